@@ -32,7 +32,7 @@ TURN = 20
 def bare() -> Callable[[], object]:
     """heyoka alone."""
     tool = compiled(HEAVY_TOP, DOUBLE)
-    with tool.lent() as engine:
+    with tool.borrowed() as engine:
         found = engine
     tool.spare.remove(found)
     found.pars[:] = [3, 2, 1, 0, 1 / 4, 1 / 3]

@@ -20,13 +20,13 @@ import json, resource, sys
 from fractions import Fraction
 from time import process_time
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
+from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE
-from heavytop.suite.cases import CASES
+from heavytop.cases import CASES
 from heavytop.top.heavy_top import State
-from heavytop.top.integrals import holding
+from heavytop.top.equations import holding
 
 horizon, count = int(sys.argv[1]), int(sys.argv[2])
 case = CASES["kovalevskaya"]

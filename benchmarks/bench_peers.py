@@ -44,9 +44,9 @@ def test_heyoka_against_the_best_peer(benchmark, case: str) -> None:
     ratios: dict[str, list[float]] = {each: [] for each in settings if each in OURS}
 
     def once(each: str) -> float:
-        knob, _, text = settings[each]
+        control, _, text = settings[each]
         time.sleep(0.001)
-        run = peers.ready(each, None if text == "eps" else (knob, exact(text)))(*problem)
+        run = peers.ready(each, None if text == "eps" else (control, exact(text)))(*problem)
         return run.seconds["run"]
 
     def repeat() -> None:

@@ -19,17 +19,16 @@ from heavytop.suite.plan import read
 
 PARTS = {
     "compiling": (
-        "integrate.engines:compiled",
-        "integrate.taylor:compiled",
+        "integrate.heyoka.engines:compiled",
+        "integrate.heyoka.motions:compiled",
         "integrate.ensemble:compiled",
-        "integrate.words:compiled",
-        "integrate.words_ensemble:compiled_lanes",
-        "integrate.words_lanes:compiled_lanes",
+        "integrate.multiword.motions:compiled",
+        "integrate.multiword.lanes:compiled_lanes",
     ),
     "integrating": (
-        "measure.integrator:Integrator.propagate",
-        "measure.integrator:Integrator.propagate_many",
-        "integrate.taylor:propagate",
+        "measure.integrator:ChosenIntegrator.propagate",
+        "measure.integrator:ChosenIntegrator.propagate_many",
+        "integrate.heyoka.motions:propagate",
     ),
     "truth": (
         "measure.truth:certified",
@@ -40,7 +39,7 @@ PARTS = {
         "kinds.growth:reference",
     ),
     "scoring": ("measure.scorer:Scorer.__call__",),
-    "noise": ("measure.reruns:Reruns._of", "measure.reruns:uncertified"),
+    "noise": ("measure.rounding_noise:Reruns._of", "measure.rounding_noise:uncertified"),
 }
 WHOLE = ("noise",)
 """Parts of which everything inside counts as that part."""

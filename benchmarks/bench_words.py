@@ -55,7 +55,7 @@ def by_words(problem: Problem, tolerance: Fraction | None, span: Fraction) -> fl
 
 def by_heyoka(problem: Problem, tolerance: Fraction | None, span: Fraction) -> float:
     """Seconds a unit of time; to the end of a whole step."""
-    with compiled(HEAVY_TOP, problem.precision, tolerance=tolerance).lent() as engine:
+    with compiled(HEAVY_TOP, problem.precision, tolerance=tolerance).borrowed() as engine:
         load(engine, problem)
         end = number(span, problem.precision)
         began = thread_time()

@@ -17,9 +17,9 @@ from itertools import permutations
 
 import msgspec
 
-from heavytop.compare.compare import compare
-from heavytop.compare.noise import Policy
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import compare
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.names import row_name
 from heavytop.kinds import KINDS, work_precision
 from heavytop.measure.scalar import UNRESOLVED, of_fraction

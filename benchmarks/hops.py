@@ -1,7 +1,7 @@
 """How many files take part in one flow: a row of drift, a propagation, a comparison, a Kovalevskaya reference.
 
 ``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order
-of their first call, and how many of them are not the mathematics (`top/`, `words/`, `exact/`).  What runs while a
+of their first call, and how many of them are not the mathematics (`top/`, `multiword/`, `exact/`).  What runs while a
 module is imported counts for nothing: all modules are imported before.  Each flow is a process of its own, so that
 nothing is cached.
 """
@@ -23,7 +23,7 @@ from typing import Any
 import heavytop as ht
 
 PACKAGE = Path(ht.__file__).parent
-MATHEMATICS = ("top/", "words/", "exact/")
+MATHEMATICS = ("top/", "multiword/", "exact/")
 PLAN = """name = "one"
 [[measure]]
 kind = "drift"

@@ -17,7 +17,7 @@ import typer
 
 import heavytop as ht
 from heavytop.cli import app
-from heavytop.compare import noise
+from heavytop.comparison import noise
 from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
 from heavytop.render.terminal import brief

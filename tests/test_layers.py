@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import heavytop
 from heavytop.kinds import KINDS
 
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
@@ -25,7 +26,7 @@ FLOORS = (
     {"suite"},
     {"document"},
     {"store"},
-    {"compare"},
+    {"comparison"},
     {"render"},
     {"kinds"},
     {"api"},
@@ -126,3 +127,7 @@ def used_by(path: Path) -> set[str]:
 def test_no_file_is_longer_than_anyone_reads() -> None:
     for path in SOURCE.rglob("*.py"):
         assert len(path.read_text("utf-8").splitlines()) <= 700, path
+
+
+def test_no_room_hides_a_public_name() -> None:
+    assert not {path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py")} & set(heavytop.__all__)

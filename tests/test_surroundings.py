@@ -220,7 +220,7 @@ for count in (2, 64):
         wrong.append(f"ensemble by {count} threads")
 try:
     ht.propagate(top, start, ["x"])
-    wrong.append("a number that is none")
+    wrong.append("a text that is not a number")
 except ht.InputError:
     pass
 if wrong:

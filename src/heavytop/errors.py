@@ -46,7 +46,7 @@ class OutOfReach(HeavyTopError):
 
 
 class PeerFailed(HeavyTopError):
-    """An integrator of others that raised or broke its contract; says which and how.  Its row says so, others go on.
+    """A third-party integrator that raised or broke its contract; says which and how.  Its row says so, others go on.
 
     answered: whether it said itself that it failed, or gave a state that is not finite, and kept the protocol.
     """

@@ -223,7 +223,7 @@ def time_text(time: Fraction) -> str:
 
 
 def exact_text(value: Fraction) -> str:
-    """An exact number as ``str`` writes it; Python refuses to write whole numbers of more than 4300 digits itself."""
+    """An exact number as ``str`` writes it; Python refuses to write integers of more than 4300 digits itself."""
     numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
     return f"{numerator}" if denominator == 1 else f"{numerator}/{denominator}"
 
@@ -319,14 +319,51 @@ def _out_of_range(value: Fraction, precision: Precision) -> InputError:
 
 
 def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
-    """:func:`number` of each: in double an array; InputError as there."""
-    if precision.family == "double":
-        import numpy
+    """:func:`number` of each, an array where whole arrays of doubles show them; InputError as there.
 
-        nearest = getattr(values, "doubles", None)
-        if nearest is not None and len(nearest):
-            return cast(Sequence[Any], numpy.array(nearest))
+    values: may have ``doubles``, the nearest to each, and say that they ``are_doubles`` themselves.
+    """
+    nearest = getattr(values, "doubles", None)
+    if nearest is None or not len(nearest):
+        return [number(value, precision) for value in values]
+    import numpy
+
+    doubles = numpy.array(nearest)
+    if precision.family == "double":
+        return cast(Sequence[Any], doubles)
+    if precision.bits >= DOUBLE.bits and getattr(values, "are_doubles", False):
+        return cast(Sequence[Any], _widened(doubles, precision))
+    if precision.family == "extended":
+        return cast(Sequence[Any], _long_doubles(values, doubles))
     return [number(value, precision) for value in values]
+
+
+def _widened(doubles: Any, precision: Precision) -> Any:
+    """An array of doubles as numbers of a format with as many bits or more."""
+    if precision.family == "extended":
+        return doubles.astype("longdouble")
+    import heyoka
+
+    return doubles.astype(heyoka.real128) if precision.family == "quad" else heyoka.real(0, precision.bits) + doubles
+
+
+def _long_doubles(values: Sequence[Fraction], doubles: Any) -> Any:
+    """The nearest to each of ``values`` in extended, out of the nearest double and the nearest to what that lacks."""
+    import numpy
+
+    lows = numpy.array([_rest(*pair) for pair in zip(values, doubles.tolist(), strict=True)])
+    highs = doubles.astype(numpy.longdouble)
+    found = highs + lows
+    error = lows - (found - highs)
+    for place in map(int, numpy.flatnonzero(found + error * (1 + 2.0**-38) != found)):  # about as near to two of them
+        found[place] = number(values[place], EXTENDED)
+    return found
+
+
+def _rest(value: Fraction, high: float) -> float:
+    top, bottom = value.as_integer_ratio()
+    above, below = high.as_integer_ratio()
+    return (top * below - above * bottom) / (bottom * below)
 
 
 def _wide(significand: int, exponent: int, precision: Precision) -> Any:

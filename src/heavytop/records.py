@@ -18,7 +18,7 @@ SCHEMA = "heavytop-report/2"
 OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
 UNSUPPORTED, OUT_OF_TIME = "unsupported", "out_of_time"
 UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME
-"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
+"""Outcomes of a row that was aborted: it has no metrics, and says why in the place of a reference.
 
 failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
 cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row."""
@@ -132,8 +132,8 @@ class Law(msgspec.Struct, frozen=True, gc=False):
     growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
     starts, null where there is too little to fit.
     first, last: the span of |t| that was fitted, which ends before saturation.
-    detects: decimal text; the smallest relative fault a step that this ensemble would have told from the healthy law.
-    lost_at: |t| from which the format holds no digit, reached or extrapolated; null where no law says so.
+    detects: decimal text; the smallest relative fault a step that this ensemble would have distinguished from the
+    healthy law. lost_at: |t| from which the format holds no digit, reached or extrapolated; null where no law says so.
     bend: 95 % interval of how much larger the exponent of the later half of the span is than that of the earlier half.
     """
 
@@ -236,7 +236,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     how: with proven values, with computed ones, with equations, or with none but its own first integrals.
     radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
     before that of all starts.  reason: why there is none, or none that is proven.
-    until: decimal text; the time from which no digit of the format is left to compare.
+    until: decimal text; the time from which all significant digits of the format are lost.
     """
 
     how: Literal["proven", "computed", "equations", "none"]
@@ -255,7 +255,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             return self.method
         if self.how == "computed":
             agreed = f" agree within {self.radius}" if self.radius else ""
-            ends = f", and no digit is left from t = {self.until} on" if self.until else ""
+            ends = f", and all significant digits are lost from t = {self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
         said = ", for the first start; ".join(each.text for each in self.certificates)

@@ -284,7 +284,7 @@ def _both(known: Domain, residual: sympy.Expr) -> list[Statement]:
 @pytest.mark.parametrize(
     "residual",
     [
-        # a ball that is no number, or not real, excludes 0 and is no witness
+        # a ball that is not a number, or not real, excludes 0 and is no witness
         1 + sympy.sqrt(-1 - T**2),
         1 + sympy.log(-1 - T**2),
         2 + sympy.acos(2 + T**2),

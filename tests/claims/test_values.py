@@ -12,7 +12,8 @@ import mpmath
 import pytest
 from rich.console import Console
 
-from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table, read_claim
+from heavytop.claims.audit import audit as auditing
+from heavytop.claims.audit.audit import audit_claim, claim_from_table, read_claim
 from heavytop.claims.audit.judge import Audit, Row
 from heavytop.claims.audit.values import PrintedNumber, ValueClaim
 from heavytop.claims.library import entry as entries
@@ -418,7 +419,7 @@ def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: 
     body = FILE.format("0.203").replace('name = "a table"\n', "")
     (tmp_path / "three.toml").write_text(head + body, "utf-8")
     monkeypatch.setattr(entries, "FOLDER", tmp_path)
-    monkeypatch.setattr(audit, "FOLDER", tmp_path)
+    monkeypatch.setattr(auditing, "FOLDER", tmp_path)
     entries.library.cache_clear()
     try:
         (task,) = AuditTable(claims=["three"]).tasks(lambda name: pytest.fail(name))

@@ -181,7 +181,7 @@ def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
     start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
     with pytest.raises(OutOfReach, match=r"Near t = 3\.31.* whether the function changes sign or only touches"):
         ht.events(PENDULUM, start, 5, "gamma1 = -3/5", digits=15)
-    # a change of sign at the end of the run itself cannot be told from one behind it
+    # a change of sign at the end of the run itself cannot be distinguished from one behind it
     at_end = Fraction(ht.events(PENDULUM, start, 3, "gamma2", digits=400).times[0].value)
     with pytest.raises(OutOfReach, match="before the end of the run"):
         ht.events(PENDULUM, start, at_end, "gamma2", digits=15)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from heavytop.exact import enclosure
+from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, working_precision
@@ -65,7 +65,7 @@ def made(request, field):
     else:
         grid = {64: 138, 128: 184, 400: 528}[precision]
         node = node_with(grid, size * 2.0 ** (grid - precision), field=field, start=motion.scaled.state)
-        found = step(field, node, grid, motion.carrier(grid))
+        found = step(field, node, grid, motion.certified(grid))
     assert found is not None
     return found
 
@@ -105,7 +105,7 @@ def theorem(found, field):
     """(D, W, the bound of |v|) of the module's theorem, exactly but for e^Λ from below; as numbers."""
     h, q, slope, beta = found.length, field.q, field.l, betas(found)
     order = found.order
-    # half an ulp an order in whole numbers; in words what tests/words/test_proven.py attacks
+    # half an ulp an order in integers; in words what tests/words/test_proven.py attacks
     defect = Fraction(found.series.rounding) * ulp(found)
     for n in range(order, 2 * order + 1):
         pairs = sum(beta[j] * beta[n - j] for j in range(max(0, n - order), min(n, order) + 1))

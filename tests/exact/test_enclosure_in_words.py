@@ -7,11 +7,12 @@ from random import Random
 import pytest
 
 from heavytop.errors import Contradiction
-from heavytop.exact.enclosure import run, start_node, step
+from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
+from heavytop.exact.enclosure.step import start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits
 from heavytop.multiword.fixed_point import fixed_point_run
-from heavytop.multiword.fixed_point.certified_series import Carrier, Series
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Series
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -145,14 +146,14 @@ def test_machine_code_that_is_wrong_is_caught_before_it_is_used(monkeypatch):
 def test_a_step_that_words_cannot_hold_is_shortened():
     """Where the series does not converge or a sum leaves its range there is a shorter step, never a wrong one."""
     motion = ScaledMotion.of(HEAVY_TOP, HEAVY_TOP.parameters(TOP, START), START.flat, forwards=True)
-    carrier = motion.carrier(138)
+    certified = motion.certified(138)
     node = start_node(motion.field, motion.scaled.state, 138)
-    assert carrier.series(node.centre, -3) is None
-    found = step(motion.field, type(node)(node.time, node.centre, node.errors, -3), 138, carrier)
+    assert certified.series(node.centre, -3) is None
+    found = step(motion.field, type(node)(node.time, node.centre, node.errors, -3), 138, certified)
     assert found is not None
     assert found.node.halvings > -3
     assert isinstance(found.series, Series)
-    assert isinstance(carrier, Carrier)
+    assert isinstance(certified, CertifiedSeries)
 
 
 @pytest.mark.parametrize("digits", [20, 40, 70])

@@ -12,10 +12,10 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact import enclosure
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.enclosure import run
+from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import quadratic
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
@@ -274,7 +274,7 @@ def test_a_motion_that_changes_far_faster_than_it_turns_is_refused():
 
 
 def test_bits_are_given_though_the_forecast_was_too_low(monkeypatch):
-    """The ladder of precisions is met at every offset: the last bit asked for counts."""
+    """The schedule of precisions is met at every offset: the last bit asked for counts."""
     monkeypatch.setattr(Validated, "_forecast", lambda *_: (-8.0, 20.0))
     solution = motion(VECTORS[0])
     for bits in range(96, 130):

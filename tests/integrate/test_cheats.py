@@ -23,7 +23,7 @@ from time import perf_counter, sleep
 import numpy
 from heavytop.integrate.peers.double import Solved, double_peer
 from heavytop.integrate.peers.splitting import _solver
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Trajectory
 
 COARSE, FINE = Fraction(1, 10**4), Fraction(1, 10**10)

@@ -55,7 +55,7 @@ FAILURES = {
     "closes its output": "closed its output before it said done",
     "a line without an end": "wrote a line of more than 1048576 characters",
     "1 GB": "wrote the state at 0.5 where that at 1",
-    "gives up": "failed: no convergence at t = 1.3",
+    "aborts": "failed: no convergence at t = 1.3",
     "only done": "said done after 0 of 2 states",
     "prompts": "wrote '> state 0.5 1 2 3 4 5 6', which is no line of the protocol",
     "an empty line": "wrote '', which is no line of the protocol",
@@ -63,11 +63,11 @@ FAILURES = {
     "ready again": "wrote 'ready faulty 1', which is no line",
     "nan": "wrote a state that is not finite at t = 1",
     "infinite": "wrote a state that is not finite at t = 0.5",
-    "overflow": "wrote '1e999', which is no number: outside the range of double",
-    "comma": "which is no number: write a decimal point, not a comma",
-    "a word": "wrote 'zero', which is no number",
-    "underscores": "wrote '1_0.5', which is no number",
-    "hexadecimal of nothing": "wrote '0x.p3', which is no number",
+    "overflow": "wrote '1e999', which is not a number: outside the range of double",
+    "comma": "which is not a number: write a decimal point, not a comma",
+    "a word": "wrote 'zero', which is not a number",
+    "underscores": "wrote '1_0.5', which is not a number",
+    "hexadecimal of nothing": "wrote '0x.p3', which is not a number",
     "five numbers": "wrote a state of 5 numbers after its time instead of 6",
     "seven numbers": "wrote a state of 7 numbers after its time instead of 6",
     "wrong order": "wrote the state at 1 where that at 0.5",
@@ -219,7 +219,7 @@ def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:
 
 
 def test_a_program_that_says_that_it_failed_keeps_the_states_so_far() -> None:
-    run = ht.propagate(CASE.top, CASE.start, TIMES, integrator=program("gives up"))
+    run = ht.propagate(CASE.top, CASE.start, TIMES, integrator=program("aborts"))
     assert (run.outcome, run.flags["failure"]) == (Outcome.FAILED, "no convergence at t = 1.3")
     assert len(run.states) == 0
     for option in ("high_accuracy", "compact_mode"):

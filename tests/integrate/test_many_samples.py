@@ -61,6 +61,10 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
         ("heyoka", QUAD, 20),
         ("multiword", DOUBLE, 1),
         ("multiword", EXTENDED, 5),
+        ("multiword", parse("double-double"), 5),
+        ("multiword", parse("real:70"), 5),
+        ("multiword", QUAD, 20),
+        ("multiword", parse("real:150"), 20),
     ],
     ids=lambda value: getattr(value, "name", value),
 )
@@ -209,9 +213,15 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
     precision, times = parse(name), [-time for time in irregular(60, 9, 4)]
     asked = {"xi": (Fraction(1), Fraction(0), Fraction(0))}
     start = State(CASE.start.omega, (0, 0, 1))
-    found = [propagate_words(CASE.top, start, times, precision, **asked)]
+
+    def observed() -> list:
+        seen: list = []
+        propagate_words(CASE.top, start, times, precision, observer=lambda _, state: seen.append(state), **asked)
+        return seen
+
+    found = [propagate_words(CASE.top, start, times, precision, **asked).states, observed()]
     monkeypatch.setattr(multiword_motions, "sums_of_two", lambda *_: None)
-    found.append(propagate_words(CASE.top, start, times, precision, **asked))
-    quick, exactly = ([[exact(value) for value in state] for state in run.states] for run in found)
-    assert quick == exactly
+    found.append(observed())
+    columns, quick, exactly = ([[exact(value) for value in state] for state in states] for states in found)
+    assert columns == quick == exactly
     assert len(quick) == len(times)

@@ -1,4 +1,4 @@
-"""Whatever an integrator of others does, its row says so and the others go on."""
+"""Whatever a third-party integrator does, its row says so and the others go on."""
 
 import importlib
 import json
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers import contract
@@ -33,7 +33,7 @@ from dataclasses import replace
 from fractions import Fraction
 import numpy
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.integrate.peers.double import Solved, double_peer
 
@@ -285,7 +285,7 @@ def test_the_rows_of_others_go_on_and_every_surface_has_the_reason(package: Path
     assert "mine:zero raised ZeroDivisionError: division by zero in euler/T=2 tolerance=1e-9" in html.report_page(
         report
     )
-    assert "gave up" not in html.report_page(report).split("</section>")[0]
+    assert "aborted" not in html.report_page(report).split("</section>")[0]
 
 
 def test_the_command_ends_with_exit_3_no_traceback_and_all_rows(package: Path) -> None:

@@ -260,10 +260,10 @@ import sys
 sys.modules["numba"] = None
 from fractions import Fraction
 from heavytop.integrate import peers
-from heavytop.suite.cases import CASES
+from heavytop.cases import CASES
 case = CASES["generic"]
-for name, knob, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
-    run = peers.ready(name, (knob, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
+for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
+    run = peers.ready(name, (control, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
     print(run.flags["field"], *run.states[-1])
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

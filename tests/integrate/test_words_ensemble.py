@@ -1,4 +1,6 @@
-"""Many motions in many words: each is the true one, and none of its bits depends on the others, on threads or order."""
+"""Many motions in multi-word arithmetic: each is the true one, and none of its bits depends on the others, on threads
+or order.
+"""
 
 from fractions import Fraction
 from random import Random

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from heavytop.compare.compare import compare
-from heavytop.compare.noise import Policy
+from heavytop.comparison.compare import compare
+from heavytop.comparison.noise import Policy
 from heavytop.document.document import Block, Chart, Headline, Section, Sources, Value
 from heavytop.document.document import Table as Cells
 from heavytop.kinds import KINDS, Kind

@@ -8,7 +8,7 @@ import pytest
 from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.measure import claim_error as module
-from heavytop.measure.claim_error import CLOSE, PARTED, exact_claim, parting, true_solution
+from heavytop.measure.claim_error import CLOSE, PARTED, divergence_time, exact_claim, true_solution
 from heavytop.precision import exact
 from support.reports import expand, load, measure
 
@@ -33,7 +33,7 @@ def distance(given: PartialCase, time: Fraction, branch: str) -> Fraction:
 @pytest.mark.parametrize(("ratio", "branch", "sign", "expected"), KNOWN)
 def test_the_distance_crosses_the_limit_between_the_two_ends(ratio, branch, sign, expected) -> None:
     given = case(ratio)
-    found = parting(given, sign * HORIZON, branch)
+    found = divergence_time(given, sign * HORIZON, branch)
     assert f"{float(found.time):.4f}" == expected
     assert 0 < found.after - found.before <= CLOSE * found.before
     ends = [distance(given, sign * time, branch) for time in (found.before, found.after)]
@@ -44,7 +44,7 @@ def test_the_distance_crosses_the_limit_between_the_two_ends(ratio, branch, sign
 @pytest.mark.parametrize("ratio", [2, 6])
 def test_it_is_the_first_time(ratio, branch) -> None:
     given = case(ratio)
-    found = parting(given, HORIZON, branch)
+    found = divergence_time(given, HORIZON, branch)
     before = [distance(given, found.before * i / 50, branch) for i in range(1, 51)]
     assert max(before) < PARTED
     # from 0 on it grows, so there is no earlier one between these samples either
@@ -55,16 +55,16 @@ def test_it_is_the_first_time(ratio, branch) -> None:
 def test_time_scales_like_one_over_alpha_and_moments_change_nothing(alpha, i1) -> None:
     alpha, i1 = exact(alpha), exact(i1)
     for ratio in (2, 6):
-        one = parting(case(ratio), HORIZON, "smooth")
-        other = parting(case(ratio, alpha, i1), HORIZON / alpha, "smooth")
+        one = divergence_time(case(ratio), HORIZON, "smooth")
+        other = divergence_time(case(ratio, alpha, i1), HORIZON / alpha, "smooth")
         assert (other.before * alpha, other.after * alpha) == (one.before, one.after)
 
 
 def test_before_it_nothing_parts_and_the_horizon_itself_counts() -> None:
-    found = parting(case(2), HORIZON, "smooth")
-    assert parting(case(2), found.before, "smooth") is None
-    assert parting(case(2), -found.before, "smooth") is None
-    late = parting(case(2), found.after * (1 + CLOSE), "smooth")
+    found = divergence_time(case(2), HORIZON, "smooth")
+    assert divergence_time(case(2), found.before, "smooth") is None
+    assert divergence_time(case(2), -found.before, "smooth") is None
+    late = divergence_time(case(2), found.after * (1 + CLOSE), "smooth")
     assert abs(late.after - found.after) <= CLOSE * found.after
 
 
@@ -72,7 +72,7 @@ def test_a_limit_that_is_touched_and_not_passed_is_no_number(monkeypatch: pytest
     # a claim that parts by less than the limit provably does not; one that is undecidable is refused, not guessed
     monkeypatch.setattr(module._Pair, "reached", lambda *_: False)
     with pytest.raises(OutOfReach, match="apart"):
-        parting(case(2), HORIZON, "smooth")
+        divergence_time(case(2), HORIZON, "smooth")
 
 
 def test_the_slope_between_two_times_is_within_its_bound() -> None:

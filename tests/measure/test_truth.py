@@ -131,7 +131,7 @@ def test_the_truth_of_a_chaotic_row_ends_where_its_format_has_no_digit_left() ->
     assert answer.ends is not None
     assert Fraction(200) <= answer.ends <= Fraction(600)
     assert answer.against.until == str(answer.ends)
-    assert f"no digit is left from t = {answer.ends} on" in answer.against.text
+    assert f"all significant digits are lost from t = {answer.ends} on" in answer.against.text
     assert not answer.covers(answer.ends)
     assert answer.covers(answer.ends / 2)
     # a run in the format itself is lost there, and was not long before
@@ -171,7 +171,8 @@ def test_more_digits_last_longer() -> None:
 
 
 def test_a_format_without_a_digit_at_the_first_sample_has_no_truth() -> None:
-    assert "no digit of the format is left at t = 5000, the first sample" in truth(chaotic(), times(10**4, 2))
+    answer = truth(chaotic(), times(10**4, 2))
+    assert "all significant digits of the format are lost at t = 5000, the first sample" in answer
 
 
 def test_the_choice_and_the_text_are_the_same_however_busy_the_machine_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +219,8 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
     answer = truth(chaotic(precision), [Fraction(horizon)])
     assert isinstance(answer, str)
     far = abs(horizon) > 10**20
-    assert ("takes too long: its first 1000 steps end at" if far else "no digit of the format is left at") in answer
+    too_late = "all significant digits of the format are lost at"
+    assert ("takes too long: its first 1000 steps end at" if far else too_late) in answer
     assert ".;" not in answer
     assert not answer.endswith(".")
     assert steps < 60_000

@@ -12,7 +12,7 @@ import pytest
 import heavytop.exact
 from heavytop.cases import CASES
 from heavytop.claims.library.ershkov import PartialCase
-from heavytop.compare.verdicts import weaker
+from heavytop.comparison.verdicts import weaker
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.integrate.trajectory import Problem
@@ -140,7 +140,7 @@ def test_references_of_ensembles_say_what_they_are_known_to() -> None:
 def test_a_truth_that_ends_earlier_is_weaker() -> None:
     whole, late, early = (Against("computed", "words", "1e-9", until=until) for until in ("", "400", "-150"))
     for old, new in ((whole, late), (whole, early), (late, early)):
-        assert weaker(old, new) == "the truth ends earlier"
+        assert weaker(old, new) == "the reference is valid until an earlier time"
         assert weaker(new, old) == ""
     assert weaker(late, msgspec.structs.replace(late, until="300")) == ""
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from heavytop.compare.noise import Policy, Rule, Timings
-from heavytop.compare.verdicts import Verdict, judge_seconds
+from heavytop.comparison.noise import Policy, Rule, Timings
+from heavytop.comparison.verdicts import Verdict, judge_seconds
 from heavytop.document.names import short
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction

@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from heavytop.compare.noise import Policy
-from heavytop.compare.rows import judge_law, judge_series
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.rows import judge_law, judge_series
 from heavytop.errors import InputError
 from heavytop.records import Against, Certified, Law, Metric, Row, Series
 from support.edited_reports import EDITS, document_of, trials

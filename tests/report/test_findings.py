@@ -2,8 +2,8 @@
 
 import pytest
 
-from heavytop.compare.findings import MOST
-from heavytop.compare.noise import Policy
+from heavytop.comparison.findings import MOST
+from heavytop.comparison.noise import Policy
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Law, Row, Subject

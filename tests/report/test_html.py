@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.document.document import MOST_PLOTS, Card, Headline, In, Section, Word, points
 from heavytop.document.kind import document
 from heavytop.document.svg import apart, decades, finish, new_axes
@@ -141,7 +141,8 @@ def test_the_headline_says_what_the_audit_found(tmp_path: Path, verdict: str, wo
 def test_no_claim_no_verdict_on_one() -> None:
     assert list(KINDS["audit"].document([])) == []
     page = html.report_page(Report("", {}, {}, [row()]))
-    assert '<h2 id="verdict-heading">heyoka has 10.0 of 16 digits left at T = 1000 (euler in double).</h2>' in page
+    said = "heyoka has 10.0 of 16 significant digits at T = 1000 (euler in double)."
+    assert f'<h2 id="verdict-heading">{said}</h2>' in page
     assert "claim" not in page[page.index("<main") : page.index("</main")]
 
 
@@ -240,9 +241,9 @@ def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str,
     euler, lagrange = section.pictures
     assert all(f">{name}</text>" in euler.svg for name in ("heyoka double", "peer:A", "peer:B"))
     assert all(f">{name}</text>" in lagrange.svg for name in ("cyrk:DOP853", "splitting:4"))
-    assert "peer:B: gave up (1)." in euler.description
+    assert "peer:B: aborted (1)." in euler.description
     assert section_of("work-precision", Report("", {}, {}, [row()])) is None
-    assert "1 run of work against precision gave up" in pages["report"].text
+    assert "1 run of work against precision aborted" in pages["report"].text
 
 
 def test_rows_without_a_number_anywhere_make_a_page_all_the_same(tmp_path: Path) -> None:
@@ -340,15 +341,15 @@ def test_ticks_of_long_and_short_logarithmic_axes(low: float, high: float, words
 def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
     mine = row(integrator="mine:rk", metrics={RELATIVE.text: error("1e-4")})
     alone = row(case="far", horizon="9000", integrator="mine:rk", metrics={RELATIVE.text: error("1e-2")})
-    said = "mine:rk has 4.0 of 16 digits left at T = 1000 (euler in double), heyoka 10.0."
+    said = "mine:rk has 4.0 of 16 significant digits at T = 1000 (euler in double), heyoka 10.0."
     assert digits_headline([row(), mine, alone]) == Headline(said)
     assert digits_headline([row(horizon="10"), row()]) == Headline(
-        "heyoka has 10.0 of 16 digits left at T = 1000 (euler in double).",
+        "heyoka has 10.0 of 16 significant digits at T = 1000 (euler in double).",
     )
     only = {"solution_error_omega_max": error("1e-5"), "solution_error_gamma_max": error("1e-3")}
     assert (
         digits_headline([row(metrics=only)]).text
-        == "heyoka has at least 3.0 of 16 digits left at T = 1000 (euler in double)."
+        == "heyoka has at least 3.0 of 16 significant digits at T = 1000 (euler in double)."
     )
     assert digits_headline([row(outcome="time_limit")]) is None
 
@@ -412,7 +413,7 @@ def test_kinds_that_are_mixed_answer_in_order_and_what_a_card_says_is_said_once(
     )
     assert opened[0].startswith("The claimed solution is not a motion")
     said = [other[1] for other in others]
-    assert said[0] == "heyoka has 8.7 of 16 digits left at T = 1e5 (lagrange in double)."
+    assert said[0] == "heyoka has 8.7 of 16 significant digits at T = 1e5 (lagrange in double)."
     assert said[1:] == [ALONE["homoclinic"], ALONE["break_away_law"], ALONE["claim_evaluation"]]
 
 

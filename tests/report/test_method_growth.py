@@ -5,7 +5,7 @@ import math
 import numpy
 import pytest
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.document.svg import quiet_style
 from heavytop.records import SCHEMA, Report, Series
 from heavytop.render.work_precision import alike, method_growth, trend

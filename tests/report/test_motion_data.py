@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, exact

@@ -12,8 +12,8 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.noise import Policy
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.noise import Policy
 from heavytop.document.document import logarithm
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact

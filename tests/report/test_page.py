@@ -14,7 +14,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.precision import DOUBLE
 from heavytop.records import Report, Row
 from heavytop.render.history import history_page
@@ -130,7 +130,7 @@ def smoke(default: Report) -> Report:
 
 
 def gate(default: Report, growth: Report, peers: Report) -> Report:
-    """An integrator of a user beside heyoka, as plan gate has it: drift, one ladder, growth."""
+    """An integrator of a user beside heyoka, as plan gate has it: drift, one schedule, growth."""
     drift = [each for each in default.rows if each.key.kind == "drift" and each.precision == "double"]
     work = [each for each in peers.rows if each.case == "lagrange/T=1000" and each.key.subject.name == "heyoka"]
     rows = [*drift, *work, growth.rows[0]]

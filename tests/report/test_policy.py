@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy, adjusted, load
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.noise import Policy, adjusted, load
+from heavytop.comparison.verdicts import Verdict
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.records import Law, Row

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.compare.noise import (
+from heavytop.comparison.noise import (
     Policy,
     RoundingBound,
     Rule,

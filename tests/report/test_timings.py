@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy, Rule, Timings
+from heavytop.comparison.noise import Policy, Rule, Timings
 from heavytop.errors import InputError
 from heavytop.kinds import work_precision
 from heavytop.measure.integrator import Repeats

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from heavytop.compare.work_precision import Line, Point, beside_ours, leads, panels
+from heavytop.comparison.work_precision import Line, Point, beside_ours, leads, panels
 from heavytop.document.document import Headline
 from heavytop.document.svg import quiet_style
 from heavytop.errors import InputError

@@ -13,7 +13,7 @@ import pytest
 import heavytop as ht
 from heavytop import records
 from heavytop.api.run_folder import prepare
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.files import line, verified
 from heavytop.integrate import peers

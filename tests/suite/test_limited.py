@@ -15,7 +15,7 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.suite.limited import RowLimits

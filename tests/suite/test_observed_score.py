@@ -245,3 +245,14 @@ def test_units_of_any_size_change_no_diagnosis(power: int, tmp_path: Path) -> No
         omega=f"0, 0, 3e{-power}", inertia=f"2{size[1:]}, 2{size[1:]}, 1{size[1:]}", weight=f"1e{-power}",
     )  # fmt: skip
     assert "scalar_last" in str([(e.kind, e.numbers) for e in scored(last, tmp_path).diagnoses])
+
+
+@pytest.mark.parametrize("about", ["pivot", "centre of mass"])
+def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> None:
+    keys = {"mass": "15", "gravity": "9.81", "centre": "0,1,0", "inertia": "0.234375,0.46875,0.234375", "about": about}
+    lines = [f"# {key}: {value}" for key, value in (keys | {"omega": "0,150,-4.61538"}).items()]
+    file = tmp_path / "motion.csv"
+    file.write_text("\n".join([*lines, "t,qw,qx,qy,qz", "0,1,0,0,0", "0.01,0.73,0,0.68,0"]) + "\n", "utf-8")
+    told = [text for text in read(file, None, True).warnings() if "not that of a rigid body" in text]
+    assert len(told) == (about == "pivot")
+    assert all('give about = "centre of mass"' in text for text in told)

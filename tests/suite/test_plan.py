@@ -202,6 +202,24 @@ def test_moments_that_no_body_has_are_told(tmp_path: Path) -> None:
     assert warning == "top odd: I3 = 7 exceeds the sum 5 of the other two: no rigid body has such moments."
 
 
+@pytest.mark.parametrize("about", ["pivot", "centre of mass"])
+def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> None:
+    body = 'mass = "15"\ngravity = "9.81"\ncentre = ["0", "1", "0"]\ninertia = ["0.234375", "0.46875", "0.234375"]\n'
+    start = 'omega = ["0", "150", "-4.61538"]\nquaternion = ["1", "0", "0", "0"]\n'
+    table = '[[measure]]\nkind = "drift"\ncases = ["mine"]\nruns = [{precision = "double", horizon = "1"}]\n'
+    file = tmp_path / "own.toml"
+    file.write_text(f'name = "own"\n[[top]]\nname = "mine"\n{body}about = "{about}"\n{start}{table}')
+    found = warnings(load(str(file))[0])
+    if about == "pivot":
+        (text,) = found
+        assert text.startswith(
+            "top mine: The inertia tensor about the centre of mass, diagonal -945/64, 15/32, -945/64,"
+        )
+        assert text.endswith('If it was meant about it, give about = "centre of mass".')
+    else:
+        assert found == []
+
+
 @pytest.mark.parametrize(
     ("tolerance", "integrator", "refused"),
     [("1e-20", "heyoka", True), ("1e-15", "heyoka", False), ("1e-16", "sundials:CVODE", False), ("0", "heyoka", True)],
@@ -211,8 +229,8 @@ def test_a_tolerance_below_eps_is_refused_before_anything_runs(
 ) -> None:
     pytest.importorskip("sksundae")
     file = tmp_path / "work.toml"
-    ladder = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
-    file.write_text(f'name = "work"\n{ladder}')
+    schedule = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
+    file.write_text(f'name = "work"\n{schedule}')
     if refused:
         with pytest.raises(InputError, match="olerance"):
             read(str(file))

@@ -4,8 +4,8 @@ from dataclasses import replace as replace_dataclass
 
 import pytest
 
-from heavytop.compare.noise import Policy
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.verdicts import Verdict
 from heavytop.errors import InputError
 from heavytop.integrate import integrator
 from heavytop.measure.scalar import UNRESOLVED, of_fraction

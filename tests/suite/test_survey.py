@@ -12,7 +12,8 @@ import numpy
 import pytest
 
 import heavytop as ht
-from heavytop.compare.noise import Policy
+from heavytop.comparison import motions
+from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.multiword.lanes import Pairs
@@ -146,7 +147,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 2)
     tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
     rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
-    lost = [failed(task, "heyoka gave up") for task in tasks]
+    lost = [failed(task, "heyoka aborted") for task in tasks]
 
     def report(*parts: Row) -> ht.Report:
         return ht.Report(SCHEMA, {"name": "many"}, {}, gathered(zip(tasks, parts, strict=True)))
@@ -156,7 +157,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     for bad, first in ((part, 2), (none, 0)):
         found = compare(whole, bad, Policy())
         assert (found.verdict, found.exit_code, len(found.findings)) == ("worse", 1, 1)
-        assert f"heyoka gave up in many[{first}]" in found.findings[0].reason
+        assert f"heyoka aborted in many[{first}]" in found.findings[0].reason
     assert compare(none, none, Policy()).verdict == "same"
 
 
@@ -240,3 +241,83 @@ def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) 
 def test_a_map_without_two_axes_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="two axes"):
         read(str(plan(tmp_path, more='map = ["omega1"]')), KINDS)
+
+
+def _surveyed(folder: Path, monkeypatch: pytest.MonkeyPatch, fault: float = 0.0, places: tuple[int, ...] = ()) -> Path:
+    """A run of 80 motions, of which some are off by a planted error of γ1; NaN for runs that end early."""
+    runs = records._runs
+
+    def faulty(*given: object) -> object:
+        outcomes, states, steps = runs(*given)  # type: ignore[arg-type]
+        states.high[list(places), -1, 3] += fault
+        outcomes[[place for place in places if math.isnan(fault)]] = "incomplete"
+        return outcomes, states, steps
+
+    folder.mkdir()
+    file = plan(folder, 80)
+    with monkeypatch.context() as patch:
+        patch.setattr(records, "_runs", faulty)
+        ht.run(file, folder / "out", workers=1)
+    return folder / "out"
+
+
+def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
+    faulty = _surveyed(tmp_path / "faulty", monkeypatch, 1e-9, (11, 40))
+    (found,) = ht.compare(healthy, faulty).motions
+    assert (found.joined, found.worse, {each.index for each in found.first}) == (80, 2, {11, 40})
+    table = ht.read_survey(healthy)
+    for each in found.first:
+        assert each.before == round(table.digits_right[each.index], 2)
+        assert each.after == pytest.approx(9, abs=0.5)
+    said = heavytop("compare", healthy, faulty)
+    assert said.returncode == 1
+    pasted = " ".join(said.stdout.replace("\\\n", " ").split())
+    assert f"got worse: 2 of 80 {found.first[0].text} {found.first[0].command} motion" in pasted
+    assert json.loads(heavytop("compare", healthy, faulty, "--json").stdout)["surveys"][0]["worse"] == 2
+    (back,) = ht.compare(faulty, healthy).motions
+    assert (back.worse, back.sentence) == (0, "")
+
+
+def test_a_command_made_of_a_record_measures_the_same_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = _surveyed(tmp_path / "healthy", monkeypatch)
+    (row,) = ht.read_report(out).rows
+    columns = motions._records(out / "survey.parquet", row)
+    for index in (3, 70):
+        line = motions._command(row, columns, index, "success").partition(" | ")[0].split()
+        state = json.loads(heavytop("propagate", *line[2:]).stdout)
+        case = Random(name="many", seed=3, count=80).cases()[index]
+        expected = ht.propagate(case.top, case.start, TIMES, ht.DOUBLE)
+        assert [*map(float, state["states"][-1])] == [*map(float, expected.states[-1])]
+
+
+def test_a_fault_that_no_quantile_sees_is_listed_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = tuple(range(0, 80, 3))  # a third of the motions is off in both
+    healthy = _surveyed(tmp_path / "healthy", monkeypatch, 1e-9, before)
+    faulty = _surveyed(tmp_path / "faulty", monkeypatch, 1e-9, (*before, 11))
+    found = ht.compare(healthy, faulty)
+    assert found.verdict == "same"
+    assert [each.index for each in found.motions[0].first] == [11]
+
+
+def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
+    faulty = _surveyed(tmp_path / "faulty", monkeypatch, math.nan, (7,))
+    (found,) = ht.compare(healthy, faulty).motions
+    assert [(each.index, each.after, each.outcome) for each in found.first] == [(7, None, "incomplete")]
+    assert not found.first[0].command.endswith("score -")
+    assert ht.compare(faulty, faulty).motions[0].worse == 0
+
+
+def test_surveys_of_other_tops_are_not_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    healthy = _surveyed(tmp_path / "healthy", monkeypatch)
+    file = plan(tmp_path, 9)
+    file.write_text(file.read_text().replace("seed = 3", "seed = 4"))
+    ht.run(file, tmp_path / "other", workers=1)
+    (found,) = ht.compare(healthy, tmp_path / "other").motions
+    assert found.reason == "motion 0 is another top or start"
+    assert not found.first

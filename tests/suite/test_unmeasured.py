@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import truth
 from heavytop.suite.rows import unmeasured
@@ -103,9 +103,9 @@ horizon = "1"
 
 
 def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
-    ladder = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
-    ladder += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
-    (task,) = tasks_of(tmp_path, 'name = "work"\n' + ladder)
+    schedule = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
+    schedule += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
+    (task,) = tasks_of(tmp_path, 'name = "work"\n' + schedule)
     row = unmeasured(task, OutOfReach("Nothing is known there."))
     assert row.identity[1:] == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
     assert not all_good([row])

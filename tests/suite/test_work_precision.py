@@ -1,4 +1,4 @@
-"""Work against precision: the errors are true, a run that gives up is a failure, bad ladders are refused."""
+"""Work against precision: the errors are true, a run that aborts is a failure, bad ladders are refused."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
-from heavytop.compare.work_precision import panels
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.work_precision import panels
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint

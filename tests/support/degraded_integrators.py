@@ -19,8 +19,8 @@ from typing import Any
 import msgspec
 import numpy
 
-from heavytop.compare.noise import Policy
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.verdicts import Verdict
 from heavytop.integrate.peers.double import Given, Solved, double_peer
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact

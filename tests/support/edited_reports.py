@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text, exact, log10
 from heavytop.records import Against

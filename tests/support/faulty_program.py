@@ -64,7 +64,7 @@ INSTEAD = {  # of the answer to a request with times
     "closes its output": lambda: (os.close(1), hang()),
     "a line without an end": lambda: (sys.stdout.write("9" * 3_000_000), sys.stdout.flush(), hang()),
     "1 GB": lambda: [sys.stdout.write("state 0.5 1 2 3 4 5 6\n" * 10_000) for _ in iter(int, 1)],
-    "gives up": lambda: out("failed no convergence at t = 1.3"),
+    "aborts": lambda: out("failed no convergence at t = 1.3"),
     "only done": lambda: out("done"),
     "prompts": lambda: out("> state 0.5 1 2 3 4 5 6"),
     "an empty line": lambda: out(""),

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from heavytop import records
-from heavytop.compare import compare as _compare
+from heavytop.comparison import compare as _compare
 from heavytop.document.kind import kind_of
 from heavytop.errors import PeerFailed
 from heavytop.kinds import KINDS

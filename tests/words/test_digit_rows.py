@@ -1,4 +1,4 @@
-"""Digits: sums of products against integers, digits of words, and steps against whole numbers."""
+"""Digits: sums of products against integers, digits of words, and steps against integers."""
 
 import ctypes
 from fractions import Fraction

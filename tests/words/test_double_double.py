@@ -26,7 +26,7 @@ from heavytop.multiword.codegen.machine_code import (
 )
 from heavytop.multiword.double_double import steps as dd
 from heavytop.multiword.double_double.arithmetic import by_constant, log2, power_of_two, split, split_constant
-from heavytop.multiword.double_double.double_double_run import Floating, Ladder
+from heavytop.multiword.double_double.double_double_run import Floating, OrderSchedule
 from heavytop.multiword.double_double.eight_lane_run import Eight
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
@@ -34,14 +34,14 @@ from support.words_helpers import LEVELS, problem
 
 PATH = os.pathsep.join(map(str, Path(__file__).parents[:2]))
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
-LADDER = Ladder.of(FINEST)
+LADDER = OrderSchedule.of(FINEST)
 PLAIN = Processor("x86-64")
 
 
 @cache
 def bits_on(processor: Processor | None, attitude: bool, tolerance: Fraction) -> tuple[object, ...]:
     """All that a run knows at t = 30, in code for that processor."""
-    run = Floating(problem(1, attitude), Ladder.of(tolerance), True, processor=processor)
+    run = Floating(problem(1, attitude), OrderSchedule.of(tolerance), True, processor=processor)
     assert run.advance(Fraction(30), 10**6) is Status.FINE
     return run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))
 
@@ -120,7 +120,7 @@ def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
     """glibc masks FMA and AVX2, so that its own fma, which code for x86-64 calls, is computed in software."""
     script = (
         "import test_double_double as t; "
-        "run = t.Floating(t.problem(), t.Ladder.of(t.COARSE), True, processor=t.PLAIN); "
+        "run = t.Floating(t.problem(), t.OrderSchedule.of(t.COARSE), True, processor=t.PLAIN); "
         "run.advance(t.Fraction(30), 10**6); print(*run.place())"
     )
     environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": PATH}
@@ -130,8 +130,8 @@ def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
 
 
 def test_more_orders_are_kept_in_double_double_where_the_spin_is_fast() -> None:
-    ladder = Ladder.of(Fraction(1, 10**20))
-    slow, fast = Floating(problem(), ladder, True), Floating(problem(20), ladder, True)
+    schedule = OrderSchedule.of(Fraction(1, 10**20))
+    slow, fast = Floating(problem(), schedule, True), Floating(problem(20), schedule, True)
     for run in (slow, fast):
         run.advance(Fraction(20), 10**6)
     assert slow.counts[dd.USED] < fast.counts[dd.USED]
@@ -139,8 +139,8 @@ def test_more_orders_are_kept_in_double_double_where_the_spin_is_fast() -> None:
 
 def test_n0_rises_within_one_step_to_what_the_motion_needs() -> None:
     """Begun with nearly every order in plain doubles, the first step that stands is as good as any."""
-    ladder = Ladder.of(Fraction(1, 10**25))
-    careful, careless = (Floating(problem(), ladder, True, low_order=n) for n in (None, 2))
+    schedule = OrderSchedule.of(Fraction(1, 10**25))
+    careful, careless = (Floating(problem(), schedule, True, low_order=n) for n in (None, 2))
     for run in (careful, careless):
         run.advance(Fraction(1, 2**30), 1)
         assert run.steps == 1

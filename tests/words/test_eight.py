@@ -4,14 +4,14 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, Ladder
+from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, OrderSchedule
 from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import rotor
 from support.words_helpers import LEVELS
 
-FINE = Ladder.of(Fraction(1, 2**105), FALL_IN_LANES)
+FINE = OrderSchedule.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)
 
 
@@ -22,8 +22,8 @@ def problems(system) -> list[Scaled]:
     return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
 
 
-def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=33, processor=None, forwards=True) -> Eight:
-    eight = Eight(system, ladder, low_order, processor)
+def in_lanes(system, lanes: list[Scaled | None], schedule=FINE, low_order=33, processor=None, forwards=True) -> Eight:
+    eight = Eight(system, schedule, low_order, processor)
     for lane, problem in enumerate(lanes):
         if problem is not None:
             eight.put(lane, problem, forwards, None)
@@ -42,7 +42,7 @@ def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> N
     given = problems(system)
     found = samples(in_lanes(system, given, forwards=forwards))
     for lane, problem in enumerate(given):
-        run = Floating(problem, Ladder.of(Fraction(1, 2**105)), forwards)
+        run = Floating(problem, OrderSchedule.of(Fraction(1, 2**105)), forwards)
         assert run.advance(SPAN, 10**6) is Status.FINE
         off = max(abs(a - b) for a, b in zip(found[lane], run.sample(SPAN), strict=True))
         assert off < Fraction(1, 2**94)
@@ -64,7 +64,7 @@ def test_what_a_symmetric_top_spares_changes_no_bit() -> None:
     alike = [Scaled.of(HEAVY_TOP, p, tuple(Fraction(n * k, 7) for n in (1, 2, -3, 4, 5, 3))) for k in range(1, 8)]
     spared = samples(in_lanes(HEAVY_TOP, [None, *alike]), range(1, 8))
     assert spared == samples(in_lanes(HEAVY_TOP, [problems(HEAVY_TOP)[0], *alike]), range(1, 8))
-    run = Floating(alike[0], Ladder.of(Fraction(1, 2**105)), True)
+    run = Floating(alike[0], OrderSchedule.of(Fraction(1, 2**105)), True)
     assert run.advance(SPAN, 10**6) is Status.FINE
     assert max(abs(a - b) for a, b in zip(spared[1], run.sample(SPAN), strict=True)) < Fraction(1, 2**94)
 
@@ -87,6 +87,6 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
 
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
-    given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20), FALL_IN_LANES)
-    own, other = (samples(in_lanes(HEAVY_TOP, given, ladder, 16, each)) for each in (None, processor))
+    given, schedule = list(problems(HEAVY_TOP)), OrderSchedule.of(Fraction(1, 10**20), FALL_IN_LANES)
+    own, other = (samples(in_lanes(HEAVY_TOP, given, schedule, 16, each)) for each in (None, processor))
     assert own == other

@@ -13,7 +13,7 @@ from heavytop.multiword.codegen.machine_code import doubles, pointer
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT
 from heavytop.multiword.fixed_point import arithmetic, certified_series
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
-from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import rotor
 from support.words_helpers import LEVELS
@@ -58,16 +58,16 @@ def rounded(motion: ScaledMotion, grid: Grid) -> list[int]:
     return [round(value * 2**grid.total) for value in motion.scaled.state]
 
 
-def used(motion: ScaledMotion, carrier: Carrier, centre: list[int], halvings: int) -> float | None:
+def used(motion: ScaledMotion, certified: CertifiedSeries, centre: list[int], halvings: int) -> float | None:
     """How much of the bound is used; None where there is no series."""
-    series = carrier.series(centre, halvings)
+    series = certified.series(centre, halvings)
     if series is None:
         return None
-    true = lacking(motion.field, series, carrier.grid.total, halvings)
+    true = lacking(motion.field, series, certified.grid.total, halvings)
     assert [sum(component) for component in series.values] == list(series.total)
     assert [component[0] for component in series.values] == centre
     for n, column in enumerate(zip(*series.values, strict=True)):
-        assert max(map(abs, column)) <= Fraction(series.sizes[n]) * 2**carrier.grid.total
+        assert max(map(abs, column)) <= Fraction(series.sizes[n]) * 2**certified.grid.total
     return float(sum(true) / Fraction(series.rounding))
 
 
@@ -91,10 +91,10 @@ def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude
     for _ in range(6):
         motion = some_motion(random, system, attitude, decades=random.choice([0, 3, 100]))
         assert motion.in_words
-        carrier = Carrier(motion.scaled, grid, motion.forwards)
+        certified = CertifiedSeries(motion.scaled, grid, motion.forwards)
         for centre in (rounded(motion, grid), extreme_centre(random, grid, len(motion.scaled.state))):
             for halvings in range(8):
-                share = used(motion, carrier, centre, halvings)
+                share = used(motion, certified, centre, halvings)
                 if share is not None:
                     shares.append(share)
                     break
@@ -116,9 +116,9 @@ def test_coefficients_that_are_smaller_than_the_state_by_several_words(words: in
         ):
             p = Parameters(tuple(map(Fraction, moments)), tuple(map(Fraction, moment)), Fraction(0))
             motion = ScaledMotion.of(HEAVY_TOP, p, tuple(map(Fraction, state)), True)
-            carrier = Carrier(motion.scaled, grid, True)
+            certified = CertifiedSeries(motion.scaled, grid, True)
             for halvings in (2, 5):
-                share = used(motion, carrier, rounded(motion, grid), halvings)
+                share = used(motion, certified, rounded(motion, grid), halvings)
                 assert share is None or share <= 1
 
 
@@ -140,30 +140,30 @@ def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
     for terms in (1, orders):
         assert each * terms + once >= terms * ((words + 1) * rounding + dropped) + rounding
     motion = some_motion(Random(2))
-    carrier = Carrier(motion.scaled, grid, True)
+    certified = CertifiedSeries(motion.scaled, grid, True)
     widest, added = numpy.zeros((2, words, 8)), numpy.zeros((1, words, 8))
     each, once = certified_series._error(grid, numpy.zeros(2 * words - 1), orders)
     for scale in (0.0, 2.0**20):
         sums = [
-            Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(carrier._of_constants)) for n in range(1, 41)
+            Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(certified._of_constants)) for n in range(1, 41)
         ]
         total = sum((part + Fraction(1, 2)) / n + Fraction(3, 4) for n, part in enumerate(sums, 1))
-        assert total <= Fraction(carrier._rounding(widest, added, orders, scale)) <= 2 * total
+        assert total <= Fraction(certified._rounding(widest, added, orders, scale)) <= 2 * total
 
 
 def test_sums_have_room_for_the_largest_products_between_two_looks() -> None:
     """(1): four products of 2^50 units are one too many."""
     grid = grid_of(3, whole=True)
-    carrier = Carrier(some_motion(Random(2)).scaled, grid, True)
+    certified = CertifiedSeries(some_motion(Random(2)).scaled, grid, True)
     for share, fine in ((1 - 2.0**-10, True), (1.0, False)):
         widest, added = numpy.zeros((2, 3, 8)), numpy.zeros((1, 3, 8))
         widest[0, 0], widest[1, 0] = (2.0 ** (48 - grid.bits) * part for part in (1.0, 2.0 ** (grid.bits - 46) * share))
-        assert (carrier._rounding(widest, added, 2, 1.0) is not None) is fine
+        assert (certified._rounding(widest, added, 2, 1.0) is not None) is fine
     # and the sum of all coefficients stays exact
     for share, fine in ((0.5, True), (2.0, False)):
         added = numpy.zeros((1, 3, 8))
         added[0, 0, 5] = share * 2.0 ** (52 - grid.bits)
-        assert (carrier._rounding(numpy.zeros((2, 3, 8)), added, 2, 1.0) is not None) is fine
+        assert (certified._rounding(numpy.zeros((2, 3, 8)), added, 2, 1.0) is not None) is fine
 
 
 @pytest.mark.parametrize(("words", "vectors"), [(3, 1), (4, 2), (24, 1)])
@@ -201,9 +201,9 @@ def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
         grid = Grid(3, bits, whole=True)
         for _ in range(6):
             motion = some_motion(random)
-            carrier = Carrier(motion.scaled, grid, motion.forwards)
+            certified = CertifiedSeries(motion.scaled, grid, motion.forwards)
             for centre in (rounded(motion, grid), extreme_centre(random, grid, 6)):
-                share = used(motion, carrier, centre, 3)
+                share = used(motion, certified, centre, 3)
                 refused += share is None
                 assert share is None or share <= 1
     assert refused
@@ -213,8 +213,8 @@ def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     motion = some_motion(Random(5), attitude=True)
     grid = grid_of(4, whole=True)
-    one, other = (Carrier(motion.scaled, grid, True, processor=each) for each in (None, processor))
-    found, same = (carrier.series(rounded(motion, grid), 3) for carrier in (one, other))
+    one, other = (CertifiedSeries(motion.scaled, grid, True, processor=each) for each in (None, processor))
+    found, same = (certified.series(rounded(motion, grid), 3) for certified in (one, other))
     assert found is not None
     assert same is not None
     assert found.values == same.values
@@ -223,7 +223,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
 
 def test_a_carrier_travels_between_processes() -> None:
     motion, grid = some_motion(Random(6)), grid_of(3, whole=True)
-    carrier = Carrier(motion.scaled, grid, True)
-    again = pickle.loads(pickle.dumps(carrier))
+    certified = CertifiedSeries(motion.scaled, grid, True)
+    again = pickle.loads(pickle.dumps(certified))
     centre = rounded(motion, grid)
-    assert again.series(centre, 4).values == carrier.series(centre, 4).values
+    assert again.series(centre, 4).values == certified.series(centre, 4).values

@@ -1,4 +1,4 @@
-"""Coefficients split in two: their sums are exact, and what they leave out is as small as the ladder says."""
+"""Coefficients split in two: their sums are exact, and what they leave out is as small as the schedule says."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -10,14 +10,14 @@ import pytest
 from heavytop.multiword.codegen.recurrence import MOST_ORDER
 from heavytop.multiword.double_double import steps as dd
 from heavytop.multiword.double_double import steps as parts
-from heavytop.multiword.double_double.double_double_run import Floating, Ladder
+from heavytop.multiword.double_double.double_double_run import Floating, OrderSchedule
 from heavytop.multiword.double_double.eight_lane_run import Eight
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import rotor
 from support.words_helpers import problem
 
-FINE = Ladder.of(Fraction(1, 2**70))
+FINE = OrderSchedule.of(Fraction(1, 2**70))
 ALL_PAIRS = replace(FINE, depth=-1000.0)
 
 
@@ -57,7 +57,7 @@ def test_a_step_in_split_coefficients_differs_by_less_than_its_ladder_allows(sys
     random, most = Random(2), Fraction(1, 2**79)
     for scale in (0, 100, -100, 0, 0):
         given = random_problem(random, system, attitude, scale)
-        split, exact = (Floating(given, ladder, True) for ladder in (FINE, ALL_PAIRS))
+        split, exact = (Floating(given, schedule, True) for schedule in (FINE, ALL_PAIRS))
         for _ in range(20):
             for run in (split, exact):
                 assert run.advance(run.time + Fraction(1, 10**9), 1) is Status.FINE
@@ -98,7 +98,7 @@ def test_units_out_of_reach_are_not_used() -> None:
     """Ω is far below what units reach: nothing is split then."""
     p = Parameters(tuple(map(Fraction, (3, 2, 1))), (Fraction(0), Fraction(0), Fraction(1)), Fraction(0))
     start = (Fraction(1, 10**140), *(Fraction(0) for _ in range(4)), Fraction(1))
-    split, exact = (Floating(Scaled.of(HEAVY_TOP, p, start), ladder, True) for ladder in (FINE, ALL_PAIRS))
+    split, exact = (Floating(Scaled.of(HEAVY_TOP, p, start), schedule, True) for schedule in (FINE, ALL_PAIRS))
     for run in (split, exact):
         assert run.advance(Fraction(20), 10**6) is Status.FINE
     assert split.words[split.layout.units] < 2.0**-400
@@ -108,12 +108,12 @@ def test_units_out_of_reach_are_not_used() -> None:
 
 def test_lanes_are_split_as_a_motion_by_itself_is() -> None:
     random = Random(3)
-    ladder = Ladder.of(Fraction(1, 2**70), 1.6)
+    schedule = OrderSchedule.of(Fraction(1, 2**70), 1.6)
     for system in (HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT):
         given = [random_problem(random, system, False, (0, 40, -40)[k % 3]) for k in range(8)]
         found = []
         for pairs in (False, True):
-            eight = Eight(system, replace(ladder, depth=-1000.0) if pairs else ladder, ladder.order - 2)
+            eight = Eight(system, replace(schedule, depth=-1000.0) if pairs else schedule, schedule.order - 2)
             assert (eight.pair_order == eight.low_order) is pairs
             for lane, one in enumerate(given):
                 eight.put(lane, one, True, 5)

@@ -1,4 +1,4 @@
-"""Motions in whole numbers: the field, proven accuracy, the same bits however a run is cut."""
+"""Motions in integers: the field, proven accuracy, the same bits however a run is cut."""
 
 from fractions import Fraction
 from random import Random

@@ -32,7 +32,7 @@ class Hunt:
     """What a hunt came to; prints as `heavytop hunt` does.
 
     found: a dict each, worst first: exact texts of ``inertia``, ``weight``, ``centre``, ``omega`` and ``gamma`` after
-    shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one came to nothing),
+    shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one was aborted),
     ``outcome``, ``class``, ``command`` that shows it again, ``toml`` ready to paste.
     motions: that were tried, shrinking left out.  seed: of the search.
     hunted: everything that was measured; again: the command that searches so again.

@@ -480,7 +480,7 @@ class Integrator:
         if self._is_plain:
             plain = self._plain(state, row, targets)
             if plain is not None:
-                with self._tool.lent() as engine:
+                with self._tool.borrowed() as engine:
                     return states_at(engine, self._numbers, plain, targets, self._limit, self._form)
         if state is None:
             state = State(row[:3], row[3:])

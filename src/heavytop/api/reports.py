@@ -12,8 +12,9 @@ from heavytop import records
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.api.run_folder import prepare
-from heavytop.compare import compare as comparing
-from heavytop.compare import noise as policies
+from heavytop.comparison import compare as comparing
+from heavytop.comparison import noise as policies
+from heavytop.comparison.motions import beside
 from heavytop.display import Table, Tabular
 from heavytop.document.names import printable, row_name, short
 from heavytop.errors import InputError, quoted
@@ -76,6 +77,7 @@ class Comparison(Tabular, comparing.Comparison):
             for f in self.changed
         ]
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
+        notes += [printable(each.sentence) for each in self.motions if each.sentence]
         return Table(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
 
 
@@ -168,7 +170,7 @@ def compare(
     """Compare two reports, row by row and metric by metric.
 
     Arguments:
-        baseline, candidate: reports, or the folders or files of two.
+        baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
         policy: a TOML file of what counts as the same (docs/compare.md).
         floor: errors below ``floor`` eps are all the same.
         loss: bits that an error may grow by.
@@ -182,7 +184,11 @@ def compare(
     """
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
-    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), rules, KINDS)
+    old, new = _report(baseline, "baseline"), _report(candidate, "candidate")
+    surveys = None
+    if not isinstance(baseline, records.Report) and not isinstance(candidate, records.Report):
+        surveys = beside(arguments.path(baseline, "baseline")), beside(arguments.path(candidate, "candidate"))
+    found = comparing.compare(old, new, rules, KINDS, surveys=surveys)
     return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from heavytop.compare.compare import CONTROL, Trial, compare, trial
-from heavytop.compare.noise import Policy
+from heavytop.comparison.compare import CONTROL, Trial, compare, trial
+from heavytop.comparison.noise import Policy
 from heavytop.integrate.broken import FAULTS
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Report, Row

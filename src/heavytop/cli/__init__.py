@@ -4,20 +4,24 @@ Exit codes: 0 good, 1 a finding, 2 usage, bad input, or an output that cannot be
 incomparable or out of reach, 130 interrupted, 141 nobody reads the output any more, 143 terminated.
 """
 
-# ruff: noqa: I001
 from __future__ import annotations
 
 import os
 import sys
 
-from heavytop.cli import output
+# each adds its commands
+from heavytop.cli import claims, integrators, motions, output, reports  # noqa: F401
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
 
-# the commands, in the order of `heavytop --help`
-from heavytop.cli import reports, motions, claims, integrators  # noqa: F401
-
+_ORDER = (
+    *("run", "compare", "history", "show", "export"),
+    *("propagate", "reference", "score", "audit", "claims", "figures"),
+    *("selftest", "check-integrator", "new", "hunt", "list"),
+)
+"""The commands in the order of ``heavytop --help``."""
+app.registered_commands.sort(key=lambda command: _ORDER.index(str(command.name)))
 
 _COMPLETE = "_HEAVYTOP_COMPLETE"
 """Set by the scripts of `heavytop --completion SHELL`."""

@@ -204,7 +204,7 @@ def selftest(
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     json: Json = False,
 ) -> int:
-    """Try the detectors on integrators broken on purpose.
+    """Try the detectors on integrators with planted faults.
 
     Exit 1 if a fault they should see slips through.  Takes two minutes on two cores.
     """

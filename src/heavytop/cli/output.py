@@ -32,7 +32,7 @@ class ReaderGone(Exception):
 
 
 class _Output(io.FileIO):
-    """Standard output, whose failures are not mistaken for those of files, by us or by any library in between."""
+    """Standard output, whose failures are not confused with those of files, by us or by any library in between."""
 
     def write(self, data: Any) -> int:
         try:

@@ -36,22 +36,23 @@ def compare(
 
     Else exit 3 if anything is missing or incomparable, else 0.
     """
-    from heavytop.compare.compare import compare as compare_reports
+    from heavytop.comparison.compare import compare as compare_reports
+    from heavytop.comparison.motions import beside
     from heavytop.kinds import KINDS
     from heavytop.store import store
 
-    rules = _policy(policy, floor, loss)
+    rules, surveys = _policy(policy, floor, loss), (beside(baseline), beside(candidate))
     files: list[tuple[Path, str]] = []
     if html is not None:
         from heavytop.render.page import comparison_page
 
         old, new = _read([baseline, candidate], store.read)
-        result = compare_reports(old, new, rules, KINDS)
+        result = compare_reports(old, new, rules, KINDS, surveys=surveys)
         files.append((html, comparison_page(old, new, result, KINDS)))
     else:
         all_of_them = json or junit is not None
         before, after = _read([baseline, candidate], store.read_brief)
-        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them)
+        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them, surveys=surveys)
     if markdown is not None:
         from heavytop.render.export import comparison_markdown
 
@@ -80,7 +81,7 @@ def history(
     json: Json = False,
 ) -> int:
     """Show metrics over reports, with every step marked."""
-    from heavytop.compare.noise import glob
+    from heavytop.comparison.noise import glob
     from heavytop.kinds import KINDS
     from heavytop.render import history as over
     from heavytop.store import store
@@ -119,7 +120,7 @@ def _read(paths: list[Path], reader: Callable[..., Any]) -> list[Any]:
 
 def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
     """The policy of a file or the default one; the options count before either."""
-    from heavytop.compare.noise import Policy, adjusted, load
+    from heavytop.comparison.noise import Policy, adjusted, load
 
     return adjusted(Policy() if file is None else load(file), floor, loss)
 
@@ -241,7 +242,7 @@ def run(
     row_timeout: Annotated[
         str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
     ] = None,
-    save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
+    save_every: Annotated[float, typer.Option(help="Seconds between checkpoints of a long row.", min=0)] = 10.0,
 ) -> int:
     """Run a plan of measurements and write its report.
 

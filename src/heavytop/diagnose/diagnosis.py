@@ -14,7 +14,7 @@ from sys import float_info
 import numpy
 
 from heavytop.diagnose import hypotheses
-from heavytop.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Suspect, Units, suspect
+from heavytop.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Examined, Units, examined
 from heavytop.measure.scalar import EXPLAINS, Rounding, explains, rounding
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
@@ -80,7 +80,7 @@ def diagnose(
     if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= _WORTH_ASKING:
         return _rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
-        given = suspect(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
+        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
         truth = None if given is None else given.supposed(given.times)
         if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
             return _rounded(written, relative_error)
@@ -98,7 +98,7 @@ def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
     return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
 
 
-def _only_rounded(written: Rounding | None, error: float | None, given: Suspect | None) -> bool:
+def _only_rounded(written: Rounding | None, error: float | None, given: Examined | None) -> bool:
     """Whether every component that is looked at is the true one, rounded as it is written."""
     if written is None or (error is not None and error > EXPLAINS * written.error):
         return False
@@ -110,7 +110,7 @@ def _only_rounded(written: Rounding | None, error: float | None, given: Suspect 
     return bool((numpy.abs(given.states - truth) <= allowed).all())
 
 
-def _mistake(given: Suspect, truth: Array | None, error: float) -> Diagnosis | None:
+def _mistake(given: Examined, truth: Array | None, error: float) -> Diagnosis | None:
     """The simplest mistake among those that explain the states about as well as the best."""
     explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
     if not explained and error > _WRONG:
@@ -125,7 +125,7 @@ def _mistake(given: Suspect, truth: Array | None, error: float) -> Diagnosis | N
 
 
 def _still(
-    given: Suspect | None, states: Sequence[Sequence[Fraction]], relative_error: float | None
+    given: Examined | None, states: Sequence[Sequence[Fraction]], relative_error: float | None
 ) -> Diagnosis | None:
     """From some time on every state is the same, which are three at least, though the motion moves there."""
     same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
@@ -138,7 +138,7 @@ def _still(
     return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
 
 
-def _moves(given: Suspect, row: int) -> bool:
+def _moves(given: Examined, row: int) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
     sizes = numpy.repeat([given.rate, 1.0], 3)
     true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
@@ -148,7 +148,7 @@ def _moves(given: Suspect, row: int) -> bool:
     )
 
 
-def _off_alone(given: Suspect | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
+def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
     """A few states that are off while all others are right.
 
     errors: as far as they were measured; where there are none, those of what heyoka reaches.
@@ -177,7 +177,7 @@ def _gap(error: float, other: float) -> bool:
     return bool(error > _WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
 
 
-def _jumps(given: Suspect | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
+def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
     """Whether the last state is not that of the motion through the one before, nor much later than that."""
     spans = [abs(b - a) for a, b in zip([Fraction(0), *times[: last - 1]], times[:last], strict=True)]
     if given is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
@@ -189,7 +189,7 @@ def _jumps(given: Suspect | None, times: Sequence[Fraction], last: int, errors: 
     return bool(off.max() >= errors[last] / 2)
 
 
-def _looked_at(given: Suspect, found: Diagnosis | None) -> Diagnosis | None:
+def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
     """The same, with how many of the states it was found in, where that is not all of them."""
     looked, all_of_them = len(given.rows), len(given.all_times)
     if found is None or looked == all_of_them:
@@ -201,7 +201,7 @@ Supposition = tuple[str, dict[str, str], float, float]
 """Kind, numbers, the error that is left, and how far it must have fallen."""
 
 
-def _suppositions(given: Suspect, truth: Array | None) -> Iterator[Supposition]:
+def _suppositions(given: Examined, truth: Array | None) -> Iterator[Supposition]:
     """The simplest first, those with a fitted number last."""
     reading = None if truth is None else hypotheses.reading(given, truth)
     if reading is not None and reading[0].changes == 1:
@@ -251,7 +251,7 @@ def _of_clock(clock: hypotheses.Clock, left: float, units: Units) -> Supposition
     return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
 
 
-def _lost_row(every: Suspect) -> Diagnosis | None:
+def _lost_row(every: Examined) -> Diagnosis | None:
     """States that are right up to a time, and from there on those of the next sample, or of the one before."""
     times = every.times
     if len(times) < _FEWEST_ROWS:
@@ -273,7 +273,7 @@ def _lost_row(every: Suspect) -> Diagnosis | None:
     return None
 
 
-def _integrals_off(given: Suspect, error: float) -> Diagnosis | None:
+def _integrals_off(given: Examined, error: float) -> Diagnosis | None:
     """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
     if len(given.rows) < 3:
         return None
@@ -297,7 +297,7 @@ def _integrals_off(given: Suspect, error: float) -> Diagnosis | None:
     return Diagnosis("integrals_off", numbers, error) if told else None
 
 
-def _sizes(given: Suspect) -> dict[str, tuple[float, Fraction]]:
+def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
     """What the integrals that are looked at may be, and their units."""
     p = given.system.parameters(given.top, given.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import numpy
 
-from heavytop.diagnose.samples import ALIKE, FARTHEST, FLOOR, SHORT, SMALL, Array, Suspect, motion, named, notable
+from heavytop.diagnose.samples import ALIKE, FARTHEST, FLOOR, SHORT, SMALL, Array, Examined, motion, named, notable
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
@@ -96,7 +96,7 @@ READINGS = sorted((reading for reading in _readings() if reading.changes), key=l
 """Every reading that is tried, the simplest first."""
 
 
-def reading(given: Suspect, truth: Array) -> tuple[Reading, float] | None:
+def reading(given: Examined, truth: Array) -> tuple[Reading, float] | None:
     """The simplest reading of the columns that fits about as well as the best, and its error."""
     inertia = numpy.array([float(value) for value in given.top.inertia])
     errors = [given.error(each.columns(truth, inertia)) for each in READINGS]
@@ -106,7 +106,7 @@ def reading(given: Suspect, truth: Array) -> tuple[Reading, float] | None:
     )
 
 
-def scaled(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+def scaled(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
     """Ω, γ or one column times a constant factor: kind, numbers, and the error of the states divided by the factor."""
     groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
     groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
@@ -125,13 +125,13 @@ def scaled(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], 
             yield kind, {**numbers, "factor": text}, _divided(given, truth, columns, float(factor))
 
 
-def _divided(given: Suspect, truth: Array, columns: slice, factor: float) -> float:
+def _divided(given: Examined, truth: Array, columns: slice, factor: float) -> float:
     states = given.states.copy()
     states[:, columns] /= factor
     return replace(given, states=states).error(truth)
 
 
-def constant_column(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+def constant_column(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
     """A column that is the same in every state, and the error of the other five."""
     if len(given.rows) < _FEWEST:
         return
@@ -152,7 +152,7 @@ _MARGIN = 30.0
 """How many errors of the samples a fitted number may be off."""
 _AT_ONCE = 1e-3
 _LATER = 2
-"""The last sample must be so many times as late as the first for a start to be told from the method's own errors."""
+"""The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +171,7 @@ class Data:
 Found = tuple[Data, float]
 
 
-def without_numbers(given: Suspect) -> Iterator[Found]:
+def without_numbers(given: Examined) -> Iterator[Found]:
     """Suppositions that need no fitted number, the likeliest first."""
     top, start = given.top, given.start
     yield _tried(given, "weight_sign", replace(top, weight=-top.weight))
@@ -202,7 +202,7 @@ def without_numbers(given: Suspect) -> Iterator[Found]:
 
 
 def _tried(
-    given: Suspect,
+    given: Examined,
     kind: str,
     top: HeavyTop | None = None,
     start: State | None = None,
@@ -215,7 +215,7 @@ def _tried(
     return Data(kind, numbers), given.error(given.supposed(given.times, top, start))
 
 
-def _as_momentum(given: Suspect, start: State) -> Found:
+def _as_momentum(given: Examined, start: State) -> Found:
     """Start and states give M in place of Ω."""
     truth = given.supposed(given.times, start=start)
     if truth is not None:
@@ -224,14 +224,14 @@ def _as_momentum(given: Suspect, start: State) -> Found:
     return Data("all_momentum"), given.error(truth)
 
 
-def _all_times(given: Suspect, factor: float) -> float:
+def _all_times(given: Examined, factor: float) -> float:
     """The error where start and states give Ω times ``factor``."""
     start = State([w / Fraction(factor) for w in given.start.omega], given.start.gamma)
     truth = given.supposed(given.times, start=start)
     return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * 3))
 
 
-def all_scaled(given: Suspect) -> Found | None:
+def all_scaled(given: Examined) -> Found | None:
     """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
     square = _weight_ratio(given)
     if square is None or square <= 0:
@@ -244,7 +244,7 @@ def all_scaled(given: Suspect) -> Found | None:
     return Data("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(given, float(factor))
 
 
-def _weight_ratio(given: Suspect) -> float | None:
+def _weight_ratio(given: Examined) -> float | None:
     """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
     inertia, moment = _floats(given.top.inertia), _floats(given.top.moment)
     start = _floats(given.start.flat)
@@ -255,7 +255,7 @@ def _weight_ratio(given: Suspect) -> float | None:
     return ratio if isfinite(ratio) else None
 
 
-def another_weight(given: Suspect) -> Found | None:
+def another_weight(given: Examined) -> Found | None:
     """P from the energy."""
     ratio, old = _weight_ratio(given), given.top.weight
     if ratio is None or not isfinite(ratio * float(old)):
@@ -269,7 +269,7 @@ def another_weight(given: Suspect) -> Found | None:
     return Data("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
 
 
-def another_start(given: Suspect) -> Found | None:
+def another_start(given: Examined) -> Found | None:
     """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
 
     The error must fall by more than the motion itself magnifies it from the start to the first sample: where
@@ -299,7 +299,7 @@ def another_start(given: Suspect) -> Found | None:
     return (Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
 
 
-def _shows_at_once(given: Suspect, first: Array) -> bool:
+def _shows_at_once(given: Examined, first: Array) -> bool:
     """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
     method may look like one from another start.
     """
@@ -307,7 +307,7 @@ def _shows_at_once(given: Suspect, first: Array) -> bool:
     return early >= _AT_ONCE * largest
 
 
-def another_top(given: Suspect) -> Found | None:
+def another_top(given: Examined) -> Found | None:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
     direction = _conserving(given) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
     before = [*given.top.inertia, *given.top.moment]
@@ -328,7 +328,7 @@ def another_top(given: Suspect) -> Found | None:
 _NAMES = ("I1", "I2", "I3", "P a", "P b", "P c")
 
 
-def _conserving(given: Suspect) -> Array | None:
+def _conserving(given: Examined) -> Array | None:
     """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
     start = _floats(given.start.flat)
     omega, gamma = given.states[:, :3], given.states[:, 3:]
@@ -358,7 +358,7 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
     ]
 
 
-def _with(given: Suspect, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
+def _with(given: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
     """The error with that top."""
     try:
         top = HeavyTop(inertia, 1, moment, given.top.rotor)
@@ -410,7 +410,7 @@ _TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_veloc
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
-def suppositions(given: Suspect, truth: Array | None) -> Iterator[FoundEquations]:
+def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquations]:
     """Each with the error that is left."""
     if truth is not None:
         yield _any_order(given, truth)
@@ -420,7 +420,7 @@ def suppositions(given: Suspect, truth: Array | None) -> Iterator[FoundEquations
         yield from _signs(given)
 
 
-def _signs(given: Suspect) -> Iterator[FoundEquations]:
+def _signs(given: Examined) -> Iterator[FoundEquations]:
     """A sign in the equations turned over.
 
     With −Ω in the place of Ω, M' = Ω × M + P γ × r is M' = M × Ω − P γ × r, and γ' = γ × Ω is γ' = Ω × γ.
@@ -437,7 +437,7 @@ def _signs(given: Suspect) -> Iterator[FoundEquations]:
         yield kind, {}, given.error(None if found is None else found * _OMEGA_BACK)
 
 
-def _axes_of_space(given: Suspect, truth: Array) -> Iterator[FoundEquations]:
+def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
     """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
     omega, gamma = given.states[:, :3], given.states[:, 3:]
     size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate)
@@ -451,7 +451,7 @@ def _axes_of_space(given: Suspect, truth: Array) -> Iterator[FoundEquations]:
             yield "axes_of_space", {"of": what, "vertical": str(axis + 1)}, float(left)
 
 
-def _any_order(given: Suspect, truth: Array) -> FoundEquations:
+def _any_order(given: Examined, truth: Array) -> FoundEquations:
     """Each column as that component, or its negative, that it is nearest to."""
     sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate), numpy.abs(truth[:, 3:]).max()], 3)
     both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
@@ -498,7 +498,7 @@ class Clock:
     fitted: bool = False
 
 
-def clock(given: Suspect) -> tuple[Clock, float] | None:
+def clock(given: Examined) -> tuple[Clock, float] | None:
     """The simplest of the suppositions about the times that are about as good as the best, and its error."""
     found = [(each, given.error(given.supposed(times))) for each, times in _without_numbers(given) if len(times)]
     if len(given.rows) >= 3:
@@ -507,7 +507,7 @@ def clock(given: Suspect) -> tuple[Clock, float] | None:
     return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
 
 
-def _without_numbers(given: Suspect) -> Iterator[tuple[Clock, list[Fraction]]]:
+def _without_numbers(given: Examined) -> Iterator[tuple[Clock, list[Fraction]]]:
     every = given.all_times
     yield Clock("time_reversed"), [-time for time in given.times]
     if len(every) > 1:
@@ -520,7 +520,7 @@ def _without_numbers(given: Suspect) -> Iterator[tuple[Clock, list[Fraction]]]:
             yield Clock("time_unit", factor=float(factor)), [factor * time for time in given.times]
 
 
-def _fitted(given: Suspect) -> Iterator[tuple[Clock, float]]:
+def _fitted(given: Examined) -> Iterator[tuple[Clock, float]]:
     """Shifts and units that bring the first states onto the motion, refined over all samples."""
     times = numpy.array([float(time) for time in given.times])
     if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
@@ -571,7 +571,7 @@ def _moved(kind: str, number: float, times: Array) -> Array:
     return times + number if kind == "times_shifted" else times * number
 
 
-def _refined(given: Suspect, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[Clock, float]]:
+def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[Clock, float]]:
     """Gauss-Newton on the one number; the rate of the motion is a difference quotient of the motion itself."""
     small = 1e-6 / given.rate
     for _ in range(_REFINED):

@@ -71,7 +71,7 @@ class Units:
 
 
 @dataclass(frozen=True, slots=True)
-class Suspect:
+class Examined:
     """A motion as it was given, at the samples that are looked at.
 
     all_times, all_states: the whole of it.  rows: the places of those samples in it.
@@ -105,16 +105,16 @@ class Suspect:
             return None
         return motion(top or self.top, start or self.start, self.system, times)
 
-    def at(self, rows: Sequence[int]) -> Suspect:
+    def at(self, rows: Sequence[int]) -> Examined:
         """The same at other samples."""
         return replace(self, rows=tuple(rows), states=self.all_states[list(rows)])
 
-    def widened(self) -> Suspect:
+    def widened(self) -> Examined:
         """The same with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
         reached = [abs(float(time)) * self.rate <= FARTHEST for time in self.all_times[:MOST_AT_ONCE]]
         return self.at(range(sum(reached))).trusted()
 
-    def trusted(self) -> Suspect:
+    def trusted(self) -> Examined:
         """The same up to where the motion makes more of roundings than an error that is asked about."""
         truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
         if truth is None:
@@ -157,14 +157,14 @@ class Suspect:
         return worst if worst == worst else float("inf")
 
 
-def suspect(
+def examined(
     top: HeavyTop,
     start: State,
     system: System,
     times: Sequence[Fraction],
     states: Sequence[Sequence[Fraction]],
     worst: int | None = None,
-) -> Suspect | None:
+) -> Examined | None:
     """At most :data:`MOST_SAMPLES` samples, over the first turns of the body, and ``worst`` where it is among these.
 
     Those where roundings of the start hide the motion are left out if enough remain.  None for numbers that no double
@@ -192,7 +192,7 @@ def suspect(
     last = max(early, min(len(ends), _FEW))
     some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
     rows = sorted(some if worst is None or worst >= last else some | {worst})
-    found = Suspect(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
+    found = Examined(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
 

@@ -96,7 +96,7 @@ def clip(text: str, most: int = 60) -> str:
 
 
 def logarithm(value: str | None) -> float | None:
-    """log10 |value| of a report's text; None for 0 and for what is no number."""
+    """log10 |value| of a report's text; None for 0 and for what is not a number."""
     try:
         return log10(exact(value)) if value is not None else None
     except InputError:
@@ -176,7 +176,7 @@ class Value:
     noise: bool = False
 
     def __str__(self) -> str:
-        """``2.3e-13 ± 0.12``; "-" where there is no number."""
+        """``2.3e-13 ± 0.12``; "-" where there is none."""
         if self.metric is None:
             return "-"
         band = self.metric.band if self.noise else None

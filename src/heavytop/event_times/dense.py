@@ -189,7 +189,7 @@ class OfHeyoka(Dense):
         problem, bits = self.problem, self.problem.precision.bits
         tool = compile_heyoka(problem.system, problem.precision, tolerance=self.tolerance)
         self.flags, self.seconds["compile"] = tool.flags, tool.seconds
-        with tool.lent() as engine:
+        with tool.borrowed() as engine:
             load(engine, problem)
             self.order = engine.order
             stepper = Stepper(engine, self.until > 0, None, None)
@@ -301,7 +301,7 @@ def dense(
 # Isolation is Vincent's theorem with bisection (Collins and Akritas, 1976): on (0, 1) the number of roots is at most
 # the number v of sign changes among the coefficients of (1 + x)^n g(1/(1 + x)), and equal to it for v = 0 and v = 1.
 # An interval that is shorter than asked for is not divided any more: the signs at its ends tell whether the function
-# changes sign in it, so roots that no number of a format tells apart count as one change, or as none where they are
+# changes sign in it, so roots that coincide in the format count as one change, or as none where they are
 # even in number.
 #
 # Refinement is Abbott's quadratic interval refinement (2014): a secant says where among N parts the root lies, and
@@ -310,7 +310,7 @@ def dense(
 
 _ONE_MORE = fmpz_poly([1, 1])
 _DEEPEST = 400
-"""Bisections of an interval at most: roots that lie 2^-400 of a step apart are not told apart in any format."""
+"""Bisections of an interval at most: roots that lie 2^-400 of a step apart are not distinguished in any format."""
 _MOST_PARTS_BITS = 4096
 
 

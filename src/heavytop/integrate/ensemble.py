@@ -127,13 +127,13 @@ def processors() -> int:
 
 def _in_lanes(work: Work) -> None:
     """One thread of a batch ensemble."""
-    with work.tool.lent() as mover, work.tool.lent() as sampler, numpy.errstate(all="ignore"):
+    with work.tool.borrowed() as mover, work.tool.borrowed() as sampler, numpy.errstate(all="ignore"):
         Lanes(work, mover, sampler).run()
 
 
 def _one_by_one(work: Work) -> None:
     """One thread of scalar runs."""
-    with work.tool.lent() as engine:
+    with work.tool.borrowed() as engine:
         while taken := work.take():
             index, problem = taken
             observer = partial(work.observe, index) if work.observed else None

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
 _GUARD_BITS = 64
 _LOCKED = 16
-"""Times the eps of the format: where the sine (or cosine) by which two Euler angles are told apart is smaller, they are
-told from rounding alone."""
+"""Times the eps of the format: where the sine (or cosine) by which two Euler angles are distinguished is smaller, they
+are distinguished from rounding alone."""
 _SIGN_BITS = 8
 """A component of the quaternion at the start that is within so many bits of rounding counts as 0."""
 
@@ -276,7 +276,7 @@ class Place:
 
     samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
     its time; steps: taken until then.  seconds: run so far.  flags: everything else that can change bits.
-    words: in place of state and time, all that an integrator in many words knows there, as text.
+    words: in place of state and time, all that an integrator in multi-word arithmetic knows there, as text.
     """
 
     samples: int

@@ -139,7 +139,7 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     axes = new_axes("format (bits)", "escape |t| (time units of the data)", 3.0)
     merged = _both_directions(found)
     left_out(section, len(merged) - len(COLOURS) * max(1, len(sources)), "case")
-    heard, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]
+    alternative, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]
     for name, place, source in merged:
         if name not in bases:
             continue
@@ -155,13 +155,13 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             line = [middle[1] + slope * (b - middle[0]) for b in bits]
             axes.plot(bits, line, color=COLOURS[number], lw=1.2, ls=DASHED, label=_LAW.label)
         listed = ", ".join(f"{t:g} at {b:g}" for b, t in zip(bits, times, strict=True))
-        heard.append(f"{label}: {listed} bits.")
+        alternative.append(f"{label}: {listed} bits.")
         section.rows.append([label, listed, short(measured), short(expected)])
     if slopes:
         section.key(_LAW)
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
-    section.pictures.append(finish(axes, "Escape time against bits", spoken(heard), "break-away"))
+    section.pictures.append(finish(axes, "Escape time against bits", spoken(alternative), "break-away"))
     return section
 
 

@@ -43,7 +43,7 @@ from heavytop.exact.flint.balls import FUNCTIONS, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.base import Kind
 from heavytop.measure import claim_error as errors_of
-from heavytop.measure.claim_error import CLAIM_XI, parting, true_solution
+from heavytop.measure.claim_error import CLAIM_XI, divergence_time, true_solution
 from heavytop.measure.scalar import largest, metric, text
 from heavytop.measure.truth import certified, compute
 from heavytop.precision import exact, time_text
@@ -117,17 +117,17 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             axes = new_axes(TIME, f"error of {title} ({unit})")
             decades(axes.xaxis)
             decades(axes.yaxis)
-            heard: list[str] = []
+            alternative: list[str] = []
             for source, report in sources:
                 rows = [row for row in report.rows if (row.key.case, row.key.direction) == (case, direction)]
                 for key, series, scale, symbol in _claim_parts(rows, quantity, source):
-                    heard += _claim_curve(axes, section, section.key(key), series, scale, called, symbol)
+                    alternative += _claim_curve(axes, section, section.key(key), series, scale, called, symbol)
             title = f"{clip(called, 40)}: error of {title}"
-            if heard:
+            if alternative:
                 box = axes.dataLim
                 if math.isfinite(box.y0):
                     axes.set_ylim(max(box.y0 - 1, _LOWEST), max(box.y1, _LOWEST) + 1)
-                section.pictures.append(finish(axes, title, spoken(heard), f"claim-{number}-{quantity}"))
+                section.pictures.append(finish(axes, title, spoken(alternative), f"claim-{number}-{quantity}"))
     return section
 
 
@@ -259,7 +259,7 @@ class ClaimModel(Kind):
                 metrics[quantity.over("max")] = metric(largest(values.values()), "value")
                 kept = [text(abs(values[time]), 12) for time in task.keep]
                 series[quantity.text] = Series([time_text(time) for time in task.keep], kept, quantity)
-            parted = parting(claim, task.times[-1], branch)
+            parted = divergence_time(claim, task.times[-1], branch)
             metrics[PARTS] = time_metric(None if parted is None else parted.time, "value")
         measured = f"{CLAIM}, {branch} branch, exactly evaluated"
         return exact_row(task, measured, against, by_name(metrics), errors_of.MODEL_BITS, series)

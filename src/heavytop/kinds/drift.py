@@ -123,7 +123,7 @@ class Drift(Kind):
         return _row(task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Digits left at the longest horizon; digits right, a line a motion; everything, a line a row."""
+        """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""
         if (found := digits_headline(rows)) is not None:
             yield found
         yield from digits_columns(rows)

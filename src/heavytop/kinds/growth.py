@@ -171,7 +171,7 @@ class Growth(Kind):
         return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """The laws, whether the planted faults are told from them; the laws in short; a line for each law."""
+        """The laws, whether the planted faults are distinguished from them; the laws in short; a line for each law."""
         if (found := laws_headline(rows)) is not None:
             yield found
         yield from laws_in_short(rows)

@@ -10,7 +10,7 @@ from functools import lru_cache
 from msgspec.structs import replace
 
 from heavytop.cases import Case
-from heavytop.compare.verdicts import size
+from heavytop.comparison.verdicts import size
 from heavytop.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip
 from heavytop.document.document import Table as Cells
 from heavytop.document.names import short

@@ -47,7 +47,7 @@ class HuntTable(Table, tag=NAME):
         """One."""
         (horizon,) = positive([self.horizon], "horizon")
         if not 1 <= self.budget <= _MOST:
-            raise InputError(f"budget = {self.budget} is no number of motions.", f"Give 1 to {_MOST}.")
+            raise InputError(f"budget = {self.budget} is not a number of motions.", f"Give 1 to {_MOST}.")
         if self.limit and exact(self.limit) <= 0:
             raise InputError(f"limit = {quoted(self.limit)} is not above 0.", "Give a positive number.")
         if self.found:

@@ -113,7 +113,7 @@ def _cells(row: Row) -> list[Cell]:
 
 
 def _told(rows: Sequence[Row]) -> list[Row]:
-    """Those that have an error; of integrators of others alone where there are any."""
+    """Those that have an error; of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
     return [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
 

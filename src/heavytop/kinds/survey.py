@@ -118,6 +118,7 @@ def _names(task: Task, motions: Drawn) -> dict[str, object]:
     same = {
         "sweep": chunk.sweep.name,
         "integrator": task.key.subject.name,
+        "tolerance": task.key.subject.tolerance,
         "precision": task.key.precision,
         "horizon": task.key.horizon,
     }

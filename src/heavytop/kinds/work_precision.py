@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.compare.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
+from heavytop.comparison.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
 from heavytop.document.document import Block, Chart, In, Note
 from heavytop.document.document import Table as Cells
 from heavytop.errors import InputError
@@ -44,11 +44,11 @@ RETURN = Quantity("return_error")
 _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
 """Of an integrator that is measured beside heyoka in double, by what it is set by."""
 _OF_OTHERS = 0.6
-"""Decades of rounding noise of integrators of others, whose step control turns a rounding into another step: rerun with
-other roundings, CVODE and splitting methods move by up to a decade."""
+"""Decades of rounding noise of third-party integrators, whose step control turns a rounding into another step: rerun
+with other roundings, CVODE and splitting methods move by up to a decade."""
 
 
-class Ladder(msgspec.Struct, forbid_unknown_fields=True):
+class Curve(msgspec.Struct, forbid_unknown_fields=True):
     """One integrator in one format; ``tolerances``, of which "eps" is the finest it offers, or ``steps`` if fixed."""
 
     integrator: str
@@ -57,9 +57,9 @@ class Ladder(msgspec.Struct, forbid_unknown_fields=True):
     steps: list[str] = []
 
     def subjects(self) -> Iterator[Subject]:
-        """One a rung; raises InputError for an impossible value."""
+        """The subject of each point; raises InputError for an impossible value."""
         if not self.tolerances and not self.steps:
-            raise InputError(f"The ladder of {self.integrator} is empty.", "Give it tolerances, or steps.")
+            raise InputError(f"The list of points of {self.integrator} is empty.", "Give it tolerances, or steps.")
         for text in self.steps:
             if text != FINEST and physical(exact(text), "step") <= 0:
                 raise InputError(f"A step of {text[:60]!r}.", "Give numbers above 0.")
@@ -73,14 +73,14 @@ class Ladder(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class WorkPrecisionTable(Table, tag=NAME):
-    """Each rung of each ladder over the same horizon; ``samples`` uniform samples.
+    """Each point of each curve over the same horizon; ``samples`` uniform samples.
 
     timings: whether runs are repeated so often that two reports of one machine can be compared by their seconds.
     """
 
     cases: list[str]
     horizon: str
-    ladders: list[Ladder]
+    ladders: list[Curve]
     samples: int = 100
     timings: bool = False
 
@@ -88,7 +88,7 @@ class WorkPrecisionTable(Table, tag=NAME):
         """One a row."""
         (horizon,) = positive([self.horizon], "horizon")
         times, end = uniform(horizon, self.samples), time_text(horizon)
-        rungs = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
+        points = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
@@ -99,18 +99,18 @@ class WorkPrecisionTable(Table, tag=NAME):
                 self.timings,
             )
             for case in map(find, self.cases)
-            for precision, subject in rungs
+            for precision, subject in points
         ]
 
     def beside(self, which: str | Source) -> Table | None:
-        """Four rungs in double, and the finest in other formats, where heyoka has a ladder."""
+        """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
-        knob = peers.knob_apart(which) if DOUBLE.name in formats else ""
+        control = peers.control_apart(which) if DOUBLE.name in formats else ""
         ladders = [
-            Ladder(integrator, name, **{"steps" if knob == "step" else "tolerances": _RUNGS[knob]})
+            Curve(integrator, name, **{"steps" if control == "step" else "tolerances": _RUNGS[control]})
             if name == DOUBLE.name
-            else Ladder(integrator, name, [FINEST])
+            else Curve(integrator, name, [FINEST])
             for name in formats
         ]
         return msgspec.structs.replace(self, ladders=ladders) if ladders else None
@@ -129,7 +129,7 @@ class WorkPrecision(Kind):
     place = 40
 
     def assumed_band(self, subject: Subject) -> float:
-        """That of integrators of others."""
+        """The noise of third-party integrators."""
         return 0.0 if subject.name in (OURS, CONSTANTS, LANES) else _OF_OTHERS
 
     def roundings(self, quantity: Quantity | None, steps: int) -> float:
@@ -141,7 +141,7 @@ class WorkPrecision(Kind):
         return math.log10(steps) * (0.5 if quantity is not None and quantity.name == DRIFT else 1.0)
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Raises PeerFailed where the integrator of others fails."""
+        """Raises PeerFailed where the third-party integrator fails."""
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # found before the runs: looking through the installed packages empties the caches of the processor

@@ -202,7 +202,7 @@ def true_solution(case: PartialCase) -> DeloneHomoclinic | Validated:
 
 
 @dataclass(frozen=True, slots=True)
-class Parting:
+class DivergenceTime:
     """Proven: |ΔΩ| stays below the limit from 0 up to ``before`` and has reached it at ``after``; both > 0, of |t|."""
 
     before: Fraction
@@ -215,7 +215,7 @@ class Parting:
 
 
 @whole_evaluation
-def parting(case: PartialCase, horizon: Fraction, branch: Branch) -> Parting | None:
+def divergence_time(case: PartialCase, horizon: Fraction, branch: Branch) -> DivergenceTime | None:
     """When the claim parts from the truth on the way from 0 to ``horizon`` ≠ 0; None if it provably does not.
 
     Raises OutOfReach where the true motion cannot be proven so far, or |ΔΩ| touches the limit without passing it.
@@ -230,7 +230,7 @@ def parting(case: PartialCase, horizon: Fraction, branch: Branch) -> Parting | N
             before += step
             step *= 2
         elif step <= CLOSE * before and pair.reached(before + step):
-            return Parting(before / case.alpha, (before + step) / case.alpha)
+            return DivergenceTime(before / case.alpha, (before + step) / case.alpha)
         elif step <= _SHORTEST * before:
             raise OutOfReach(
                 f"Claim and truth are 1 % of alpha apart at t = {shown(before / case.alpha)} and no more.",
@@ -371,7 +371,7 @@ class Compared:
     method: str
     gyrostat: Curves
     claim: Curves
-    parted: dict[Branch, Parting | None]
+    parted: dict[Branch, DivergenceTime | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -418,7 +418,7 @@ def _compared(ratio: int) -> Compared:
     times = [span * index / 200 for index in range(-200, 201)]
     truth, method = true_curves(case, times)
     branches: tuple[Branch, ...] = ("printed", "smooth")
-    parted = {branch: parting(case, times[-1], branch) for branch in branches}
+    parted = {branch: divergence_time(case, times[-1], branch) for branch in branches}
     return Compared(ratio, truth, method, exact_curves(case.solves, times), claim_curves(case, times), parted)
 
 

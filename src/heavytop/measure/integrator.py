@@ -84,7 +84,7 @@ class ChosenIntegrator:
 
         going_on: place and mark as in :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator
         that knows no places.  again: whether a quick call of an integrator of another package is made twice, to see
-        whether it is the same.  Raises PeerFailed for whatever an integrator of others does wrong.
+        whether it is the same.  Raises PeerFailed for whatever a third-party integrator does wrong.
         """
         if self.fault:
             watch = observer or (lambda time, state: None)

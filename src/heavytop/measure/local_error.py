@@ -99,7 +99,7 @@ class LocalError:
 
     @whole_evaluation
     def metrics(self) -> dict[str, Metric]:
-        """``local_error_ulp_max``, ``_rms`` and ``observed_order``, the median over the steps as a whole number.
+        """``local_error_ulp_max``, ``_rms`` and ``observed_order``, the median over the steps as an integer.
 
         The order is left out where no step shows one.
         """
@@ -155,7 +155,7 @@ def single_calls(
     """A run to ``until`` > 0, and 16 calls, each with the time at which it ends; none where a run failed.
 
     A call starts at one of 16 states of the run, evenly spread from the start on, and goes over the mean step of the
-    run, which a method with fixed steps takes as its step.  Raises PeerFailed for whatever an integrator of others
+    run, which a method with fixed steps takes as its step.  Raises PeerFailed for whatever a third-party integrator
     does wrong, also where its count of steps cannot be, and for a gyrostat unless it takes many motions.
     """
     whole = integrator.propagate(top, start, [until], precision, system)
@@ -163,7 +163,7 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = peers.knob(integrator.which) == "step"
+    fixed = peers.control(integrator.which) == "step"
     length = until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:

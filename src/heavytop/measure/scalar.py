@@ -147,7 +147,7 @@ def digits_right(row: Measured) -> float | None:
 
     At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
     Of an ensemble: from the root mean square over its starts of each start's largest.
-    0 where the format has no digit left before the end.
+    0 where the format has lost all significant digits before the end.
     None without a reference, without a sample, and for a value that is not finite.
     """
     metric = row.metrics.get(RELATIVE.text)

@@ -4,7 +4,7 @@ Proven: a closed form that a second source certifies, or the validated enclosure
 reach at all, beyond where the model of its cost stays below :data:`CHEAP`.  No clock is asked: the same plan gives the
 same bytes.  Computed: two runs in words with 30 bits more than the format, and 30 more again.  On a chaotic motion
 these lose what the format loses, so that they know the motion better as long as the format knows anything.  Where it
-has no digit left the truth ends, and the time is named.
+has lost all significant digits the reference ends, and the time is named.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from heavytop.top.vectors import Vector, cross, dot
 MORE_BITS = 30
 """The words of the second run have at least so many more bits than those of the first."""
 EFFORT = 60.0
-"""Seconds of the model of the cost that each run may take; absurd starts and times would take for ever."""
+"""Seconds of the model of the cost that each run may take; absurd starts and times would never end."""
 EFFORT_OF_MANY = 600.0
 """The same for all the runs of an ensemble together."""
 _PILOT_STEPS = 1000
@@ -60,7 +60,8 @@ _DIGIT = 10
 _STAGES = 6
 _PROBES = 12
 """A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended;
-where that is before the first sample, to the horizon over 4^12, so that nothing runs to where no digit is left."""
+where that is before the first sample, to the horizon over 4^12, so that nothing runs beyond the loss of all significant
+digits."""
 
 Given = Callable[[Precision], Problem]
 """A motion to be computed, in any format."""
@@ -75,8 +76,8 @@ def seconds_a_step(bits: int) -> float:
 class ComputedReference:
     """States, with an attitude vector where the motion has one, at the times of two runs.
 
-    words: the bits of the words of both.  ends: the first time at which the format that is measured has no digit left;
-    None where it keeps one to the last.
+    words: the bits of the words of both.  ends: the first time at which the format that is measured has lost all
+    significant digits; None where it keeps one to the last.
     """
 
     words: tuple[int, int]
@@ -124,7 +125,7 @@ def of_rounded(
     """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
 
     least: bits of the first run at least.  effort: as in :func:`compute`.
-    All end where one has no digit left in the format, as laws of growth do.
+    All end where one has lost all significant digits of the format, as laws of growth do.
     Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
     """
     bits = problems[0].precision.bits
@@ -211,7 +212,8 @@ def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
 
 
 def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
-    """The first time at which some motion has no digit left in a format of so many bits ``fewer`` than the words have.
+    """The first time at which some motion has lost all significant digits in a format of so many bits ``fewer`` than
+    the words have.
 
     Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
     """
@@ -287,8 +289,8 @@ class Truth:
     """The states that a run is compared with.
 
     against: how they are known, for the row.  state: six balls at (time, bits).
-    ends: the first time at which the format has no digit left, and from which on there are no states; None where it
-    keeps one to the last.
+    ends: the first time at which the format has lost all significant digits, and from which on there are no states;
+    None where it keeps one to the last.
     """
 
     against: Against
@@ -363,7 +365,7 @@ def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None 
     except (InputError, OutOfReach) as error:
         return clause(error)
     if found.ends == times[0]:
-        return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
+        return f"all significant digits of the format are lost at t = {time_text(found.ends)}, the first sample"
     return Truth(found.against, found.state, found.ends)
 
 
@@ -437,7 +439,7 @@ def truth_with_attitude(problem: Problem, times: Sequence[Fraction], effort: flo
         why = clause(error)
         return f"{known}; {why}" if isinstance(known, str) else why
     if found.ends == times[0]:
-        return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
+        return f"all significant digits of the format are lost at t = {time_text(found.ends)}, the first sample"
     return Truth(found.against, found.state, found.ends)
 
 
@@ -526,7 +528,7 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
     motions = [Truth(against, each.state, each.ends) for each in found]
     covered = [time for time in times if motions[0].covers(time)]
     if not covered:
-        return _none(len(problems), f"no closed form; no digit of the format is left at t = {against.until}")
+        return _none(len(problems), f"no closed form; all significant digits are lost at t = {against.until}")
     return Reference(against, list(motions), [list(map(each.blur, covered)) for each in found])
 
 

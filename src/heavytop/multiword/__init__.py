@@ -1,1 +1,1 @@
-"""Arithmetic in many words: machine code for the Taylor recurrence of both systems, in eight lanes."""
+"""Multi-word arithmetic: machine code for the Taylor recurrence of both systems, in eight lanes."""

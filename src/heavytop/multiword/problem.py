@@ -1,4 +1,4 @@
-"""What a motion in many words can be asked, whatever its arithmetic."""
+"""What a motion in multi-word arithmetic can be asked, whatever its arithmetic."""
 
 from __future__ import annotations
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import line
-from heavytop.compare.rows import Finding
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import line
+from heavytop.comparison.motions import WorseMotions
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.names import printable, row_name, short
 from heavytop.render.text import table, wrapped
 
@@ -28,6 +29,8 @@ def comparison(result: Comparison, full: bool = False) -> RenderableType:
     parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
     if result.rows:
         parts += [Text(), *(_metrics(result) if full else _rows(result))]
+    for each in result.motions:
+        parts += _motions(each)
     if result.environment:
         parts += [Text(), Text("Environments differ:", style="bold")]
         changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
@@ -47,6 +50,21 @@ def _rows(result: Comparison) -> Iterator[RenderableType]:
     if len(result.rows) > _MOST:
         yield Text(f"and {len(result.rows) - _MOST} more: --json lists all, --html FILE draws them")
     yield Text("Every metric: --full", style="dim")
+
+
+def _motions(found: WorseMotions) -> Iterator[RenderableType]:
+    """The motions of a survey that lost most, each with its command, to paste into a shell."""
+    if not found.first:
+        return
+    yield Text()
+    yield Text(
+        printable(f"Motions of {row_name(found.row)} that got worse: {found.worse} of {found.joined}"), style="bold"
+    )
+    for motion in found.first:
+        yield Text(f"  {motion.text}")
+        yield Text(" \\\n".join(wrapped(printable(motion.command), "      ", "    ", 78)), style="dim")
+    if found.worse > len(found.first):
+        yield Text(f"  and {found.worse - len(found.first)} more")
 
 
 def _metrics(result: Comparison) -> Iterator[RenderableType]:

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import folded, line, statistics
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import folded, line, statistics
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.document import Block, Card, Cell, Headline, In, Note, Table, Value, Word, cell_text
 from heavytop.document.kind import Kinds, document, headlines, kind_of
 from heavytop.document.names import printable, row_name

@@ -16,7 +16,7 @@ from heavytop.claims.library.ershkov import Branch
 from heavytop.document.svg import document
 from heavytop.measure.claim_error import Compared, Curves, Drawings, PaperCurve, Portrait
 
-# Okabe and Ito's colours, told apart by any eye; line styles say the same again
+# Okabe and Ito's colours, distinguished by any eye; line styles say the same again
 ORANGE, BLUE, VERMILION, GREEN = "#E69F00", "#0072B2", "#D55E00", "#009E73"
 _SYMBOLS = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 _FORMULAS = {

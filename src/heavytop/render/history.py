@@ -10,9 +10,9 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.compare.compare import compare
-from heavytop.compare.noise import Policy
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import compare
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.document import Key, Section, clip, draw, logarithm, numbered, scientific
 from heavytop.document.kind import Kinds
 from heavytop.document.names import printable, row_name, short
@@ -205,7 +205,7 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
     """The metrics of one row over the reports, each named at its end, their steps marked."""
     labels = [clip(track.metric or "whole row", 30) for track in tracks]
     axes = new_axes("report", "value", 2.4 + 0.17 * len(tracks), room(labels))
-    heard: list[str] = []
+    alternative: list[str] = []
     reasons: list[str] = []
     ends: list[End] = []
     heights: list[float] = []
@@ -220,7 +220,7 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
         last = max(points)
         ends.append(End(label, COLOURS[key.colour], last + 1, points[last]))
         values = ", ".join(f"{number + 1}: {scientific(value)}" for number, value in points.items())
-        heard.append(f"{label} over the reports: {values}.")
+        alternative.append(f"{label} over the reports: {values}.")
         heights += points.values()
     axes.set_xlim(0.7, len(ticks) + 0.3)
     shown = range(0, len(ticks), -(-len(ticks) // 6))
@@ -228,4 +228,4 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
     pad = max(1.0, 0.15 * (max(heights) - min(heights)))
     axes.set_ylim(min(heights) - pad, max(heights) + pad)
     decades(axes.yaxis, 5)
-    return finish(axes, section.title, spoken(heard), name, clip("; ".join(reasons), 200), ends)
+    return finish(axes, section.title, spoken(alternative), name, clip("; ".join(reasons), 200), ends)

@@ -13,10 +13,10 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import Change, folded, line, statistics
-from heavytop.compare.rows import Finding
-from heavytop.compare.work_precision import ERRORS, leads, panels, seconds_text
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import Change, folded, line, statistics
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.work_precision import ERRORS, leads, panels, seconds_text
 from heavytop.document.document import (
     Card,
     Cell,
@@ -90,7 +90,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
 
 
 def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
-    """The answer of each kind; one that has cards is heard once, so in a sentence where it opens the page alone."""
+    """The answer of each kind; one that has cards is repeated in a sentence only where it opens the page alone."""
     said = headlines(found, kinds)
     with_cards = [blocks for blocks in found.values() if any(isinstance(block, Card) for block in blocks)]
     return [each for number, each in enumerate(said) if not number or not any(each in blocks for blocks in with_cards)]
@@ -255,9 +255,9 @@ _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved
 
 
 def digits_headline(rows: Sequence[Row]) -> Headline | None:
-    """The fewest digits left at the longest horizon: of an integrator of others beside heyoka's, else of heyoka beside
-    those of multiword.  A motion whose truth ends before, for the format has no digit left, counts where there is no
-    other.
+    """The fewest significant digits at the longest horizon: of a third-party integrator beside heyoka's, else
+    of heyoka beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has
+    lost all significant digits, counts where there is no other.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
@@ -274,7 +274,8 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
         return None
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
     row, kept = min((each for each in chosen if abs(exact(each[0].horizon)) == last), key=lambda each: each[1])
-    said = f"{clip(row.key.subject.name, 40)} has {at_least}{digits_text(kept)} of {digits_of(row.bits)} digits left"
+    digits = f"{digits_text(kept)} of {digits_of(row.bits)} significant digits"
+    said = f"{clip(row.key.subject.name, 40)} has {at_least}{digits}"
     said += f" at T = {short(row.horizon)} ({clip(row.case, 40)} in {clip(row.precision, 20)})"
     other = second.get(_place(row))
     return Headline(said + ("." if other is None else f", {beside} {digits_text(other)}."))
@@ -397,8 +398,8 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:
-    """The laws that most of the healthy runs follow, of integrators of others where there are any, and how many of the
-    planted faults have another law than these.
+    """The laws that most of the healthy runs follow, of third-party integrators where there are any, and how many of
+    the planted faults have another law than these.
     """
     theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows

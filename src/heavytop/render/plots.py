@@ -75,7 +75,7 @@ class _Chart(NamedTuple):
 
     axes: Any
     title: str
-    heard: list[str]
+    alternative: list[str]
     ends: list[End]
 
 
@@ -112,11 +112,11 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         drawn = [_chart(section, name, column, cases[name]) for column in _COLUMNS]
         charts = [chart for chart in drawn if chart]
         x, y = ([getattr(chart.axes, f"get_{axis}lim")() for chart in charts] for axis in "xy")
-        for axes, title, heard, ends in charts:
+        for axes, title, alternative, ends in charts:
             axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
             axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
             name = f"growth-{len(section.pictures)}"
-            section.pictures.append(finish(axes, title, spoken(heard, 24), name, ends=ends))
+            section.pictures.append(finish(axes, title, spoken(alternative, 24), name, ends=ends))
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
     return section
@@ -146,7 +146,7 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     """Draw one run with its noise and its law, and list it."""
     x, y = points(held, (1 - row.bits) * math.log10(2))
     if not x:
-        chart.heard.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
+        chart.alternative.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
         return
     draw(chart.axes, section.key(key), x, y)
     colour = COLOURS[key.colour]
@@ -157,10 +157,10 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     if law:
         if _law(chart.axes, colour, law, x, y):
             section.key(_FITTED)
-        chart.heard.append(_law_said(key.label, law))
+        chart.alternative.append(_law_said(key.label, law))
         chart.ends.append(End(_law_short(law), colour, x[-1], y[-1]))
     what = quantity.component.replace("_", " ")
-    chart.heard.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
+    chart.alternative.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
     named = f"{'drift of' if quantity.name == DRIFT else 'error'} {what}"
     section.rows.append([case, key.label, named, short(held.times[-1]), short(held.values[-1]), *_law_words(law)])
 
@@ -290,7 +290,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     low, high = axes.dataLim.intervalx
     axes.set_xlim(math.floor(low - 0.1), math.ceil(high + 0.1))
-    section.pictures.append(finish(axes, section.title, spoken(drawing.heard, 24), "digits", ends=ends))
+    section.pictures.append(finish(axes, section.title, spoken(drawing.alternative, 24), "digits", ends=ends))
     if any(cell[5] == "" for cell in section.rows):
         section.notes.append("A cross at the top is a run that failed, or one whose error is not available.")
     return section
@@ -327,7 +327,7 @@ class _Digits(NamedTuple):
     section: Section
     axes: Any
     formats: dict[str, int]
-    heard: list[str]
+    alternative: list[str]
 
     def lane(self, lane: tuple[str, str], members: Sequence[tuple[str, Row]], colour: int) -> End | None:
         """Draw one motion in its formats; where its last point is."""
@@ -337,7 +337,8 @@ class _Digits(NamedTuple):
             old, band = source == "baseline", row.metrics[RELATIVE.text].band or 0.0
             key = self.section.key(self._key(row, source))
             cells = _cells(_label(lane), source, row)
-            self.heard.append(f"{cells[0]}, {key.label}: {cells[5] or cells[6]} of {cells[4]} lost at {cells[2]}.")
+            lost_text = f"{cells[5] or cells[6]} of {cells[4]} lost at {cells[2]}."
+            self.alternative.append(f"{cells[0]}, {key.label}: {lost_text}")
             if until is None:
                 continue
             if lost is None:

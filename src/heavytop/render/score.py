@@ -159,7 +159,7 @@ _SENTENCES = {
     "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",
     "rows_reversed": "The states are listed from the last time to the first",
 }
-"""Of the kinds that need no number."""
+"""The sentences of kinds without a number."""
 _SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
 _OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass", "top_axes": "top"}
 
@@ -453,20 +453,20 @@ def digits_lost(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "Digits lost over time",
         [
             f"Digits lost: log10 of the error in units of ε = 2^(1 − bits) of {row.precision}, of its part along the "
-            "flow (phase) and of its part across it. The axis ends where the format has no digit left."
+            "flow (phase) and of its part across it. The axis ends where the format has lost all significant digits."
         ],
         columns=["t", *_PAGE_PARTS],
     )
     axes = new_axes(TIME, "digits lost", 3.2)
     epsilon = (1 - row.bits) * math.log10(2)
-    heard = []
+    alternative = []
     for place, (part, label) in enumerate(_PAGE_PARTS.items()):
         curve = _lost(row, part, epsilon)
         if curve:
             x, y = [point[0] for point in curve], [point[1] for point in curve]
             draw(axes, section.key(Key(label, place, MARKERS[place])), x, y)
-            heard.append(f"{label}: {y[-1]:.1f} digits lost at |t| = {scientific(x[-1])}.")
-    if not heard:
+            alternative.append(f"{label}: {y[-1]:.1f} digits lost at |t| = {scientific(x[-1])}.")
+    if not alternative:
         return None
     most = row.bits * math.log10(2)
     axes.set_ylim(0, max(most, *(line.get_ydata().max() for line in axes.lines)) * 1.02)
@@ -474,7 +474,7 @@ def digits_lost(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     decades(axes.xaxis)
     section.rows = _table(row, epsilon)
     section.notes.append(f"Dashed: all {most:.0f} digits of {row.precision} are lost.")
-    section.pictures.append(finish(axes, "Digits lost over time", spoken(heard), "lost"))
+    section.pictures.append(finish(axes, "Digits lost over time", spoken(alternative), "lost"))
     return section
 
 

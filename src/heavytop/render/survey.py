@@ -84,7 +84,7 @@ def _label(source: str, row: Row) -> str:
 def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys, name: str) -> Picture:
     axes = new_axes(_NAMES[name], "part of the motions")
     decades(axes.xaxis)
-    heard = []
+    alternative = []
     for source, row in rows:
         found = _spread(row).histograms.get(name)
         if found is None:
@@ -93,9 +93,9 @@ def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys,
         part = numpy.array([0, *found.counts, 0]) / sum(found.counts)
         middles = found.first + found.width * (numpy.arange(len(part)) - 0.5)
         draw(axes, key, middles, part)
-        heard.append(f"{key.label}: most at 10^{middles[int(part.argmax())]:.1f}.")
+        alternative.append(f"{key.label}: most at 10^{middles[int(part.argmax())]:.1f}.")
     axes.set_ylim(bottom=0)
-    return finish(axes, f"Distribution: {_NAMES[name]}", spoken(heard), f"survey-{name.replace('_', '-')}")
+    return finish(axes, f"Distribution: {_NAMES[name]}", spoken(alternative), f"survey-{name.replace('_', '-')}")
 
 
 def _map(cells: CellMap, label: str, name: str) -> Picture:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
-from heavytop.compare.verdicts import size
+from heavytop.comparison.verdicts import size
 from heavytop.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points
 from heavytop.document.kind import Kinds, document, headlines
 from heavytop.document.names import printable, short
@@ -244,7 +244,7 @@ def _growths(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def _meaning(row: Row) -> str:
-    """What the law of an integrator of others says about it."""
+    """What the law of a third-party integrator says about it."""
     name = Quantity(SOLUTION_ERROR, "along").text
     law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth

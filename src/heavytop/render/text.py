@@ -14,7 +14,7 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.compare.compare import Trial
+from heavytop.comparison.compare import Trial
 from heavytop.document.document import Cell, Value, Word, cell_text
 from heavytop.document.kind import Kinds, kind_of
 from heavytop.document.names import computed_by, printable
@@ -37,7 +37,7 @@ NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
-    """Whether a run did not reach its horizon; that one gives up may be what its rows are there to show.
+    """Whether a run did not reach its horizon; that one aborts may be what its rows are there to show.
 
     What an integrator declares that it cannot do is no failure.
     """

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.compare.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
+from heavytop.comparison.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
 from heavytop.document.document import (
     DASHED,
     TIME,
@@ -43,7 +43,7 @@ _LEADS = (
 
 
 def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Seconds of a run against its error; a run that gave up is a cross, and no point."""
+    """Seconds of a run against its error; an aborted run is a cross, and no point."""
     rows = [(source, row) for source, report in sources for row in report.rows]
     if not rows:
         return None
@@ -55,7 +55,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "Seconds of a run, the fastest of several, since other work on the machine only ever adds, against its "
             "error, the largest of a component over the samples, compared with the known motion: the lower and the "
             "farther left, the better. A curve is one integrator over its tolerances or steps; the time to compile is "
-            "apart, in the numbers. A cross on the right edge is a run that gave up before the end, at the time it "
+            "apart, in the numbers. A cross on the right edge is a run aborted before the end, at the time it "
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
             "general code, and the others, are given them when they run.",
         ],
@@ -109,22 +109,22 @@ def _picture(lines: Sequence[tuple[str, Line]], keys: Keys, title: str, name: st
     axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
     decades(axes.xaxis)
     decades(axes.yaxis)
-    heard, ends = [], []
+    alternative, ends = [], []
     for (source, line), label in zip(lines, names, strict=True):
         key = keys.key(clip(line.label, 30), source)
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)
-            heard.append(f"{key.label}: {scientific(points[0][0])} in {scientific(points[0][1])} s.")
+            alternative.append(f"{key.label}: {scientific(points[0][0])} in {scientific(points[0][1])} s.")
         failures = [math.log10(seconds) for seconds in line.failures if seconds > 0]
         if line.failures:
             edge = {"transform": axes.get_yaxis_transform(), "clip_on": False, "color": COLOURS[key.colour]}
             axes.plot([1.0] * len(failures), failures, "x", ms=6, mew=1.6, **edge)
-            heard.append(f"{key.label}: gave up ({len(line.failures)}).")
+            alternative.append(f"{key.label}: aborted ({len(line.failures)}).")
         if points or failures:
             x, y = points[-1] if points else (axes.get_xlim()[1], failures[-1])
             ends.append(End(label, COLOURS[key.colour], x, y))
-    return finish(axes, title, spoken(heard, 24), name, ends=ends)
+    return finish(axes, title, spoken(alternative, 24), name, ends=ends)
 
 
 def _numbers(source: str, row: Row) -> list[str]:
@@ -152,7 +152,7 @@ QUANTITIES = (
 )
 """Series, name, axis, and the power of the steps by which rounding errors alone grow."""
 _LOG10 = -5.0
-"""The error that the rungs of the methods are to have."""
+"""The error that the points of the methods are to have."""
 _DECADES, _FEWEST_DECADES = 2.0, 1.5
 _FITTED = Key("fitted power of t", 5, "", "6 3")
 _ABOVE_ROUNDING = 10
@@ -219,15 +219,15 @@ def trend(series: Series, rounding: float = 0.0) -> Trend | None:
 
 
 def alike(rows: Sequence[Row]) -> list[Row]:
-    """Of each method the rung whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
+    """Of each method the point whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
     found: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
     for index, row in enumerate(rows):
         name, error = row.key.subject.name, row.metrics.get("error_max")
         if row.precision != "double" or row.outcome != "success":
             continue
         if name in METHODS and "drift_energy" in row.series and error is not None and error.log10 is not None:
-            rungs = found.setdefault((row.case, row.horizon), {}).setdefault(name, [])
-            rungs.append((abs(error.log10 - _LOG10), index))
+            points = found.setdefault((row.case, row.horizon), {}).setdefault(name, [])
+            points.append((abs(error.log10 - _LOG10), index))
     whole = [case for case, methods in found.items() if len(methods) == len(METHODS)]
     if not whole:
         return []
@@ -278,18 +278,20 @@ def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None
         axes = new_axes(TIME, unit, height=3.2, right=1.2)
         decades(axes.xaxis)
         decades(axes.yaxis)
-        heard = []
+        alternative = []
         ends = []
         for key, row in chosen:
             found, last, end = _curve(axes, key, row, name, power)
             ends += [end] if end else []
             section.key(key)
-            heard.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
+            alternative.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
             exponent = found.said if found else ""
             error, law = short(row.metrics["error_max"].value), found.law if found else ""
             section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
         said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]
         heading = f"{title[0].upper()}{title[1:]} over time"
-        section.pictures.append(finish(axes, heading, spoken([*said, *heard]), f"method-growth-{number}", ends=ends))
+        section.pictures.append(
+            finish(axes, heading, spoken([*said, *alternative]), f"method-growth-{number}", ends=ends)
+        )
     section.key(_FITTED)
     return section

@@ -281,7 +281,7 @@ def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
 
 
 def _check_series(file: Path, rows: Iterable[Row]) -> None:
-    """Raises InputError where a series has not one value for each time, or a number that is none."""
+    """Raises InputError where a series has not one value for each time, or a text that is not a number."""
     for row in rows:
         for name, series in row.series.items():
             if len(series.times) != len(series.values):

@@ -1,4 +1,4 @@
-"""Reports on disk: written whole, read with suspicion."""
+"""Reports on disk: written whole, validated on reading."""
 
 from __future__ import annotations
 

@@ -285,7 +285,7 @@ def _own(plan: Plan) -> dict[str, Case]:
 
 def warnings(plan: Plan) -> list[str]:
     """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
-    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in case.top.warnings()]
+    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
@@ -352,7 +352,7 @@ _MAX_SAMPLES = 1_000_000
 
 
 def log_spaced(count: int, per_decade: int = 8) -> list[int]:
-    """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
+    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
     wanted = {count}
     i = 0
     while (value := round(10 ** (i / per_decade))) < count:

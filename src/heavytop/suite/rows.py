@@ -249,7 +249,7 @@ def _amplification(problem: Problem, horizon: Fraction) -> float | None:
 
 
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:
-    """The row of a task that came to nothing: an outcome of its own, no metric, and why in the place of a reference."""
+    """The row of a task that was aborted: an outcome of its own, no metric, and why in the place of a reference."""
     return Row(
         case=task.title,
         system=task.key.system,

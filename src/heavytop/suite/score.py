@@ -433,7 +433,7 @@ def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer 
 
 
 def required(digits: Any) -> Fraction:
-    """How many digits are asked for, exactly; raises InputError for what is no number, or is not positive."""
+    """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
     asked = physical(exact(digits), "require")
     if asked <= 0:
         raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")

@@ -1,1 +1,1 @@
-"""What moves: the top, its equations, its first integrals, its angles.  Pure: no number format is known here."""
+"""What moves: the top, its equations, its first integrals, its angles.  Independent of number formats."""

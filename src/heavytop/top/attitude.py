@@ -187,7 +187,7 @@ class Angle:
 
     @classmethod
     def read(cls, value: Any) -> Angle:
-        """Radians, or degrees where it ends with "deg"; raises InputError for what is no number."""
+        """Radians, or degrees where it ends with "deg"; raises InputError for what is not a number."""
         if isinstance(value, Angle):
             return value
         if isinstance(value, str) and value.strip().lower().endswith(_DEGREES):
@@ -262,7 +262,7 @@ class Attitude:
     def euler(cls, sequence: str, a: Any, b: Any, c: Any) -> Attitude:
         """R = R_I(a) R_J(b) R_K(c) for ``sequence`` "IJK", intrinsic; radians, or degrees as "30deg".
 
-        Raises InputError for an unknown sequence and for what is no number.
+        Raises InputError for an unknown sequence and for what is not a number.
         """
         return cls("euler", angles=tuple(map(Angle.read, (a, b, c))), sequence=require_sequence(sequence))
 

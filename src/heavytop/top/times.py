@@ -34,7 +34,7 @@ class TimeText(str):
         """The text of a time.
 
         Text stays as it is; of a float and of any other number the exact decimal, where it has one of up to 60 digits,
-        else the fraction.  Raises InputError for what is no number.
+        else the fraction.  Raises InputError for what is not a number.
         """
         number = exact(value)
         if isinstance(value, str):
@@ -94,6 +94,7 @@ class DoubleTimes(RoundedTimes):
     """
 
     __slots__ = ()
+    are_doubles = True
 
     @property
     def doubles(self) -> Any:

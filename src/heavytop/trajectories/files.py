@@ -1,4 +1,4 @@
-"""Trajectories that another program wrote, as JSON or CSV, read exactly and with suspicion."""
+"""Trajectories that another program wrote, as JSON or CSV, read exactly and validated."""
 
 from __future__ import annotations
 
@@ -307,8 +307,8 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     case: gives top, start and system where the file does not.
     normalize: take quaternions and matrices of any length for their rotations, and γ of the start for its direction.
     Raises InputError for a file that cannot be read or is neither, for a key or column that is missing or unknown, a
-    number that is none, times out of order, states of another shape or count, data that no heavy top has, and data
-    that are not those of the case.
+    text that is not a number, times out of order, states of another shape or count, data that no heavy top has, and
+    data that are not those of the case.
     """
     shown_path = str(path)[:LONGEST_NAME]
     piped = str(path) == "-"

@@ -315,9 +315,9 @@ class Given:
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
-        found = [*self.notes, *self.top.warnings()]
         if self.observed is not None:
-            return found
+            return [*self.notes, *self.observed.body.warnings()]
+        found = [*self.notes, *self.top.warnings()]
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
@@ -341,7 +341,7 @@ def of_arrays(
     """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
 
     precision: None for the narrowest format that holds every number as it is given.
-    Raises InputError for what is no number, for counts that differ or are too large, for names that cannot be shown.
+    Raises InputError for what is not a number, for counts that differ or are too large, for names that cannot be shown.
     """
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
@@ -578,7 +578,7 @@ def of_observed_arrays(
 
     precision: None for the narrowest format that holds every number as it is given.  names: of the row and the
     integrator.
-    Raises InputError for what is no number, for counts that differ or are too large, and as :func:`observed`.
+    Raises InputError for what is not a number, for counts that differ or are too large, and as :func:`observed`.
     """
     for rows in arrays.values():
         require_states(times, rows)

@@ -49,7 +49,7 @@ from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
-# Attitude of Delone's motions: the azimuth of :mod:`heavytop.exact.cases.kovalevskaya` where w2 = 0 for ever.
+# Attitude of Delone's motions: the azimuth of :mod:`heavytop.exact.cases.kovalevskaya` where w2 stays 0.
 #
 # In its units, and with k = 0, one separated variable is 0 and the other, w ≤ 0, has w'² = −2 ((w + h)(w² + G) − C²/2).
 # The level vector v has v² = 4e (q² w − e q²) and the azimuth Λ' = (l/2) (1 + e/(w − e)), e = l²/2 − h.  As

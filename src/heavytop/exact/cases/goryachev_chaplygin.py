@@ -151,7 +151,7 @@ def separated_start(level: Level) -> tuple[arb, arb]:
 
 
 def gap_ends(level: Level, curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
-    """Between which two real roots u1 and u2 move; the same root twice for a variable that rests there for ever.
+    """Between which two real roots u1 and u2 move; the same root twice for a variable that stays there.
 
     Raises Undecided where the balls do not tell.
     """

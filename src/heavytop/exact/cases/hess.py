@@ -1,7 +1,7 @@
 """Hess' tops, M·γ ≠ 0: the height of the centre of mass is elliptic, the rest a linear system with its period.
 
 n = P r = (a, 0, c), N = |n|, with I1 (I2 − I3) a² = I3 (I1 − I2) c²: r stands across a circular section of the
-ellipsoid of inertia of the moments 1/I.  M·n = 0 at the start then holds for ever.  In units with I2 = 1, with
+ellipsoid of inertia of the moments 1/I.  M·n = 0 at the start then holds at all times.  In units with I2 = 1, with
 e_z = n/N, e_x = (c, 0, −a)/N, e_y, β = ac (1/I1 − 1/I3)/N², C0 = M·γ and the energy E,
 
     M = ρ (cos φ e_x + sin φ e_y),   s = n·γ = Nγ_z,   ρ² = 2 (E − s),   γ_x + iγ_y = ρe^(iφ) (C0 − iγ_z')/ρ²
@@ -117,7 +117,7 @@ class Level:
         return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
 
     def gap(self, most: int = MOST_TERMS) -> Gap:
-        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots are not told apart."""
+        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots coincide."""
         low, high, top = self.roots()
         if not low < high < top:
             raise Undecided

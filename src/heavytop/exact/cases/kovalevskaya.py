@@ -75,7 +75,7 @@ Interval = tuple[int, int]
 def intervals(level: Level, curve: Sequence[Root], start: Start) -> tuple[Interval, Interval]:
     """Where w1 and w2 move: pairs of numbers of branch points, (lower, upper) in v and so (upper, lower) in w.
 
-    Twice the same number for a variable that rests at a double root for ever.
+    Twice the same number for a variable that stays at a double root.
     Raises Undecided where the balls do not tell.
     """
     resting = _resting(level, curve, start)
@@ -349,7 +349,7 @@ class AbelMotion:
                 form = (acb_series(p * p + q * q) - e) * a + acb_series(2 * p) * b
                 left = form * ends * acb(0, -0.5)
                 right = acb_series(q) * halves[0][i] * halves[1][i] * (mu - e)
-                # P_j = 0 for ever at a root where a variable rests
+                # P_j stays 0 at a root where a variable rests
                 rests = (i, i) in self.ends
                 kappas.append((mu - e) if rests else _fourth_root(left, right) * (mu - e))
         first, second = (tuple(inverse[row, j] * kappas[j] for j in range(3)) for row in (1, 2))
@@ -564,7 +564,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         return to_bits(evaluate, bits)[0]
 
     def second_state(self, time: Fraction, bits: int) -> list[arb]:
-        """The state at ``time`` by theta functions, to hold against :meth:`state`, which mostly inverts integrals.
+        """The state at ``time`` by theta functions, to compare with :meth:`state`, which mostly inverts integrals.
 
         Raises OutOfReach on a degenerate level, where there are no such functions, and where :meth:`state` uses them.
         """

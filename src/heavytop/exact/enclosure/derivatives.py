@@ -46,7 +46,7 @@ from heavytop.exact.enclosure.step import (
     taylor_series,
 )
 from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
-from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.precision import decimal_text
 from heavytop.top.equations import Parameters, System
 
@@ -88,12 +88,12 @@ _LARGEST_GROWTH = 16.0
 class Datum:
     """A datum θ of the field, in a unit of its own, and the field with θ + δ.
 
-    field: f + δ G̃.  carrier: of its Taylor coefficients, as for a step.  quotient: (q, l) of G̃.  off: (q, l) of
+    field: f + δ G̃.  certified: of its Taylor coefficients, as for a step.  quotient: (q, l) of G̃.  off: (q, l) of
     G − G̃, in ulps of the derivatives.
     """
 
     field: Quadratic
-    carrier: Carrier | None
+    certified: CertifiedSeries | None
     quotient: tuple[float, float]
     off: tuple[float, float]
 
@@ -103,7 +103,7 @@ class Tangent:
     """What derivatives are computed with: ``field`` is f, δ = 2^-shift, on a grid of ``precision`` bits."""
 
     field: Quadratic
-    carrier: Carrier | None
+    certified: CertifiedSeries | None
     precision: int
     shift: int
     data: tuple[Datum, ...] = ()
@@ -140,14 +140,14 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
     origin, columns, errors = _end(step.series, tau), [], []
     for j in range(tangent.field.dimension):
         beside = [value + ((k == j) << tangent.bits) for k, value in enumerate(centre)]
-        series = taylor_series(tangent.field, _centred(step, beside), tangent.precision, tangent.carrier)
+        series = taylor_series(tangent.field, _centred(step, beside), tangent.precision, tangent.certified)
         error = bounds.end_error(tangent.field, series)
         if series is None or error is None:
             return None
         columns.append(_end(series, tau))
         errors.append(error + bounds.own_error + bounds.of_start + _rounding(step, series, tau))
     for datum in tangent.data:
-        series = taylor_series(datum.field, _centred(step, centre), tangent.precision, datum.carrier)
+        series = taylor_series(datum.field, _centred(step, centre), tangent.precision, datum.certified)
         error, of_datum = bounds.end_error(datum.field, series), bounds.of_datum(datum)
         if series is None or error is None or not of_datum < inf:
             return None
@@ -443,8 +443,8 @@ def _one_way(
 
 
 def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: bool, data: bool) -> Tangent:
-    carrier = motion.carrier(precision) if in_words else None
-    tangent = Tangent(motion.field, carrier, precision, precision // 2 - _COARSER)
+    certified = motion.certified(precision) if in_words else None
+    tangent = Tangent(motion.field, certified, precision, precision // 2 - _COARSER)
     if not data:
         return tangent
     return replace(tangent, data=tuple(_datum(known, motion, tangent, k) for k in range(len(DATA))))
@@ -461,9 +461,9 @@ def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int)
     system = motion.scaled.system
     direct = quotient(system, own, datum, delta * unit, delta)
     off = difference(system, own, datum, delta * unit, delta, unit)
-    in_words = tangent.carrier is not None and varied.in_words
-    carrier = varied.carrier(tangent.precision) if in_words else None
-    return Datum(varied.field, carrier, _bounds(direct, 0), _bounds(off, tangent.bits))
+    in_words = tangent.certified is not None and varied.in_words
+    certified = varied.certified(tangent.precision) if in_words else None
+    return Datum(varied.field, certified, _bounds(direct, 0), _bounds(off, tangent.bits))
 
 
 def _bounds(field: Quadratic, bits: int) -> tuple[float, float]:
@@ -509,7 +509,7 @@ def _step(tangent: Tangent, node: Node) -> tuple[Step, StepDerivatives] | tuple[
     """The step from a node with its derivatives; shorter where they need it."""
     for shorter in range(_SHORTENED):
         trial = replace(node, halvings=node.halvings + shorter)
-        found = step(tangent.field, trial, tangent.precision, tangent.carrier)
+        found = step(tangent.field, trial, tangent.precision, tangent.certified)
         if found is None:
             return None, None
         own = step_derivatives(tangent, found, Fraction(1))

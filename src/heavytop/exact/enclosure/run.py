@@ -7,7 +7,7 @@ The step and its theorem are in :mod:`heavytop.exact.enclosure.step`.  Its coeff
 (:mod:`heavytop.multiword.fixed_point.certified_series`), as far as there are words, or in exact integers where a few
 steps would not be worth the machine code.  Here the working precision is chosen so that the asked bits come out: the
 bits that the motion loses are measured on a pilot run, and carried on linearly to the time asked for; where the pilot's
-bits do, it is the run asked for.  Precisions come from a ladder and steps depend on the node that they start from
+bits do, it is the run asked for.  Precisions come from a schedule and steps depend on the node that they start from
 alone, so a ball does not depend on what was asked before; what was computed before is only found faster.
 
 Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
@@ -53,7 +53,7 @@ from heavytop.exact.flint.balls import (
 from heavytop.multiword.codegen.recurrence import coefficients, rates
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
-from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.multiword.problem import Scaled
 from heavytop.precision import decimal_text
 from heavytop.top.attitude import perpendicular
@@ -82,7 +82,7 @@ class Run:
     motion: Quadratic
     precision: int
     nodes: tuple[Node, ...]
-    carrier: Carrier | None = None
+    certified: CertifiedSeries | None = None
     stride: int = 1
     lost_at: Fraction | None = None
     _last: Step | None = None
@@ -95,7 +95,7 @@ class Run:
             if self.lost_at is not None and node.time >= self.lost_at:
                 return None
             if found is None:
-                found = self._last = step(self.motion, node, self.precision, self.carrier)
+                found = self._last = step(self.motion, node, self.precision, self.certified)
             if found is None:
                 self.lost_at = node.time
                 return None
@@ -166,7 +166,7 @@ class Pilot:
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
             if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > most_steps:
                 break
-            found = step(run.motion, node, run.precision, run.carrier)
+            found = step(run.motion, node, run.precision, run.certified)
             if found is None:
                 break
             node = found.end()
@@ -224,7 +224,7 @@ class ScaledMotion:
     field: Quadratic
     forwards: bool
     in_words: bool
-    _carriers: dict[int, Carrier] = dataclasses.field(default_factory=dict)
+    _certified: dict[int, CertifiedSeries] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], forwards: bool) -> ScaledMotion:
@@ -271,24 +271,24 @@ class ScaledMotion:
                     return grid.total, True
         return _ladder(bits), False
 
-    def carrier(self, precision: int) -> Carrier:
+    def certified(self, precision: int) -> CertifiedSeries:
         """The Taylor coefficients in ``precision`` bits, one of those that words have."""
-        if precision not in self._carriers:
+        if precision not in self._certified:
             grid = next(grid for grid in _GRIDS if grid.total == precision)
-            carrier = Carrier(self.scaled, grid, self.forwards)
-            self._require_right(carrier)
-            self._carriers[precision] = carrier
-        return self._carriers[precision]
+            certified = CertifiedSeries(self.scaled, grid, self.forwards)
+            self._require_right(certified)
+            self._certified[precision] = certified
+        return self._certified[precision]
 
-    def _require_right(self, carrier: Carrier) -> None:
+    def _require_right(self, certified: CertifiedSeries) -> None:
         """The first step that machine code takes in this process is compared with exact integers."""
-        grid, size = carrier.grid, len(self.scaled.state)
+        grid, size = certified.grid, len(self.scaled.state)
         key = (grid, self.scaled.system.name, size)
         if key in _seen_right:
             return
         centre = [round(value * 2**grid.total) for value in self.scaled.state]
         for halvings in range(2, 64):
-            series = carrier.series(centre, halvings)
+            series = certified.series(centre, halvings)
             if series is not None:
                 if sum(lacking(self.field, series, grid.total, halvings)) > Fraction(series.rounding):
                     raise Contradiction(
@@ -481,11 +481,11 @@ class Validated:
         key = (direction, precision, in_words, len(start))
         if key not in self._runs:
             motion = self._motion(direction, start)
-            carrier = motion.carrier(precision) if in_words else None
+            certified = motion.certified(precision) if in_words else None
             off = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
             lacking = [value / size for value, size in zip(off, motion.scaled.sizes[: len(off)], strict=True)]
             node = start_node(motion.field, motion.scaled.state, precision, lacking)
-            self._runs.setdefault(key, Run(motion.field, precision, (node,), carrier))
+            self._runs.setdefault(key, Run(motion.field, precision, (node,), certified))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
@@ -533,7 +533,7 @@ class Validated:
         """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
         pilot = self._pilot(direction, start, bits)
         if most is None:
-            a_step = seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+            a_step = seconds_a_step(pilot.run.precision, pilot.run.certified is not None)
             return pilot.forecast(span, _HOPELESS * self.effort / a_step)
         # the enclosure may take fewer bits than its pilot
         fewest = self._motion(direction, start).precision(bits, inf)
@@ -570,7 +570,7 @@ class Validated:
 def _steps_of(run: Run, span: Fraction) -> Iterator[Step]:
     node = run.nodes[0]
     while node.time < span:
-        found = step(run.motion, node, run.precision, run.carrier)
+        found = step(run.motion, node, run.precision, run.certified)
         if found is None:
             return
         yield found

@@ -2,7 +2,7 @@
 
 All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ τ ≤ 1: y' = h f(y).
 
-*The polynomial* p(τ) = Σ b_n τⁿ has whole numbers in units of 2^-p ("ulps") as coefficients, exactly:
+*The polynomial* p(τ) = Σ b_n τⁿ has integers in units of 2^-p ("ulps") as coefficients, exactly:
 b_{n+1} is h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p): ρ_n is half an ulp where they are made of
 exact integers, and what :mod:`heavytop.multiword.fixed_point.certified_series` proves where they are made of words.
 What p lacks to be a motion is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1) ρ_n;
@@ -49,7 +49,7 @@ from flint import arb, fmpz, fmpz_poly
 from gmpy2 import mpq, mpz
 from numpy.typing import NDArray
 
-from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.multiword.integers.integer_series import Row, coefficients
 from heavytop.multiword.problem import variation as variation_of
 
@@ -238,7 +238,7 @@ class Whole:
 
 
 def lacking(motion: Quadratic, series: StepSeries, precision: int, halvings: int) -> list[Fraction]:
-    """|b_(n+1) − h f_n/(n + 1)| in the maximum norm, in ulps, for 0 ≤ n < N: exactly, from whole numbers."""
+    """|b_(n+1) − h f_n/(n + 1)| in the maximum norm, in ulps, for 0 ≤ n < N: exactly, from integers."""
     polynomials = [fmpz_poly([int(value) for value in component]) for component in series.values]
     products = [polynomials[j] * polynomials[k] for j, k in motion.pairs]
     found = [Fraction(0)] * series.order
@@ -438,15 +438,15 @@ def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, of
     return Node(Fraction(0), centre, Errors(np.eye(field.dimension), radii, 0), halvings)
 
 
-def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None = None) -> Step | None:
+def step(field: Quadratic, node: Node, precision: int, certified: CertifiedSeries | None = None) -> Step | None:
     """The proven step from ``node``; None where the errors have grown beyond what the theorem admits.
 
-    carrier: of this motion on the grid of ``precision`` bits; None for coefficients in exact integers.
+    certified: of this motion on the grid of ``precision`` bits; None for coefficients in exact integers.
     """
     halvings = node.halvings
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
-        series = taylor_series(field, trial, precision, carrier)
+        series = taylor_series(field, trial, precision, certified)
         found = None if series is None else _prove(field, trial, series, precision)
         if found is not None and isfinite(found.widest) and found.variation_error < CAP:
             return found if found.widest < CAP else None
@@ -454,10 +454,10 @@ def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None =
     return None
 
 
-def taylor_series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+def taylor_series(field: Quadratic, node: Node, precision: int, certified: CertifiedSeries | None) -> StepSeries | None:
     """The polynomial from a node, over its own step; None where that is too long for it."""
-    if carrier is not None:
-        return carrier.series(node.centre, node.halvings)
+    if certified is not None:
+        return certified.series(node.centre, node.halvings)
     values = coefficients(field, node.centre, precision, node.halvings)
     return None if values is None else Whole(values, precision)
 

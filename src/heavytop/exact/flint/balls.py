@@ -414,7 +414,7 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
 
 @whole_evaluation
 def whole(value: arb) -> int:
-    """The whole number nearest to the middle of a ball; 0 if it is not finite."""
+    """The integer nearest to the middle of a ball; 0 if it is not finite."""
     found = (value + _HALF).mid().floor().unique_fmpz()
     return 0 if found is None else int(found)
 

@@ -206,7 +206,7 @@ class Inversion:
 
 
 class Rest:
-    """The variable at rest at ``place``; its phase is 0 for ever."""
+    """The variable at rest at ``place``; its phase stays 0."""
 
     turn = 1.0
     periodic = False

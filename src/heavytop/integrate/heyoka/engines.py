@@ -191,7 +191,7 @@ class Compiled:
     copying: Lock = field(default_factory=Lock)
 
     @contextmanager
-    def lent(self) -> Iterator[Any]:
+    def borrowed(self) -> Iterator[Any]:
         """A copy of the engine for one run, given back at the end, also of a run that raises.
 
         Whoever runs meanwhile, another thread or an observer of this very run, has another copy.

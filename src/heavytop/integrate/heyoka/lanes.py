@@ -132,7 +132,7 @@ class Lanes:
         self.samples: deque[_Sample] = deque()
         self.seconds_per_step = CHUNK_SECONDS
         self.fresh = True
-        self.suspect = 0
+        self.unverified = 0
 
     def run(self) -> None:
         """Run problems until none is left; raises StoppedError when the ensemble is given up."""
@@ -173,10 +173,10 @@ class Lanes:
             # over the same ground again, by halves, until the step that fails is a single one
             mover.state[:] = before.states
             mover.set_dtime(before.high, before.low)
-            self.suspect = count
+            self.unverified = count
             return
         failed = self._single(before) if count == 1 else {}
-        self.suspect = max(self.suspect - count, 0)
+        self.unverified = max(self.unverified - count, 0)
         self.fresh = False
         self.steps += count
         ahead = self.direction * mover.time
@@ -199,8 +199,8 @@ class Lanes:
         ahead = self.direction * self.mover.time
         short = 0.95 * ((self.distance - ahead) * self.steps / ahead).min()
         count = max(_WINDOW, min(short, CHUNK_SECONDS / self.seconds_per_step))
-        if self.suspect:
-            count = min(count, max(self.suspect // 2, 1))
+        if self.unverified:
+            count = min(count, max(self.unverified // 2, 1))
         if self.limits is not None:
             count = min(count, (self.limits - self.steps).min())
         return int(count)
@@ -266,7 +266,7 @@ class Lanes:
                 self._finish(run, Outcome.SUCCESS, run.times[-1], int(sample.before.steps[sample.lane]) + steps)
 
     def _stop(self, lane: int, outcome: Outcome, time: Any, steps: Any, rest: Any = None) -> None:
-        """End the run in the lane; SUCCESS where it rests for ever in the state ``rest``."""
+        """End the run in the lane; SUCCESS where it is an equilibrium, ``rest``."""
         while self.samples:
             self._take_samples()
         if run := self.runs[lane]:
@@ -326,7 +326,7 @@ def states_on_a_grid(
     least = numpy.spacing(ends[-1])
     states = numpy.full((count, len(times), 6), numpy.nan)
     steps, good = numpy.zeros(count, int), numpy.zeros(count, bool)
-    with tool.lent() as engine, numpy.errstate(all="ignore"):
+    with tool.borrowed() as engine, numpy.errstate(all="ignore"):
         for first in range(0, count, LANES):
             places = numpy.minimum(numpy.arange(first, first + LANES), count - 1)
             engine.set_time(0.0)

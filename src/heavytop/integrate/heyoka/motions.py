@@ -256,7 +256,7 @@ def propagate(
         compact_mode=compact_mode,
         constants=constants,
     )
-    with tool.lent() as engine:
+    with tool.borrowed() as engine:
         return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
 
 
@@ -405,7 +405,7 @@ def first_steps(
     outcome = Outcome.SUCCESS
     began = perf_counter()
     end = number(until, precision)
-    with tool.lent() as engine:
+    with tool.borrowed() as engine:
         load(engine, problem)
         stepper = stepping(engine, True, None, None)
         while stepper.time < end and outcome is Outcome.SUCCESS and stepper.rest is None:

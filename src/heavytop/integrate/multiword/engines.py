@@ -14,7 +14,7 @@ from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, XI, derivatives, known_parameters
 from heavytop.integrate.trajectory import Problem
 from heavytop.multiword.double_double import double_double_run, eight_lane_run
-from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, Ladder
+from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, OrderSchedule
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_for
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
@@ -23,7 +23,7 @@ from heavytop.multiword.problem import Run, Scaled, Status, Steps
 from heavytop.precision import DOUBLE, Precision, decimal_text, last_call
 from heavytop.top.equations import System
 
-# Machine code in many words takes one step that is known before it takes any other.
+# Machine code takes one known step before it takes any other.
 
 
 _MOST_ORDERS = 100
@@ -112,12 +112,12 @@ def _tolerance_text(tolerance: Fraction) -> str:
 class DoubleDouble(Arithmetic):
     """106 bits that float, with plain doubles above an order n0.
 
-    ladder: of one motion.  in_lanes: of eight.
+    schedule: of one motion.  in_lanes: of eight.
     """
 
     tolerance: Fraction
-    ladder: Ladder
-    in_lanes: Ladder
+    schedule: OrderSchedule
+    in_lanes: OrderSchedule
 
     @property
     def flags(self) -> dict[str, str]:
@@ -126,13 +126,13 @@ class DoubleDouble(Arithmetic):
             "words": "2",
             "bits": str(double_double_run.BITS),
             "tolerance": _tolerance_text(self.tolerance),
-            "order": str(self.ladder.order),
-            "step_rule": f"radius of convergence times 2^{self.ladder.reach:.3f}, ten bits",
-            "plain_orders": f"where rounding is below 2^{self.ladder.room - 53:.1f}",
+            "order": str(self.schedule.order),
+            "step_rule": f"radius of convergence times 2^{self.schedule.reach:.3f}, ten bits",
+            "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",
         }
 
     def begin(self, scaled: Scaled, forwards: bool) -> Run:
-        return Floating(scaled, self.ladder, forwards)
+        return Floating(scaled, self.schedule, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
         made, _ = double_double_run.machine(system, attitude)
@@ -144,11 +144,11 @@ class DoubleDouble(Arithmetic):
 
 _REACH = -2.9
 # the same machine code with every order in double-double, and with nearly all in plain doubles
-_FULL = Ladder(38, _REACH, -1000.0)
-_PLAIN = Ladder(24, _REACH, 1000.0)
-_ALLOWED = Ladder(38, _REACH, 1000.0)
+_FULL = OrderSchedule(38, _REACH, -1000.0)
+_PLAIN = OrderSchedule(24, _REACH, 1000.0)
+_ALLOWED = OrderSchedule(38, _REACH, 1000.0)
 # with most orders in split coefficients
-_SPLIT, _SPLIT_ALLOWED = Ladder(38, _REACH, -1000.0, -40.0), Ladder(38, _REACH, 1000.0, -40.0)
+_SPLIT, _SPLIT_ALLOWED = OrderSchedule(38, _REACH, -1000.0, -40.0), OrderSchedule(38, _REACH, 1000.0, -40.0)
 _SPLIT_BITS = 80
 _PLAIN_BITS = 53
 _CHECKED_BITS = 128
@@ -183,7 +183,7 @@ class Words(Arithmetic):
 
 @dataclass(frozen=True, slots=True)
 class WholeNumbers(Arithmetic):
-    """Whole numbers of ``bits`` bits, where there are no words for so many."""
+    """Integers of ``bits`` bits, where there are no words for so many."""
 
     tolerance: Fraction
     bits: int
@@ -232,7 +232,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
     inner = wanted / 2**tiny if tiny > fixed_point_run.TINY_BITS else wanted
     if inner < _FINEST:
         return None
-    return DoubleDouble(wanted, Ladder.of(inner), Ladder.of(inner, FALL_IN_LANES))
+    return DoubleDouble(wanted, OrderSchedule.of(inner), OrderSchedule.of(inner, FALL_IN_LANES))
 
 
 @last_call

@@ -97,9 +97,9 @@ class WordsLanes:
         self.chunk = _FIRST_CHUNK
 
     def _own_flags(self) -> dict[str, str]:
-        ladder = self.arithmetic.in_lanes
-        rule = f"radius of convergence times 2^{ladder.reach:.3f}, ten bits"
-        return {"lanes": str(LANES), "order": str(ladder.order), "step_rule": rule}
+        schedule = self.arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
+        return {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
 
     def run(self) -> None:
         """Until no problem is left, with n0 rising for those that outgrow it."""
@@ -225,7 +225,7 @@ class WordsLanes:
         )
 
 
-# Many motions in many words: eight in lanes where double-double serves, threads on top.
+# Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.
 
 
 def propagate_words_ensemble(
@@ -238,7 +238,7 @@ def propagate_words_ensemble(
     step_limit: int | None = None,
     tolerance: Fraction | None = None,
 ) -> list[Trajectory]:
-    """The motions of ``problems`` at ``times``, computed in many words, in the order of the problems.
+    """The motions of ``problems`` at ``times``, computed in multi-word arithmetic, in the order of the problems.
 
     Where double-double serves the format and the tolerance, eight go side by side, unless they carry an attitude; else
     each by itself, to the bits of :func:`heavytop.integrate.multiword.motions.propagate_words`.  No bit of a motion

@@ -1,4 +1,4 @@
-"""Motions computed in many words: the same call as heyoka's, on the project's own Taylor integrator."""
+"""Motions computed in multi-word arithmetic: the same call as heyoka's, on the project's own Taylor integrator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
-from heavytop.multiword.double_double.double_double_run import PLACES, Floating
+from heavytop.multiword.codegen.machine_code import Doubles
+from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.problem import Run, Scaled, Status
 from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
@@ -27,6 +29,10 @@ _LARGE_EXPONENT = 500
 _MANY = 64
 """States at so many times are sampled in few calls."""
 _LARGE = 2.0**_LARGE_EXPONENT
+_EVERY_BIT = 1200
+"""Bits in which sums of doubles below 2^100 are exact."""
+_LEAST_LOW = 2.0**-960
+"""A low word that is larger has all its bits."""
 OUTCOMES = {
     Status.FINE: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
@@ -49,7 +55,8 @@ def propagate_words(
     place: Place | None = None,
     mark: Callable[[Place], None] | None = None,
 ) -> Trajectory:
-    """The motion from ``start`` at t = 0, at ``times``, computed in many words and rounded to ``precision`` once.
+    """The motion from ``start`` at t = 0, at ``times``, computed in multi-word arithmetic and rounded to ``precision``
+    once.
 
     tolerance: the local error aimed at, relative to the state; None for what the format can show.
     The other arguments and what is raised: as in :func:`heavytop.integrate.heyoka.motions.propagate`.
@@ -139,14 +146,21 @@ def _trajectory(
 
 
 def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
-    """Whether the states at many doubles are asked for, far from the ends of their exponents."""
-    if len(targets) < _MANY or problem.precision != DOUBLE or not isinstance(pace.run, Floating):
+    """Whether the states at many times are asked for that whole arrays hold, far from the ends of their exponents."""
+    if len(targets) < _MANY or pace.scaled.rest or not _holds(pace.run, problem.precision):
         return False
     far = all(
         1 / _LARGE < abs(float(time) * float(pace.scaled.rate)) < _LARGE
         for time in (targets[int(targets[0] == 0)], targets[-1])
     )
-    return far and not pace.scaled.rest and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
+    return far and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
+
+
+def _holds(run: Run, precision: Precision) -> bool:
+    """Whether arrays hold the states of this run: two words in a format that has no more, K of a grid in any other."""
+    if isinstance(run, Floating):
+        return DOUBLE.bits <= precision.bits <= BITS and precision.family != "quad"
+    return isinstance(run, Fixed) and precision.family in ("quad", "real")
 
 
 def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
@@ -182,6 +196,42 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
         # a zero has no sign
         found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
     return found
+
+
+def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+    """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
+    totals = abs(highs + lows)
+    odd = ((totals <= 1 / _LARGE) & (totals > 0)) | ~(totals < _LARGE)
+    if precision.family in ("double", "extended"):
+        zero = _widening(precision)(0.0)
+        return (zero + highs + lows) * sizes, odd.any(axis=1)
+    lows = lows * sizes
+    odd |= (lows != 0) & ~(abs(lows) > _LEAST_LOW)
+    return _widening(precision)(0.0) + highs * sizes + lows, odd.any(axis=1)
+
+
+def _sums_of_words(words: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+    """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows in which
+    only exact numbers tell.
+    """
+    import heyoka
+    import numpy
+
+    each = [words[:, k] for k in range(words.shape[1])]
+    if precision.family == "real":
+        zero = heyoka.real(0, _EVERY_BIT)
+        total = sum(each, zero) * numpy.array([zero + size for size in sizes])
+        states = numpy.array([heyoka.real(value, precision.bits) for value in total.ravel()], dtype=heyoka.real)
+        return states.reshape(total.shape), numpy.zeros(len(words), bool)
+    # two words fill a quad, and what the others add to is added to them at once
+    first, second, rest, *smaller = (word.astype(heyoka.real128) for word in each)
+    odd = numpy.zeros(words.shape[::2], bool)
+    for word in smaller:
+        total = rest + word
+        part = total - rest
+        odd |= (rest - (total - part)) + (word - part) != 0
+        rest = total
+    return (first + second + rest) * sizes.astype(heyoka.real128), odd.any(axis=1)
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:
@@ -233,24 +283,44 @@ class _Pace:
         """The states at many doubles that are reached, as from :meth:`reach` and :meth:`sample`, in few calls."""
         import numpy
 
-        assert isinstance(self.run, Floating)
         if targets[0] == 0:
             outcome, states = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
             return outcome, numpy.concatenate([[start], states])
-        status, words = self.run.sampled(numpy.abs(numpy.array(targets, dtype=float)) * float(self.scaled.rate))
-        width = len(self.scaled.sizes)
-        places = list(PLACES[:width])
-        total = words[:, places] + words[:, [place + 8 for place in places]]
-        states = (total + 0.0) * numpy.array([float(size) for size in self.scaled.sizes])
-        sizes = abs(total)
-        odd = ((sizes <= 1 / _LARGE) & (sizes > 0)) | ~(sizes < _LARGE)
-        for row in numpy.flatnonzero(odd.any(axis=1)):
-            state = native_state(self.scaled.back(self.run.exact_state(words[row])), precision)
+        found = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
+        status, states, others = found(targets, numpy.array([float(size) for size in self.scaled.sizes]), precision)
+        for row, known in sorted(others.items()):
+            state = None if known is None else native_state(self.scaled.back(known), precision)
             if state is None:
-                return Outcome.NON_FINITE, states[:row]
+                return Outcome.CAPACITY if known is None else Outcome.NON_FINITE, states[:row]
             states[row] = state
         return OUTCOMES[status], states
+
+    def _of_two_words(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
+        """How it ended, the states at many times, and by their rows those that only exact numbers tell."""
+        import numpy
+
+        assert isinstance(self.run, Floating)
+        times, rate = numpy.array(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
+        highs = times.astype(float)
+        status, words = self.run.sampled(highs * rate, (times - highs).astype(float) * rate)
+        places = list(PLACES[: len(self.scaled.sizes)])
+        pairs = words[:, places], words[:, [place + 8 for place in places]]
+        states, odd = _sums_of_columns(*pairs, sizes, precision)
+        others = {row: self.run.exact_state(words[row]) for row in map(int, numpy.flatnonzero(odd))}
+        return status, states, others
+
+    def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
+        import numpy
+
+        assert isinstance(self.run, Fixed)
+        times, rate = [abs(exact(target)) for target in targets], self.scaled.rate
+        status, words, others = self.run.sampled(times if rate == 1 else [time * rate for time in times])
+        states, odd = _sums_of_words(words, sizes, precision)
+        for row in map(int, numpy.flatnonzero(odd)):
+            if row not in others:
+                others[row] = tuple(sum(map(Fraction, column), Fraction(0)) for column in words[row].T.tolist())
+        return status, states, others
 
     def native(self, target: Fraction, precision: Precision) -> tuple[Outcome, Any]:
         """The state at ``target``, inside the last step, rounded; None where it cannot be given."""

@@ -114,13 +114,13 @@ def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> P
         with contained(name, " when its arguments were looked at"):
             arguments = inspect.signature(chosen).parameters
             takes_any = any(each.kind is each.VAR_KEYWORD for each in arguments.values())
-        for knob in given:
-            if knob not in arguments and not takes_any and own:
+        for control in given:
+            if control not in arguments and not takes_any and own:
                 raise InputError(
-                    f"The integrator {name} has no {knob}.", "Fixed steps take a step, others a tolerance."
+                    f"The integrator {name} has no {control}.", "Fixed steps take a step, others a tolerance."
                 )
-            if knob not in arguments and not takes_any:
-                raise PeerFailed(f"{name} has no {knob}")
+            if control not in arguments and not takes_any:
+                raise PeerFailed(f"{name} has no {control}")
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
     return Contained(name, chosen, own, declared, given)
@@ -128,7 +128,7 @@ def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> P
 
 def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
     """The program with that setting; one that says that it failed raises PeerFailed with what it said."""
-    if setting is not None and setting[0] != command.knob:
+    if setting is not None and setting[0] != command.control:
         raise PeerFailed(f"{command.name} has no {setting[0]}")
     integrate: Peer = CommandIntegrator(command)
 
@@ -141,10 +141,10 @@ def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
     return call
 
 
-def knob(which: str | Source) -> str:
+def control(which: str | Source) -> str:
     """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     if isinstance(which, Command):
-        return which.knob
+        return which.control
     if control := described(which).control:
         return control
     for each in ("step", "tolerance"):
@@ -156,13 +156,13 @@ def knob(which: str | Source) -> str:
     return ""
 
 
-def knob_apart(which: str | Source) -> str:
-    """:func:`knob`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
+def control_apart(which: str | Source) -> str:
+    """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
     if isinstance(which, Command) or described(which).own:
-        return knob(which)
+        return control(which)
     with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
         try:
-            return pool.submit(knob, which).result(timeout=_PATIENCE)
+            return pool.submit(control, which).result(timeout=_PATIENCE)
         except BrokenProcessPool:
             return ""
         except TimeoutError:

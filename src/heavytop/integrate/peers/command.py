@@ -90,7 +90,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     folder: str = ""
 
     @property
-    def knob(self) -> str:
+    def control(self) -> str:
         """What it is set by: "step", "tolerance", or "" for neither."""
         return "" if self.setting == "none" else self.setting
 
@@ -157,31 +157,35 @@ class CommandIntegrator:
         return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
 
     def _setting(self, given: dict[str, Fraction], precision: Precision) -> Fraction | None:
-        knob = self.command.knob
+        control = self.command.control
         for name in given:
-            if name != knob:
-                raise InputError(f"The integrator {self.command.name} has no {name}.", f"It is set by: {knob or '-'}.")
-        if not knob:
+            if name != control:
+                raise InputError(
+                    f"The integrator {self.command.name} has no {name}.", f"It is set by: {control or '-'}."
+                )
+        if not control:
             return None
-        value = given.get(knob)
+        value = given.get(control)
         if value is None:
             return self.default(precision)
-        if value <= 0 or (knob == "tolerance" and value > 1):
-            limits = "above 0" if knob == "step" else "above 0, up to 1"
-            raise InputError(f"{self.command.name} cannot use the {knob} {decimal_text(value, 6)}.", f"Give {limits}.")
+        if value <= 0 or (control == "tolerance" and value > 1):
+            limits = "above 0" if control == "step" else "above 0, up to 1"
+            raise InputError(
+                f"{self.command.name} cannot use the {control} {decimal_text(value, 6)}.", f"Give {limits}."
+            )
         return exact(number(value, precision))
 
     def default(self, precision: Precision) -> Fraction | None:
         """The setting where none is asked for: the step 1/100 as a number of the format, or the eps of the format."""
-        if self.command.knob == "step":
+        if self.command.control == "step":
             return exact(number(DEFAULT_STEP, precision))
-        return precision.eps if self.command.knob else None
+        return precision.eps if self.command.control else None
 
     def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
-        flags = {command.knob: number_text(request.setting, problem.precision)} if request.setting else {}
+        flags = {command.control: number_text(request.setting, problem.precision)} if request.setting else {}
         steps = reply.counts.get("steps")
-        if steps is None and command.knob == "step" and not reply.failure:
+        if steps is None and command.control == "step" and not reply.failure:
             assert request.setting is not None
             steps = sum(ceil(abs(b - a) / request.setting) for a, b in pairwise([Fraction(0), *request.times]))
         if steps is None:
@@ -319,7 +323,7 @@ class Reply:
         del words[::width]
         try:
             numbers = _as_doubles(b"[" + b",".join(words) + b"]")
-        except msgspec.DecodeError:  # 1. or +1, which JSON has not; or a number that is none
+        except msgspec.DecodeError:  # 1. or +1, which JSON does not know; or NaN
             return 0
         values = numpy.array(numbers).reshape(count, width - 1)
         if values[:, 0].tolist() != self._doubles[place : place + count] or not numpy.isfinite(values).all():
@@ -382,7 +386,7 @@ class Reply:
             comma = ": write a decimal point, not a comma" if "," in word else ""
             if not comma and "outside the exponent range" in error.cause:
                 comma = f": outside the range of {self.precision.name}"
-            raise PeerFailed(f"{self.name} wrote {said(repr(word))}, which is no number{comma}") from None
+            raise PeerFailed(f"{self.name} wrote {said(repr(word))}, which is not a number{comma}") from None
 
     def _take_counts(self, words: list[str]) -> None:
         if len(words) % 2:

@@ -1,4 +1,4 @@
-"""What is asked of an integrator of others, and the one place that checks it.
+"""What is asked of a third-party integrator, and the one place that checks it.
 
 Whatever the code of others does, short of ending the process, comes out as a Trajectory that keeps the contract or as
 PeerFailed, which says in a sentence what it did.

@@ -69,7 +69,7 @@ def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
 
 
 def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
-    """a over a whole number whose inverse is given in two words.
+    """a over an integer whose inverse is given in two words.
 
     A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
     the quotient of the exact remainder is not.
@@ -90,6 +90,26 @@ def covered(code: Code, time: Pair, target: Pair) -> Any:
     b = code.builder
     level = b.and_(b.fcmp_ordered("==", time[0], target[0]), b.fcmp_ordered(">=", time[1], target[1]))
     return b.or_(b.fcmp_ordered(">", time[0], target[0]), level)
+
+
+def behind(code: Code, time: Pair, began: Pair, sign: Any) -> tuple[Pair, Any]:
+    """± (time − began), doubles in order, and a bit: whether it surely is what :func:`split` makes of the exact one.
+
+    The exact difference is s + l + e, where s is the nearest double to s + l, with more to spare than |e| or e = 0.
+    """
+    b = code.builder
+    first, error = code.two_sum(time[0], b.fneg(began[0]))
+    second, rest = code.two_sum(time[1], b.fneg(began[1]))
+    total, low = code.two_sum(first, second)
+    low, one = code.two_sum(low, error)
+    low, other = code.two_sum(low, rest)
+    high, low = code.two_sum(total, low)
+    one_is, other_is = (b.fcmp_ordered("==", word, ir.Constant(DOUBLE, 0.0)) for word in (one, other))
+    low, _ = code.two_sum(low, code.add(one, other))
+    wider = code.multiply(low, ir.Constant(DOUBLE, 1 + 2.0**-40))
+    nearest = b.fcmp_ordered("==", code.add(high, wider), high)
+    sure = b.or_(b.and_(one_is, other_is), b.and_(b.or_(one_is, other_is), nearest))
+    return (code.multiply(high, sign), code.multiply(low, sign)), sure
 
 
 def polynomial(code: Code, order: Any, at: Pair, count: int, row: Callable[[Any], list[Pair]]) -> list[Any]:

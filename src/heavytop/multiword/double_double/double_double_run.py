@@ -57,7 +57,7 @@ PLACES = (*range(6), *range(19, 22))
 
 
 @dataclass(frozen=True, slots=True)
-class Ladder:
+class OrderSchedule:
     """How far the series goes, how long a step is, and what is kept in double-double.
 
     order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
@@ -72,7 +72,7 @@ class Ladder:
 
     @classmethod
     @lru_cache(maxsize=256)
-    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
+    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> OrderSchedule:
         """For a local error of ``tolerance`` relative to the state.
 
         fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
@@ -115,7 +115,7 @@ class Floating(Run):
     def __init__(
         self,
         problem: Scaled,
-        ladder: Ladder,
+        schedule: OrderSchedule,
         forwards: bool,
         low_order: int | None = None,
         processor: Processor | None = None,
@@ -126,16 +126,16 @@ class Floating(Run):
         self.words = _state_words(problem.state, self.layout)
         self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
         self.clock[dd.SIGN] = 1.0 if forwards else -1.0
-        self.clock[dd.ROOM] = ladder.room
-        self.clock[dd.REACH] = ladder.reach
-        most = ladder.order - 1
-        self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
+        self.clock[dd.ROOM] = schedule.room
+        self.clock[dd.REACH] = schedule.reach
+        most = schedule.order - 1
+        self.counts[[dd.ORDER, dd.LOW_ORDER]] = schedule.order, low_order or most
         self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
-        self.clock[dd.DEPTH] = ladder.depth
-        self.table = _table(problem, ladder.order, self.layout)
-        self.scratch = doubles((ladder.order + 5) * self.layout.row)
-        self.at, self.found = doubles(1), doubles(16 * self.layout.vectors)
-        self.sampling = [pointer(array) for array in (self.scratch, self.at, self.found)]
+        self.clock[dd.DEPTH] = schedule.depth
+        self.table = _table(problem, schedule.order, self.layout)
+        self.scratch = doubles((schedule.order + 5) * self.layout.row)
+        self.found = doubles(16 * self.layout.vectors)
+        self.sampling = [pointer(array) for array in (self.scratch, self.found)]
 
     @property
     def order(self) -> int:
@@ -165,46 +165,32 @@ class Floating(Run):
     def words_at(self, time: Fraction) -> Doubles:
         """The words of the state at ``time``, inside the last step."""
         behind = time - self._time(dd.BEGAN)
-        self.at[0], low = split(behind if self.forwards else -behind)
-        series, at, found = self.sampling
-        self.machine.functions["samples"](series, self.order, at, 0, 1, 0.0, -low, 1.0, found)
+        series, found = self.sampling
+        self.machine.functions["sample"](series, self.order, *split(behind if self.forwards else -behind), found)
         return self.found.copy()
 
     def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
         """A state out of its words."""
         return _exact_state(words, len(self.problem.state))
 
-    def sampled(self, times: Doubles) -> tuple[Status, Doubles]:
-        """Steps until the last of the times |τ| > 0, which are doubles in order; the words of the states that were
-        reached, a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
+    def sampled(self, highs: Doubles, lows: Doubles) -> tuple[Status, Doubles]:
+        """Steps until the last of the times |τ| > 0, in order, in two words; the words of the states that were reached,
+        a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
         """
-        row, done, status = 16 * self.layout.vectors, 0, Status.FINE
-        found, given = doubles(row * len(times)), times.astype(float)
-        arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
-        advance, samples, sign = *(self.machine.functions[name] for name in ("advance", "samples")), self.clock[dd.SIGN]
-        ends = pointer(given), pointer(found)
-        while done < len(times):
-            covered = self._covered(given)
-            if covered > done:
-                began, low = self.clock[dd.BEGAN], self.clock[dd.BEGAN_LOW]
-                if given[covered - 1] <= 2 * began or not began:  # then the difference is exact (Sterbenz)
-                    samples(arrays[-1], self.order, ends[0], done, covered, began, low, sign, ends[1])
-                else:
-                    for place in range(done, covered):
-                        found[row * place : row * (place + 1)] = self.words_at(Fraction(float(given[place])))
-                done = covered
-                continue
-            self.clock[dd.TARGET], self.clock[dd.TARGET_LOW] = given[done], 0.0
-            self.steps += advance(*arrays, _STEPS_AT_ONCE)
+        row, count, status = 16 * self.layout.vectors, len(highs), Status.FINE
+        found, progress = doubles(row * count), numpy.zeros(2, numpy.int64)
+        own = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        arrays, result = [*own, pointer(highs), pointer(lows), pointer(progress)], pointer(found)
+        while progress[0] < count and status is Status.FINE:
+            done, taken = progress
+            self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, result)
             status = Status(int(self.counts[dd.STATUS]))
-            if status is not Status.FINE:
-                break
-        return status, found[: row * done].reshape(done, row)
-
-    def _covered(self, times: Doubles) -> int:
-        """How many of the times do not lie beyond the last step."""
-        high, low = self.clock[dd.TIME], self.clock[dd.TIME + 1]
-        return int(times.searchsorted(high, "right" if low >= 0 else "left")) if self.steps else 0
+            if status is Status.FINE and tuple(progress) == (done, taken):  # a time that takes exact numbers
+                time = Fraction(highs[done]) + Fraction(lows[done])
+                found[row * done : row * (done + 1)] = self.words_at(time)
+                progress[0] += 1
+        self.steps += int(progress[1])
+        return status, found[: row * progress[0]].reshape(-1, row)
 
     def derivatives(self, n: int) -> tuple[Fraction, ...]:
         """y_n of the last step, exactly as it was computed; a step back in time has a negative length."""

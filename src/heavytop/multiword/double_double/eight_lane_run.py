@@ -50,8 +50,8 @@ from heavytop.multiword.double_double.double_double_run import (
     LOW,
     ROW,
     SCRATCH,
-    Ladder,
     LaneOrders,
+    OrderSchedule,
     terms,
 )
 from heavytop.multiword.double_double.steps import (
@@ -288,25 +288,27 @@ class Eight:
     low_order: n0, the same for all, 2 at least; a motion that needs a larger one stops.
     """
 
-    def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
+    def __init__(
+        self, system: System, schedule: OrderSchedule, low_order: int, processor: Processor | None = None
+    ) -> None:
         self.functions = machine(system, processor).functions
-        self.ladder, self.low_order = ladder, max(LEAST_LOW_ORDER, min(low_order, ladder.order - 1))
-        self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
+        self.schedule, self.low_order = schedule, max(LEAST_LOW_ORDER, min(low_order, schedule.order - 1))
+        self.pair_order = min(self.low_order, schedule.pair_order(self.low_order))
         self.terms = terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(CLOCK * LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
         self.constants = doubles(24 * (3 + len(self.terms)))
-        self.quotients = doubles(2 * ladder.order)
-        self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
+        self.quotients = doubles(2 * schedule.order)
+        self.quotients[:] = [word for n in range(1, schedule.order + 1) for word in split(Fraction(1, n))]
         self.scratch = doubles(SCRATCH)
         self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
         self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
         self.behind, self.sampled = doubles(2 * LANES), doubles(12 * LANES)
         self.sampling = [pointer(array) for array in (self.behind, self.sampled)]
         self.signs = [1] * LANES
-        self._set(ROOM, [ladder.room] * LANES)
-        self._set(REACH, [ladder.reach] * LANES)
-        self._set(DEPTH, [ladder.depth] * LANES)
+        self._set(ROOM, [schedule.room] * LANES)
+        self._set(REACH, [schedule.reach] * LANES)
+        self._set(DEPTH, [schedule.depth] * LANES)
 
     def _set(self, vector: int, values: Any) -> None:
         self.clock[LANES * vector : LANES * (vector + 1)] = values
@@ -349,7 +351,7 @@ class Eight:
         low = ((targets - (total - part)) - (first + part)) - second
         behind[:LANES] = total + low
         behind[LANES:] = low - (behind[:LANES] - total)
-        self.functions["sample"](self.tables[2], self.ladder.order, *self.sampling)
+        self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
         return found.reshape(12, LANES).copy()
 
     def left_all(self) -> Doubles:
@@ -378,7 +380,7 @@ class Eight:
 
     def advance(self, rounds: int) -> int:
         """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
-        orders = self.ladder.order, self.low_order, self.pair_order
+        orders = self.schedule.order, self.low_order, self.pair_order
         taken: int = self.functions["advance"](*self.moving, *orders, *self.tables, rounds)
         return taken
 
@@ -413,7 +415,7 @@ class Eight:
         behind, found = doubles(2 * LANES), doubles(12 * LANES)
         for lane, time in times.items():
             behind[lane], behind[LANES + lane] = self._behind(lane, time)
-        self.functions["sample"](self.tables[2], self.ladder.order, pointer(behind), pointer(found))
+        self.functions["sample"](self.tables[2], self.schedule.order, pointer(behind), pointer(found))
         return {lane: found[lane::LANES] for lane in times}
 
     def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
@@ -433,8 +435,8 @@ def exact_state(words: Doubles) -> tuple[Fraction, ...]:
 class OneOfEight(Steps):
     """One step of a motion that is in all eight lanes, for the check of their machine code."""
 
-    def __init__(self, problem: Scaled, ladder: Ladder, low_order: int) -> None:
-        self.eight = Eight(problem.system, ladder, low_order)
+    def __init__(self, problem: Scaled, schedule: OrderSchedule, low_order: int) -> None:
+        self.eight = Eight(problem.system, schedule, low_order)
         self.steps, self.forwards = 0, True
         for lane in range(LANES):
             self.eight.put(lane, problem, True, 1)
@@ -442,7 +444,7 @@ class OneOfEight(Steps):
 
     @property
     def order(self) -> int:
-        return self.eight.ladder.order
+        return self.eight.schedule.order
 
     @property
     def time(self) -> Fraction:

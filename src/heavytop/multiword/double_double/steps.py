@@ -40,6 +40,7 @@ from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Layout, Recurrenc
 from heavytop.multiword.double_double.arithmetic import (
     Constant,
     add,
+    behind,
     covered,
     later,
     log2,
@@ -134,7 +135,7 @@ def parts(code: Code, y: Pair, big: Any) -> Pair:
 
 
 def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]], divisor: Pair) -> Pair:
-    """The sum of a pair and of products of a constant and a pair, over a whole number; in order.
+    """The sum of a pair and of products of a constant and a pair, over an integer; in order.
 
     divisor: the number and its inverse.
     """
@@ -344,51 +345,99 @@ _TOLERATED = 1.0
 
 
 def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
-    """``advance`` and ``samples`` for this system.
+    """``advance``, ``sample`` and ``follow`` for this system.
 
     advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
     their number.  The scratch holds the coefficients of the last one.
-    samples(scratch, order, times, first, last, began, low, sign, result): the polynomial of the last step at the times
-    from first to before last, a row of the result each.  The step began at began + low; times − began are doubles.
+    sample(scratch, order, high, low, result): the polynomial of the last step at a time behind its beginning.
+    follow(state, clock, counts, table, scratch, highs, lows, progress, times, steps, result): steps and a row of the
+    result for each time that they cover, until all are or so many steps are taken.  The times |τ| > 0 in two words.
+    progress: times and steps done; it ends, too, at a time whose distance from the beginning of its step takes exact
+    numbers.
     """
     module = ir.Module("double_double")
     layout = Layout(2 if attitude else 1, len(turned(system)))
-    _Step(module, layout, system).write()
-    _write_samples(module, layout, system)
+    advance = _Step(module, layout, system)
+    advance.write()
+    _write_sample(module, layout, system)
+    _Follow(module, layout, system, advance.made).write()
     integer, double = ctypes.c_int64, ctypes.c_double
     machine = compiled(
         module,
         {
             "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
-            "samples": (None, [DOUBLES, integer, DOUBLES, integer, integer, double, double, double, DOUBLES]),
+            "sample": (None, [DOUBLES, integer, double, double, DOUBLES]),
+            "follow": (None, [*[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 4, INTEGERS, integer, integer, DOUBLES]),
         },
         processor,
     )
     return machine, layout
 
 
-def _write_samples(module: ir.Module, layout: Layout, system: System) -> None:
-    arguments = [POINTER, INT, POINTER, INT, INT, DOUBLE, DOUBLE, DOUBLE, POINTER]
-    made, code = function(module, "samples", ir.VoidType(), arguments)
-    scratch, order, times, first, last, began, low, sign, result = made.args
-    b = code.builder
-    rows = Recurrence(code, layout, system, None, scratch)
+def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
+    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, DOUBLE, DOUBLE, POINTER])
+    scratch, order, high, low, result = made.args
+    _put_sample(Recurrence(code, layout, system, None, scratch), layout, order, (high, low), result)
+    code.builder.ret_void()
+
+
+def _put_sample(rows: Recurrence, layout: Layout, order: Any, time: Pair, result: Any) -> None:
+    """The polynomial of the last step, at a time behind its beginning."""
 
     def row(n: Any) -> list[Pair]:
-        at = rows.row(n)
-        return [rows.pair(at, layout.value(v)) for v in rows.vectors]
+        place = rows.row(n)
+        return [rows.pair(place, layout.value(v)) for v in rows.vectors]
 
-    def one(place: Any, _: list[Any]) -> None:
-        behind = b.fsub(b.load(code.address(times, place)), began)
-        pair = code.two_sum(behind, b.fneg(low))
-        at = [code.spread(b.fmul(word, sign)) for word in pair]
-        words = polynomial(code, order, (at[0], at[1]), layout.vectors, row)
-        begin = b.mul(place, code.integer(16 * layout.vectors))
-        for index, word in enumerate(words):
-            code.store(word, result, b.add(begin, code.integer(8 * index)))
+    at = rows.code.spread(time[0]), rows.code.spread(time[1])
+    for index, word in enumerate(polynomial(rows.code, order, at, layout.vectors, row)):
+        rows.code.store(word, result, 8 * index)
 
-    code.loop(first, last, one, [])
-    b.ret_void()
+
+class _Follow:
+    """Writes ``follow``."""
+
+    def __init__(self, module: ir.Module, layout: Layout, system: System, advance: Any) -> None:
+        kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
+        made, self.code = function(module, "follow", ir.VoidType(), kinds)
+        self.arrays, (highs, lows, self.progress, self.count, self.most, self.result) = made.args[:5], made.args[5:]
+        self.times, self.advance, self.layout = (highs, lows), advance, layout
+        self.rows = Recurrence(self.code, layout, system, None, self.arrays[-1])
+
+    def write(self) -> None:
+        """The loop over times and steps."""
+        code, b = self.code, self.code.builder
+        head, inside, step, sample, put, out = map(b.append_basic_block, ("head", "in", "step", "at", "put", "out"))
+        b.branch(head)
+        b.position_at_end(head)
+        done, taken = (self._word(self.progress, place) for place in range(2))
+        running = b.icmp_signed("==", self._word(self.arrays[2], STATUS), code.integer(0))
+        left = b.and_(b.icmp_signed("<", done, self.count), b.icmp_signed("<", taken, self.most))
+        b.cbranch(b.and_(running, left), inside, out)
+        b.position_at_end(inside)
+        target = self._word(self.times[0], done), self._word(self.times[1], done)
+        b.cbranch(covered(code, (self._clock(TIME), self._clock(TIME_LOW)), target), sample, step)
+        b.position_at_end(step)
+        for word, place in zip(target, (TARGET, TARGET_LOW), strict=True):
+            b.store(word, code.address(self.arrays[1], place))
+        more = b.call(self.advance, [*self.arrays, b.sub(self.most, taken)])
+        b.store(b.add(taken, more), code.address(self.progress, 1))
+        b.branch(head)
+        b.position_at_end(sample)
+        at, sure = behind(code, target, (self._clock(BEGAN), self._clock(BEGAN_LOW)), self._clock(SIGN))
+        b.cbranch(sure, put, out)
+        b.position_at_end(put)
+        result = code.address(self.result, b.mul(done, code.integer(16 * self.layout.vectors)))
+        _put_sample(self.rows, self.layout, self._word(self.arrays[2], ORDER), at, result)
+        b.store(b.add(done, code.integer(1)), code.address(self.progress, 0))
+        b.branch(head)
+        b.position_at_end(out)
+        b.ret_void()
+
+    def _clock(self, place: int) -> Any:
+        return self._word(self.arrays[1], place)
+
+    def _word(self, array: Any, place: Any) -> Any:
+        return self.code.builder.load(self.code.address(array, place))
 
 
 class _Step(Stepping):
@@ -396,8 +445,8 @@ class _Step(Stepping):
 
     def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         arguments = [POINTER, POINTER, INT_POINTER, POINTER, POINTER, INT]
-        made, code = function(module, "advance", INT, arguments)
-        self.state, clock, counts, table, scratch, most = made.args
+        self.made, code = function(module, "advance", INT, arguments)
+        self.state, clock, counts, table, scratch, most = self.made.args
         super().__init__(code, clock, counts, most, STATUS)
         self.layout = layout
         self.series = Recurrence(self.code, layout, system, table, scratch)

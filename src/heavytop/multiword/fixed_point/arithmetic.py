@@ -268,6 +268,11 @@ def digits(value: Fraction, grid: Grid) -> list[float]:
     top, bottom = value.as_integer_ratio()
     whole, rest = divmod(top << grid.total, bottom)
     whole += 2 * rest > bottom or (2 * rest == bottom and whole & 1)  # to nearest, a tie to even
+    return words_of(whole, grid)
+
+
+def words_of(whole: int, grid: Grid) -> list[float]:
+    """So many of the last unit, as words."""
     found = []
     for k in range(grid.words):
         shift = grid.bits * (grid.words - 1 - k)

@@ -71,8 +71,8 @@ _ROOM = 1 - 2.0**-20
 class Total(Sequence[int]):
     """Σ b_n of each component, whole ulps: kept as words, from which the next step begins."""
 
-    def __init__(self, words: Doubles, carrier: Carrier) -> None:
-        self.words, self._carrier = words, carrier
+    def __init__(self, words: Doubles, certified: CertifiedSeries) -> None:
+        self.words, self._carrier = words, certified
 
     @cached_property
     def _values(self) -> list[int]:
@@ -88,13 +88,13 @@ class Total(Sequence[int]):
 
 @dataclass(frozen=True)
 class Series:
-    """b_0, …, b_N of six or nine components, in words: those of ``carrier`` from ``centre`` with h = 2^-halvings.
+    """b_0, …, b_N of six or nine components, in words: those of ``certified`` from ``centre`` with h = 2^-halvings.
 
     total: Σ b_n.  rounding: Σ_(n < N) of (2) in ulps, which bounds the integral of the defect of all orders below N.
     sizes: upper bounds of |b_n|, shape (N + 1,).  nearest: b_n within 2^-50 of ``sizes``, shape (N + 1, components).
     """
 
-    carrier: Carrier
+    certified: CertifiedSeries
     centre: Sequence[int]
     halvings: int
     total: Total
@@ -115,7 +115,7 @@ class Series:
     @cached_property
     def values(self) -> list[list[int]]:
         """The coefficients of each component, whole ulps: computed once more, for few steps are asked for them."""
-        return self.carrier.coefficients(self.centre, self.halvings)
+        return self.certified.coefficients(self.centre, self.halvings)
 
     def scaled(self, rate: int) -> Doubles:
         """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
@@ -126,7 +126,7 @@ class Series:
         return self.nearest[: orders + 1]
 
 
-class Carrier:
+class CertifiedSeries:
     """Taylor coefficients of one motion on one grid; any thread may ask.
 
     problem: so that |ω| ≤ 4 (:meth:`heavytop.multiword.problem.Scaled.of` with ``bounded``).
@@ -152,7 +152,7 @@ class Carrier:
         self.places = first[:, None] + 8 * numpy.arange(grid.words)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (Carrier, self._own)
+        return (CertifiedSeries, self._own)
 
     def series(self, centre: Sequence[int], halvings: int) -> Series | None:
         """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
@@ -245,12 +245,12 @@ class Carrier:
 class _Scratch:
     """What one thread computes with."""
 
-    def __init__(self, carrier: Carrier) -> None:
-        words, vectors = carrier.grid.words, carrier.vectors
-        size, orders = 8 * words * vectors, most_orders(carrier.grid) + 2
-        room = size_of(carrier.grid, vectors)
+    def __init__(self, certified: CertifiedSeries) -> None:
+        words, vectors = certified.grid.words, certified.vectors
+        size, orders = 8 * words * vectors, most_orders(certified.grid) + 2
+        room = size_of(certified.grid, vectors)
         self.state, self.result, self.rows = doubles(size), doubles(size), doubles(room.rows)
-        kept = [self.state, carrier.constants, carrier.inverses, self.rows]
+        kept = [self.state, certified.constants, certified.inverses, self.rows]
         places = numpy.zeros(room.places, numpy.int64)
         self._kept: list[Doubles | Integers] = [*kept, doubles(room.sums), places, doubles(8)]
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
@@ -289,7 +289,7 @@ def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
 
 
 def _words(value: int, grid: Grid) -> list[float]:
-    """A whole number of ulps as words, exactly."""
+    """An integral number of ulps as words, exactly."""
     found = []
     for k in range(grid.words - 1):
         shift = grid.bits * (grid.words - 1 - k)

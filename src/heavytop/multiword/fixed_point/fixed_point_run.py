@@ -11,7 +11,7 @@ import numpy
 from heavytop.multiword.codegen.machine_code import Doubles, Processor, doubles, once, pointer
 from heavytop.multiword.codegen.recurrence import series_rates
 from heavytop.multiword.fixed_point import steps
-from heavytop.multiword.fixed_point.arithmetic import Grid, digits, exact
+from heavytop.multiword.fixed_point.arithmetic import Grid, digits, exact, words_of
 from heavytop.multiword.fixed_point.steps import most_of, most_orders, rows_of, sample_row, size_of
 from heavytop.multiword.problem import Run, Scaled, Status
 
@@ -19,6 +19,9 @@ _FIRST_HALVINGS = 3
 _FEWEST_HALVINGS = -4
 _MOST_HALVINGS = 40
 _HALVED_SAMPLES = 4
+_FINEST_TIME = _MOST_HALVINGS + 1
+"""Bits behind the point of the time at which a step ends, at most."""
+_STEPS_AT_ONCE = 64
 _LARGEST_TIME = Fraction(2) ** 1000
 TINY_BITS = 20
 """A component that lies more bits below 1 asks for as many more; less is made up for by the spare ones of a format."""
@@ -108,6 +111,8 @@ class Fixed(Run):
         self.counts[steps.EXCESS] = self.excess
         self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
         self.constants = constants(problem, grid, self.excess)
+        arrays = [self.words, *self._scratch(self.constants, self.rows), self.result, self.clock, self.counts]
+        self.arrays = [pointer(array) for array in arrays]
 
     @property
     def _places(self) -> list[int]:
@@ -136,9 +141,11 @@ class Fixed(Run):
         return tuple(exact(words[place : place + 8 * self.grid.words : 8]) for place in self._places)
 
     def advance(self, target: Fraction, steps_at_most: int) -> Status:
-        self.clock[steps.TARGET] = _not_before(min(target, _LARGEST_TIME))
-        arrays = [self.words, *self._scratch(self.constants, self.rows), self.result, self.clock, self.counts]
-        taken = self.machine.functions["advance"](*[pointer(array) for array in arrays], steps_at_most)
+        return self._advance(_not_before(min(target, _LARGEST_TIME)), steps_at_most)
+
+    def _advance(self, target: float, steps_at_most: int) -> Status:
+        self.clock[steps.TARGET] = target
+        taken = self.machine.functions["advance"](*self.arrays, steps_at_most)
         self.steps += taken
         return Status(int(self.counts[steps.STATUS]))
 
@@ -162,6 +169,66 @@ class Fixed(Run):
     def _samples(self, at: Doubles, found: Doubles, first: int, last: int) -> None:
         order = int(self.counts[steps.ORDERS])
         self.machine.functions["samples"](pointer(self.rows), order, pointer(at), first, last, pointer(found))
+
+    def sampled(self, times: Sequence[Fraction]) -> tuple[Status, Doubles, dict[int, tuple[Fraction, ...] | None]]:
+        """Steps until the last of the times |τ| > 0, in order: the bits of :meth:`advance` and :meth:`sample`.
+
+        The states that were reached, in K + 1 words, shape (samples, K + 1, 6 or 9); and by their places those states
+        that these words cannot hold, None where nothing can.
+        """
+        ceilings, done, status = numpy.array([_not_before(time) for time in times]), 0, Status.FINE
+        bits = max(_FINEST_TIME, *(time.denominator.bit_length() for time in times))
+        wholes = [time.numerator << bits - time.denominator.bit_length() + 1 for time in times]
+        found = doubles(sample_row(self.grid, self.vectors) * len(times)).reshape(len(times), -1)
+        others = dict[int, tuple[Fraction, ...] | None]()
+        while done < len(times) and status is Status.FINE:
+            covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
+            if covered <= done:
+                status = self._advance(ceilings[done], _STEPS_AT_ONCE)
+                continue
+            rows = found[done:covered]
+            self._put_rows(wholes[done:covered], bits, rows)
+            if not rows[:, -8:].max() <= most_of(self.grid):
+                for row in range(done, covered):
+                    if not found[row, -8:].max() <= most_of(self.grid):
+                        others[row] = self.exact_state(found[row], times[row])
+            done = covered
+        return status, self._components(found[:done]), others
+
+    def _put_rows(self, wholes: Sequence[int], bits: int, rows: Doubles) -> None:
+        """Rows of samples at times in units of 2^-bits, inside the last step."""
+        began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
+        shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
+        x = [(whole - began) << shift if shift >= 0 else _nearest(whole - began, -shift) for whole in wholes]
+        at = doubles(self.grid.words * len(wholes))
+        at[:] = [word for value in x for word in words_of(value, self.grid)]
+        self._samples(at, rows, 0, len(wholes))
+
+    def _rows_at(self, wholes: Sequence[int], bits: int) -> Doubles:
+        """Rows of samples at times in units of 2^-bits, inside the last step."""
+        began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
+        room, at = sample_row(self.grid, self.vectors), doubles(self.grid.words * len(wholes))
+        shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
+        x = [(whole - began) << shift if shift >= 0 else _nearest(whole - began, -shift) for whole in wholes]
+        at[:] = [word for value in x for word in words_of(value, self.grid)]
+        found = doubles(room * len(wholes))
+        self._samples(at, found, 0, len(wholes))
+        return found.reshape(-1, room)
+
+    def _components(self, rows: Doubles) -> Doubles:
+        """The words of (Ω, γ, ξ) out of rows of samples; the last is what the one before it had to round."""
+        count = self.grid.words
+        left = rows[:, :-8].reshape(len(rows), self.vectors, count, 8).astype(float)
+        lanes = [[left[:, v, :, lane] for lane in range(6)] for v in range(self.vectors)]
+        found = numpy.zeros((len(rows), count + 1, len(self.problem.state)))
+        for place, value in enumerate(state_of_left(lanes)):
+            found[:, :count, place] = value
+        for v in range(self.vectors):
+            whole, half = left[:, v, -1, 4:2:-1], left[:, v, -1, 5:6] / 2
+            total = whole - half
+            part = total - whole
+            found[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (whole - (total - part)) - (half + part)
+        return found
 
     def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
         """The state out of a row of samples, at ``time`` in the last step."""
@@ -215,6 +282,12 @@ def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
         middle = left[5] / 2
         found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
     return tuple(found)
+
+
+def _nearest(value: int, shift: int) -> int:
+    """value/2^shift rounded to nearest, a tie to even."""
+    whole, rest = value >> shift, value & (1 << shift) - 1
+    return whole + (2 * rest > 1 << shift or (2 * rest == 1 << shift and whole & 1))
 
 
 def _not_before(target: Fraction) -> float:

@@ -120,7 +120,7 @@ def _side(code: Code, y: list[Any], which: Sum) -> list[Any]:
 
 # Sums of products of series in digits of 24 bits: every product and every sum is exact.
 #
-# Digits are whole numbers, |d| ≤ 2^23 + 4.  A product of two is a whole number of at most 2^46 (1 + 2^-18), and 120 of
+# Digits are integers, |d| ≤ 2^23 + 4.  A product of two is an integer of at most 2^46 (1 + 2^-18), and 120 of
 # them add up to less than 2^53: a double holds their sum, one operation a product, in any order and without a look at
 # exponents.  Products with i + j < q are computed in tiles, some digits of the left by as many of the right with a sum
 # for each i + j, over so many orders that no sum has more than 120 products; it is then split at 2^24, so that what

@@ -132,9 +132,9 @@ class Series:
         y, total = ([b.phi(VECTOR) for _ in first] for _ in range(2))
         floating = range(self.grid.words - 1, len(first), self.grid.words) if not self.grid.whole else ()
         rest = {k: b.phi(VECTOR) for k in floating}
-        carriers = [n, zeros, small, wide, *y, *total, *rest.values()]
+        carried = [n, zeros, small, wide, *y, *total, *rest.values()]
         begin = [code.integer(0)] * 3 + [wide_before, *first, *first, *(code.zero for _ in rest)]
-        for phi, value in zip(carriers, begin, strict=True):
+        for phi, value in zip(carried, begin, strict=True):
             phi.add_incoming(value, entry)
         more = b.icmp_signed("<", n, code.integer(most_orders(self.grid)))
         b.cbranch(b.and_(more, b.icmp_signed("<", small, code.integer(2))), body, out)
@@ -152,7 +152,7 @@ class Series:
             sums[k], error = code.two_sum(total[k], following[k])
             lost.append(code.add(before, error))
         values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
-        for phi, value in zip(carriers, values, strict=True):
+        for phi, value in zip(carried, values, strict=True):
             phi.add_incoming(value, b.block)
         b.branch(head)
         b.position_at_end(out)

@@ -1,4 +1,4 @@
-"""Taylor coefficients of a motion of a quadratic field in whole numbers, each rounded once.
+"""Taylor coefficients of a motion of a quadratic field in integers, each rounded once.
 
 In units of 2^-precision, for steps h = 2^-halvings: b_{n+1} = round(h f_n/(n + 1)), where f_n needs every product
 b_j b_{n−j}.  Inside short blocks these are summed one by one; between blocks they are taken as products of polynomials
@@ -26,7 +26,7 @@ _BLOCK = 64
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One component of a field of degree two, (Σ c y_j y_k + Σ c y_j) / denominator with whole numbers c.
+    """One component of a field of degree two, (Σ c y_j y_k + Σ c y_j) / denominator with integers c.
 
     products: (c, index of the pair (j, k)).  linear: (c, j).
     """
@@ -128,9 +128,9 @@ class _Series:
                 between[n] += int(value)
 
 
-# One motion in whole numbers of any length: what goes on where the words of a double end.
+# One motion in integers of any length: what goes on where the words of a double end.
 #
-# A number of p bits is a whole number of ulps 2^-p; coefficients are made by
+# A number of p bits is an integral multiple of 2^-p, the ulp; coefficients are made by
 # :mod:`heavytop.multiword.integers.integer_series`, and h is a power of two, halved and doubled by the number of orders
 # that a step takes.
 
@@ -197,7 +197,7 @@ def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) 
 
 
 class Whole(Run):
-    """A motion that advances in whole numbers of ``bits`` bits; the problem is scaled so that |ω| ≤ 4."""
+    """A motion that advances in integers of ``bits`` bits; the problem is scaled so that |ω| ≤ 4."""
 
     def __init__(self, problem: Scaled, bits: int, forwards: bool) -> None:
         self.problem, self.bits, self.forwards = problem, bits, forwards

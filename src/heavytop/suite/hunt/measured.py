@@ -38,7 +38,7 @@ from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.vectors import Vector, dot
 
-# A Python integrator of others in a process of its own, which is ended where a motion takes too long.
+# A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
 
 
 SECONDS = 10.0
@@ -47,7 +47,7 @@ _BEGIN = 60.0
 
 
 class Run(NamedTuple):
-    """How a run ended, and its states, one a time, in native numbers; said: why it came to nothing."""
+    """How a run ended, and its states, one a time, in native numbers; said: why it was aborted."""
 
     outcome: str
     states: Sequence[Any]
@@ -456,7 +456,7 @@ class Meter:
         self._apart = Apart(integrator, SECONDS) if python else None
 
     def close(self) -> None:
-        """End the process of an integrator of others."""
+        """End the process of a third-party integrator."""
         if self._apart is not None:
             self._apart.end()
 
@@ -544,7 +544,7 @@ class Meter:
         ]
 
     def _error(self, run: Run, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
-        """The largest over the samples; infinite where the run did not reach the last, or is no number."""
+        """The largest over the samples; infinite where the run did not reach the last, or is not a number."""
         if _failed(run):
             return math.inf
         try:

@@ -261,7 +261,7 @@ def proof(meter: Meter, found: Measured, other: ChosenIntegrator) -> Proof:
 
 @whole_evaluation
 def _distance(problem: Problem, known: Truth, meter: Meter, run: Run) -> float:
-    """max(|δΩ|/rate, |δγ|) over the samples, at least; infinite of a run that came to nothing."""
+    """max(|δΩ|/rate, |δγ|) over the samples, at least; infinite of a run that was aborted."""
     if run.outcome != Outcome.SUCCESS.value:
         return math.inf
     bits = problem.precision.bits + GUARD_BITS
@@ -293,7 +293,7 @@ _SHOWN = 3
 _SHARPENED = 6
 _LEAST_LAW = 0.05
 _LOST = 0.01
-"""An error that would be explained up to here says nothing: the format has no digit left."""
+"""An error that would be explained up to here says nothing: the format has lost all significant digits."""
 _SPARE = 0.8
 """Of a budget in seconds; the rest is for shrinking and proving."""
 

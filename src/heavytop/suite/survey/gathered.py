@@ -18,7 +18,7 @@ from heavytop.files import whole
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
-from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, Spread, Worst, by_name
+from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
 from heavytop.suite.case_text import forms
 from heavytop.suite.rows import Task, data_of
 from heavytop.suite.survey.measured import Chunk
@@ -27,7 +27,7 @@ from heavytop.suite.survey.measured import Chunk
 
 
 FILE = "survey.parquet"
-_TEXTS = ("sweep", "integrator", "precision", "horizon", "class", "outcome")
+_TEXTS = ("sweep", "integrator", "tolerance", "precision", "horizon", "class", "outcome")
 _INTEGERS = ("index", "steps")
 _ERRORS = ("digits_right", "error_max", "error_time", "error_omega", "error_gamma", "error_scaled", "reference_radius")
 DRIFT_COLUMNS = ("drift_gamma_squared", "drift_area", "drift_energy", "drift_further")
@@ -266,17 +266,20 @@ def _worst(task: Task, case: Case, bad: _Bad) -> Worst:
     assert data is not None
     right = None if math.isnan(bad.digits) else round(bad.digits, 2)
     error = "" if bad.outcome != Outcome.SUCCESS.value else f"{bad.error:.8g}"
-    return Worst(case.name, bad.index, bad.outcome, error, right, data, _command(task, case, bad))
+    return Worst(
+        case.name, bad.index, bad.outcome, error, right, data, command(task.key, task.times, case, bool(error))
+    )
 
 
-def _command(task: Task, case: Case, bad: _Bad) -> str:
-    """The command that shows it again: the digits that are right, or how the run ends."""
+def command(key: RowKey, times: Sequence[Fraction], case: Case, reached: bool) -> str:
+    """The command that measures one motion again: the digits that are right, or, where it was not ``reached``, how the
+    run ends.
+    """
     line = forms(case)["command"].rpartition(" --times ")[0]
-    times = ",".join(map(time_text, task.times))
-    precision = "" if parse(task.key.precision).name == "double" else f" --precision {task.key.precision}"
-    tolerance = f" --tolerance {task.key.subject.tolerance}" if task.key.subject.tolerance else ""
-    line += f" --times {times}{precision} --integrator {task.key.subject.name}{tolerance}"
-    return line if bad.outcome != Outcome.SUCCESS.value else f"{line} --json | heavytop score -"
+    precision = "" if parse(key.precision).name == "double" else f" --precision {key.precision}"
+    tolerance = f" --tolerance {key.subject.tolerance}" if key.subject.tolerance else ""
+    line += f" --times {','.join(map(time_text, times))}{precision} --integrator {key.subject.name}{tolerance}"
+    return f"{line} --json | heavytop score -" if reached else line
 
 
 def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:

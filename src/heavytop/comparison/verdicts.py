@@ -8,7 +8,16 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
-from heavytop.compare.noise import BITS, STEP_CONTROL, Limits, RoundingBound, Timings, allowed_gain, allowed_loss, apart
+from heavytop.comparison.noise import (
+    BITS,
+    STEP_CONTROL,
+    Limits,
+    RoundingBound,
+    Timings,
+    allowed_gain,
+    allowed_loss,
+    apart,
+)
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
 from heavytop.precision import exact, log10
@@ -75,7 +84,7 @@ def judge(
 
 
 def _no_number(old: Metric, new: Metric, limits: Limits) -> Judged | None:
-    """The verdict where a value is no number in one row or in both; None where both are.
+    """The verdict where a value is not a number in one row or in both; None where both are.
 
     NaN is worse than any number, and never the same, not even as itself.  What was not measured is incomparable.
     """
@@ -326,7 +335,7 @@ def weaker(old: Against, new: Against) -> str:
     if _is_proven(old) and not _is_proven(new):
         return "the reference is no longer proven"
     if _earlier(old.until, new.until):
-        return "the truth ends earlier"
+        return "the reference is valid until an earlier time"
     if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES):
         return "the radius of the reference is larger, or not said"
     if not _kept(_digits(old), _digits(new), lambda before, after: after >= _DIGITS_KEPT * before):
@@ -368,7 +377,7 @@ def _times(reference: Against) -> tuple[float, ...]:
 
 
 def _log(text: str) -> float:
-    """log10 |number|, -inf for 0; nan for what is no number, which is within no bound."""
+    """log10 |number|, -inf for 0; nan for what is not a number, which is within no bound."""
     try:
         size = log10(exact(text))
     except InputError:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from heavytop.compare.rows import Finding
-from heavytop.compare.verdicts import Verdict
-from heavytop.compare.work_precision import ERRORS
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
+from heavytop.comparison.work_precision import ERRORS
 from heavytop.document.document import clip
 from heavytop.document.names import short
 from heavytop.measure.local_error import ORDER
@@ -168,7 +168,7 @@ class Sentence(NamedTuple):
 def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
     """At most eight sentences, the most telling first; what is worse before what is better.
 
-    same: how many metrics are the same, each row that came to nothing in both reports counted as one.
+    same: how many metrics are the same, each row that was aborted in both reports counted as one.
     failed: rows that failed in both reports, in the same way.
     """
     if not changes.rows:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from heavytop.compare.noise import (
+from heavytop.comparison.noise import (
     BITS,
     Limits,
     Lookup,
@@ -23,7 +23,7 @@ from heavytop.compare.noise import (
     reaches_further,
     seldom_apart,
 )
-from heavytop.compare.verdicts import (
+from heavytop.comparison.verdicts import (
     BAND,
     MISSING,
     NAN,
@@ -160,9 +160,10 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)
         if earlier > _LOST_AT + (noise / power if power else 0.0):
-            return Verdict.WORSE, f"no digit is left from t = {new.lost_at} on, not from {old.lost_at or 'any'}"
+            before = old.lost_at or "any"
+            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
     elif old.lost_at is not None:
-        return Verdict.INCOMPARABLE, "the law no longer says when no digit is left"
+        return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
     return None
 
 
@@ -283,6 +284,11 @@ class RowComparison:
     def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
         return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.key.kind, row.case), "").ignore
+
+    def limits(self, row: Row, metric: str) -> Limits:
+        """The limits of a metric of a row."""
+        rules = self.lookup.row(row.key.kind, row.case) if self.policy.rule else ()
+        return self.lookup.metric(rules, metric)
 
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from heavytop.compare.findings import RANK, Change, Changes, sentences
-from heavytop.compare.noise import Policy
-from heavytop.compare.rows import Finding, RowComparison
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.findings import RANK, Change, Changes, sentences
+from heavytop.comparison.motions import METRIC, WorseMotions, worse_motions
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.rows import Finding, RowComparison
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.kind import Kinds
 from heavytop.errors import InputError
 from heavytop.integrate.broken import FAULTS
 from heavytop.precision import exact, log10
-from heavytop.records import Identity, Row
+from heavytop.records import Identity, Row, Spread
 from heavytop.store.store import AnyReport, Brief
 
 __all__ = ["Comparison", "Finding", "compare"]
@@ -28,8 +30,9 @@ class Comparison:
     """All findings, and the differences of the plans and environments.
 
     same: how many metrics are the same, where these are not among the findings.  sentences: what changed, at most
-    eight, the most telling first.  rows: those that changed, the worst first.  changed: all findings but the same, the
-    worst first.
+    eight, the most telling first, and one for each survey with motions that got worse.  rows: those that changed, the
+    worst first.  changed: all findings but the same, the worst first.  motions: of each survey whose records were
+    joined.
     """
 
     findings: list[Finding]
@@ -37,6 +40,7 @@ class Comparison:
     same: int = 0
     sentences: list[str] = field(default_factory=list)
     rows: list[Change] = field(default_factory=list)
+    motions: list[WorseMotions] = field(default_factory=list)
     changed: list[Finding] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -73,19 +77,27 @@ class Comparison:
             "findings": self.sentences,
             "rows": [finding.to_json() for finding in self.findings],
             "environment": [{"name": n, "baseline": a, "candidate": b} for n, a, b in self.environment],
-        }
+        } | ({"surveys": [each.to_json() for each in self.motions]} if self.motions else {})
 
 
 def compare(
-    baseline: AnyReport, candidate: AnyReport, policy: Policy, kinds: Kinds, *, list_same: bool = True
+    baseline: AnyReport,
+    candidate: AnyReport,
+    policy: Policy,
+    kinds: Kinds,
+    *,
+    list_same: bool = True,
+    surveys: tuple[Path, Path] | None = None,
 ) -> Comparison:
     """Every row of either report, in the baseline's order, new ones last.
 
     list_same: False to count what plainly stayed the same in place of listing it.
+    surveys: the files of the records of surveys, which are joined by motion where both are there.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     found: list[list[Finding]] = []
     missing: list[tuple[int, Row]] = []
+    motions: list[WorseMotions | None] = []
     changes = Changes()
     timed = _timed(policy, baseline.environment, candidate.environment)
     repeated = _alike(baseline.environment, candidate.environment)
@@ -96,6 +108,8 @@ def compare(
         match = others.take(row.identity)
         if match is not None:
             found.append(changes.add(row, match, rows.compare(row, match)))
+            if surveys is not None and isinstance(match.spread, Spread) and not rows.ignores(row):
+                motions.append(worse_motions(row, match, surveys, rows.limits(row, METRIC)))
         elif not rows.ignores(row):
             missing.append((len(found), row))
             found.append([Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")])
@@ -111,13 +125,15 @@ def compare(
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
+    joined = [each for each in motions if each is not None]
     return Comparison(
         findings,
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
         rows.same,
-        sentences(changes, same, rows.failed),
+        [*sentences(changes, same, rows.failed), *(each.sentence for each in joined if each.sentence)],
         changes.worst_first,
+        joined,
     )
 
 
@@ -269,7 +285,7 @@ def trial(name: str, comparison: Comparison) -> Trial:
 
 
 def _decades(finding: Finding) -> float:
-    """How far the value moved; infinite where one of the two is no number, or only one of them is 0."""
+    """How far the value moved; infinite where one of the two is not a number, or only one of them is 0."""
     try:
         old, new = (log10(exact(value or "")) for value in (finding.baseline, finding.candidate))
     except InputError:

@@ -20,7 +20,7 @@ ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final"
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One rung that reached the end: log10 of its error, its seconds, its tolerance or step in words.
+    """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
     seconds: of its fastest run.  Other work on the machine only ever adds, and adds more to longer runs: medians on a
     busy machine would flatter whoever is quick.
@@ -35,8 +35,8 @@ class Point:
 class Line:
     """One integrator in one format, from coarse to fine as the plan has it.
 
-    failures: the seconds that rungs took which did not reach the end; they have no error.
-    compile: seconds that compiling took, at most over the rungs; 0 where none is known.
+    failures: the seconds that points took which did not reach the end; they have no error.
+    compile: seconds that compiling took, at most over the points; 0 where none is known.
     """
 
     integrator: str
@@ -53,12 +53,12 @@ class Line:
 
     @property
     def best(self) -> Point | None:
-        """The rung with the smallest error."""
+        """The point with the smallest error."""
         return min(self.points, key=lambda point: point.log10, default=None)
 
     def seconds_at(self, log10: float) -> float | None:
-        """The seconds for an error of 10^log10: the least over rungs as fine, and between rungs on either side of it,
-        where a straight line on logarithmic axes is drawn; None where no rung is as fine.
+        """The seconds for an error of 10^log10: the least over points as fine, and between points on either side of it,
+        where a straight line on logarithmic axes is drawn; None where no point is as fine.
         """
         found = [point.seconds for point in self.points if point.log10 <= log10]
         for one, other in zip(self.points, self.points[1:], strict=False):
@@ -174,8 +174,8 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                     ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
                     cells = {_rung(line, point): _cell(point, ours) for point in line.points}
                     cases[case] = cases.get(case, {}) | cells
-        rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
-        lines_of = [[rung, *(cells.get(rung, "-") for cells in cases.values())] for rung in rungs]
+        points = dict.fromkeys(point for cells in cases.values() for point in cells)
+        lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
         note = f"{name}: largest error in its time (heyoka's time for that error)"
         if lines_of:
             tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
