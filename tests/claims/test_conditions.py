@@ -261,6 +261,12 @@ SPIN = {
 UPRIGHT = SPIN | {"kind": "motion", "motion": {"gamma": ["0", "0", "1"]}}
 
 
+@pytest.fixture
+def unhurried(monkeypatch):
+    """As many seconds for assumptions that would decide as a busy machine takes."""
+    monkeypatch.setattr("heavytop.claims.audit.audit._SEARCH", 600.0)
+
+
 def _verdict(table: dict, assume: list[str]) -> tuple[str, dict[str, str]]:
     report = audit_claim(claim_from_table(table | {"assume": assume}, "claim"))
     return report.verdict, dict(report.deciding)
@@ -290,6 +296,7 @@ def _spinning(value: str) -> dict:
         ("(g*t + h)/(g*t + h)", "g > 0"),
     ],
 )
+@pytest.mark.usefixtures("unhurried")
 def test_a_divisor_that_is_0_all_over_for_some_parameters_is_not_removable(value: str, missing: str) -> None:
     table = _spinning(value)
     verdict, deciding = _verdict(table, [])
@@ -308,6 +315,14 @@ def test_a_divisor_that_no_parameters_make_0_all_over_is_removable(value: str) -
     assert _verdict(_spinning(value), [])[0] == "holds"
 
 
+@pytest.mark.parametrize("domain", ["all", "t<=0", "t>0"])
+def test_a_zero_of_a_divisor_is_removable_on_each_half_of_the_time(domain: str) -> None:
+    for value in ("sin(-g*t)/sin(-g*t)", "(1 - cos(g*t))/(2*sin(g*t/2)^2)"):
+        assert _verdict(_spinning(value) | {"domain": domain}, ["g != 0"])[0] == "holds"
+        assert _verdict(_spinning(value) | {"domain": domain}, [])[0] == "undecided"
+
+
+@pytest.mark.usefixtures("unhurried")
 def test_what_is_assumed_to_be_unequal_is_of_no_sign() -> None:
     table = SPIN | {"parameters": {"g": ["1", "2"]}, "integral": {"value": "Omega1*(sqrt(g^2) - g)"}}
     assert _verdict(table, ["g != 0"]) == ("undecided", {"g > 0": "holds"})

@@ -165,8 +165,12 @@ class Region:
         if all(tower.generators[i].kind == "symbol" for i in used(p)):
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
         if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
-            return False
+            return self._has_parameters(p) and self._is_analytic(p) and self.is_for_no_parameters(p)
         return any(self._is_nonzero_at(p, place) for place in self.places)
+
+    def _has_parameters(self, p: Any) -> bool:
+        inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
+        return bool(inside & self._setting.parameters)
 
     def is_connected(self, indices: set[int], fixed: Collection[sympy.Symbol] = ()) -> bool:
         """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them.
@@ -305,7 +309,7 @@ class Region:
                 all(map(self._is_thin_for_each, self._factors(square)))
                 if square is not None
                 else self.field.tower.signs.of(p).strict
-                or (self.is_for_no_parameters(p) and (self.is_zero_nowhere_dense(p) or self._is_analytic(p)))
+                or (self.is_for_no_parameters(p) and self.is_zero_nowhere_dense(p))
             )
         return self._thin_for_each[key]
 
@@ -334,7 +338,7 @@ class Region:
             points = [{**state, **dict.fromkeys(state.keys() - at_rest.keys(), sympy.S.Zero), **at_rest}, state]
             return for_no_parameters(e.xreplace(dict(flow.names)), self.field.assumptions, points, self._always)
         # bounds of the variable may hold parameters, and no point lies within all of them
-        times = () if domain.facts else (*((0,) if not self.field.assumptions.variable_sign else ()), *domain.points)
+        times = () if domain.facts else (0, *domain.points)
         points = [{self._setting.variable: sympy.Rational(time)} for time in times]
         return for_no_parameters(e, self.field.assumptions, points)
 

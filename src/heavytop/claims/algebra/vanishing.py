@@ -18,6 +18,7 @@ from heavytop.claims.algebra.structure import Defined
 
 _ORDERS = 4
 """Derivatives that are looked at where a formula is no polynomial."""
+_MAY_JUMP = (sympy.Abs, sympy.sign, sympy.DiracDelta, sympy.atan2)
 
 
 def for_no_parameters(
@@ -28,7 +29,8 @@ def for_no_parameters(
 ) -> bool:
     """True only where ``e`` is 0 all over its domain for no values of the parameters that ``assumptions`` admit.
 
-    points: values of all that moves, where ``e`` is analytic.  sphere: |γ|² - 1 for a formula of the state.
+    points: values of all that moves, where ``e`` is analytic, or at an end of such a domain.
+    sphere: |γ|² - 1 for a formula of the state.
     """
     parameters = e.free_symbols & assumptions.parameters
     if not parameters:
@@ -56,7 +58,8 @@ def _taylor(
             derivative = e
             for _ in range(_ORDERS):
                 value = derivative.subs(point, simultaneous=True)
-                if value.has(sympy.zoo, sympy.oo, sympy.nan, sympy.I):
+                # what is finite and made of continuous functions is the limit from within, at an end too
+                if value.has(sympy.zoo, sympy.oo, sympy.nan, sympy.I) or derivative.has(*_MAY_JUMP):
                     break
                 if value != 0:
                     yield value
