@@ -10,7 +10,6 @@ from enum import Enum
 from fractions import Fraction
 from math import isqrt
 from threading import local
-from typing import Any
 
 import numpy
 from llvmlite import ir
@@ -24,6 +23,7 @@ from heavytop.multiword.codegen.machine_code import (
     Code,
     Doubles,
     Machine,
+    Value,
     compiled,
     doubles,
     function,
@@ -248,7 +248,7 @@ def _machine(size: int) -> Machine:
     slopes, powers, orders = made.args
     b, width = code.builder, _width(size)
 
-    def order(n: Any, _: list[Any]) -> None:
+    def order(n: Value, _: list[Value]) -> None:
         after = b.add(n, code.integer(1))
         zeros = [code.zero] * (size * width // LANES)
         sums = code.loop(0, after, lambda m, values: _product(code, size, (slopes, powers), (m, n), values), zeros)
@@ -262,7 +262,9 @@ def _machine(size: int) -> Machine:
     return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
 
 
-def _product(code: Code, size: int, tables: tuple[Any, Any], at: tuple[Any, Any], sums: list[Any]) -> list[Any]:
+def _product(
+    code: Code, size: int, tables: tuple[Value, Value], at: tuple[Value, Value], sums: list[Value]
+) -> list[Value]:
     """``sums`` + J_m V_(n−m)."""
     b, width, (m, n) = code.builder, _width(size), at
     slope = code.address(tables[0], b.mul(m, code.integer(size * size)))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from time import perf_counter
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy
 from llvmlite import binding, ir
@@ -80,7 +80,7 @@ def once(make: Callable[P, T]) -> Callable[P, T]:
 
 
 def compiled(
-    module: ir.Module, signatures: dict[str, tuple[Any, Sequence[Any]]], processor: Processor | None = None
+    module: ir.Module, signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]], processor: Processor | None = None
 ) -> Machine:
     """The functions of ``module`` as machine code.
 
@@ -145,8 +145,10 @@ INT_POINTER = INT.as_pointer()
 _INDEX = ir.IntType(32)
 _INFINITY = float("inf")
 
-Pair = tuple[Any, Any]
-Index = Any
+Value: TypeAlias = ir.Value
+"""A value of the machine code: a double, a vector of eight of them, an integer, a flag or an address."""
+Pair: TypeAlias = tuple[Value, Value]
+Index: TypeAlias = int | Value
 """An int, known when the code is made, or an integer value of the code."""
 
 
@@ -158,114 +160,118 @@ class Code:
         self.module = builder.module
         self.zero = self.constant(0.0)
 
-    def _call(self, name: str, result: Any, arguments: Sequence[Any]) -> Any:
+    def _call(self, name: str, result: ir.Type, arguments: Sequence[Value]) -> Value:
         known = self.module.globals.get(name)
         function = known or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
         return self.builder.call(function, arguments)
 
-    def constant(self, value: float | Sequence[float]) -> Any:
+    def constant(self, value: float | Sequence[float]) -> Value:
         """The same double in every lane, or eight."""
         values = [value] * LANES if isinstance(value, (int, float)) else list(value)
         return ir.Constant(VECTOR, [ir.Constant(DOUBLE, float(v)) for v in values])
 
-    def integer(self, value: Index) -> Any:
+    def integer(self, value: Index) -> Value:
         """An integer value."""
         return ir.Constant(INT, value) if isinstance(value, int) else value
 
-    def add(self, a: Any, b: Any) -> Any:
+    def add(self, a: Value, b: Value) -> Value:
         """a + b."""
         return self.builder.fadd(a, b)
 
-    def subtract(self, a: Any, b: Any) -> Any:
+    def subtract(self, a: Value, b: Value) -> Value:
         """a - b."""
         return self.builder.fsub(a, b)
 
-    def multiply(self, a: Any, b: Any) -> Any:
+    def multiply(self, a: Value, b: Value) -> Value:
         """a b."""
         return self.builder.fmul(a, b)
 
-    def negative(self, a: Any) -> Any:
+    def negative(self, a: Value) -> Value:
         """-a."""
         return self.builder.fneg(a)
 
-    def fma(self, a: Any, b: Any, c: Any) -> Any:
+    def fma(self, a: Value, b: Value, c: Value) -> Value:
         """a b + c, rounded once."""
         name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
         return self._call(name, a.type, (a, b, c))
 
-    def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
+    def multiply_add(self, a: Value, b: Value, c: Value) -> Value:
         """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
         return self._call("llvm.fmuladd.v8f64", VECTOR, (a, b, c))
 
-    def absolute(self, a: Any) -> Any:
+    def absolute(self, a: Value) -> Value:
         """|a|."""
         return self._call("llvm.fabs.v8f64", VECTOR, (a,))
 
-    def larger(self, a: Any, b: Any) -> Any:
+    def larger(self, a: Value, b: Value) -> Value:
         """max(a, b) lane by lane, for numbers that are not NaN."""
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
-    def largest(self, a: Any) -> Any:
+    def largest(self, a: Value) -> Value:
         """The largest |lane|, a double; NaN lanes are passed over."""
         return self._call("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a),))
 
-    def finite(self, a: Any) -> Any:
+    def finite(self, a: Value) -> Value:
         """Whether every lane is a finite number, a bit."""
         below = self.builder.fcmp_ordered("<", self.absolute(a), self.constant(_INFINITY))
         return self.all_of(below)
 
-    def all_of(self, bits: Any) -> Any:
+    def all_of(self, bits: Value) -> Value:
         """Whether eight bits are set, a bit."""
         mask = self.builder.bitcast(bits, ir.IntType(LANES))
         return self.builder.icmp_unsigned("==", mask, ir.Constant(ir.IntType(LANES), (1 << LANES) - 1))
 
-    def any_bit(self, a: Any) -> Any:
+    def any_bit(self, a: Value) -> Value:
         """The bits that are set in any lane of eight integers, an integer."""
         return self._call("llvm.vector.reduce.or.v8i64", INT, (a,))
 
-    def shuffle(self, a: Any, b: Any, lanes: Sequence[int]) -> Any:
+    def shuffle(self, a: Value, b: Value, lanes: Sequence[int]) -> Value:
         """Lanes 0 to 7 of ``a`` and 8 to 15 of ``b``, in that order."""
         return self.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, LANES), list(lanes)))
 
-    def spread(self, scalar: Any) -> Any:
+    def spread(self, scalar: Value) -> Value:
         """A double in every lane."""
         undefined = ir.Constant(VECTOR, ir.Undefined)
         first = self.builder.insert_element(undefined, scalar, ir.Constant(_INDEX, 0))
         return self.builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES))
 
-    def two_sum(self, a: Any, b: Any) -> Pair:
+    def two_sum(self, a: Value, b: Value) -> Pair:
         """(s, e) with s + e = a + b exactly and s rounded (Knuth); vectors or doubles."""
         total = self.add(a, b)
         part = self.subtract(total, a)
         return total, self.add(self.subtract(a, self.subtract(total, part)), self.subtract(b, part))
 
-    def quick_two_sum(self, a: Any, b: Any) -> Pair:
+    def quick_two_sum(self, a: Value, b: Value) -> Pair:
         """The same where |a| >= |b| or a = 0 (Dekker)."""
         total = self.add(a, b)
         return total, self.subtract(b, self.subtract(total, a))
 
-    def two_product(self, a: Any, b: Any) -> Pair:
+    def two_product(self, a: Value, b: Value) -> Pair:
         """(p, e) with p + e = a b exactly and p rounded."""
         product = self.multiply(a, b)
         return product, self.fma(a, b, self.negative(product))
 
-    def address(self, base: Any, offset: Index) -> Any:
+    def address(self, base: Value, offset: Index) -> Value:
         """Where ``base[offset]`` is."""
         return self.builder.gep(base, [self.integer(offset)])
 
-    def load(self, base: Any, offset: Index) -> Any:
+    def load(self, base: Value, offset: Index) -> Value:
         """The eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
         value = self.builder.load(self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer()))
         value.align = 64
         return value
 
-    def store(self, value: Any, base: Any, offset: Index) -> None:
+    def store(self, value: Value, base: Value, offset: Index) -> None:
         """Put eight doubles to ``base[offset]`` and on, aligned to 64 bytes."""
         self.builder.store(value, self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer())).align = 64
 
     def loop(
-        self, start: Index, stop: Index, body: Callable[[Any, list[Any]], Sequence[Any] | None], values: Sequence[Any]
-    ) -> list[Any]:
+        self,
+        start: Index,
+        stop: Index,
+        body: Callable[[Value, list[Value]], Sequence[Value] | None],
+        values: Sequence[Value],
+    ) -> list[Value]:
         """``values`` after ``values = body(i, values)`` for i from ``start`` to before ``stop``."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
@@ -286,7 +292,7 @@ class Code:
         b.position_at_end(after)
         return carried
 
-    def either(self, condition: Any, one: Callable[[], list[Any]], other: Callable[[], list[Any]]) -> list[Any]:
+    def either(self, condition: Value, one: Callable[[], list[Value]], other: Callable[[], list[Value]]) -> list[Value]:
         """The values of ``one`` where a bit is set, else those of ``other``; the other's code does not run."""
         b = self.builder
         with b.if_else(condition) as (then, otherwise):
@@ -302,7 +308,7 @@ class Code:
         return chosen
 
 
-def function(module: ir.Module, name: str, result: Any, arguments: Sequence[Any]) -> tuple[Any, Code]:
+def function(module: ir.Module, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> tuple[ir.Function, Code]:
     """A new function of ``module`` whose pointers point to different places, and the writer of its body."""
     made = ir.Function(module, ir.FunctionType(result, list(arguments)), name)
     for argument in made.args:
@@ -321,22 +327,22 @@ class Stepping(ABC):
     status: the place among the counts of how the last step ended; 0 if well.
     """
 
-    def __init__(self, code: Code, clock: Any, counts: Any, most: Any, status: int) -> None:
+    def __init__(self, code: Code, clock: Value, counts: Value, most: Value, status: int) -> None:
         self.code, self.clock, self.counts, self.most, self.status = code, clock, counts, most, status
 
     @abstractmethod
-    def covered(self) -> Any:
+    def covered(self) -> Value:
         """Whether the time is the target or behind it, a bit."""
 
     @abstractmethod
-    def write_step(self) -> Any:
+    def write_step(self) -> Value:
         """Write one step; gives the bit that says whether it stands."""
 
-    def time(self, place: int) -> Any:
+    def time(self, place: int) -> Value:
         """A double of the clock."""
         return self.code.builder.load(self.code.address(self.clock, place))
 
-    def count(self, place: int) -> Any:
+    def count(self, place: int) -> Value:
         """One of the counts."""
         return self.code.builder.load(self.code.address(self.counts, place))
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from gmpy2 import mpq
 
-from heavytop.multiword.codegen.machine_code import Code, Index, Pair
+from heavytop.multiword.codegen.machine_code import Code, Index, Pair, Value
 from heavytop.multiword.double_double.arithmetic import Constant, accumulated, add, by_constant, divided
 from heavytop.top.equations import Parameters, System
 
@@ -249,20 +249,20 @@ class Recurrence:
     code: Code
     layout: Layout
     system: System
-    table: Any
-    scratch: Any
+    table: Value
+    scratch: Value
 
     @property
     def vectors(self) -> range:
         """The state vectors."""
         return range(self.layout.vectors)
 
-    def row(self, n: Index) -> Any:
+    def row(self, n: Index) -> Value:
         """Where the row of order n begins."""
         offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.row))
         return self.code.address(self.scratch, offset)
 
-    def pair(self, row: Any, place: int) -> Pair:
+    def pair(self, row: Value, place: int) -> Pair:
         """Both words of what lies there."""
         return self.code.load(row, place), self.code.load(row, place + 8)
 
@@ -272,7 +272,7 @@ class Recurrence:
         second = [self.code.multiply(self.code.shuffle(word, self.code.zero, which.second), signs) for word in y]
         return add(self.code, (first[0], first[1]), (second[0], second[1]))
 
-    def side(self, y: Any, which: Sum) -> Any:
+    def side(self, y: Value, which: Sum) -> Value:
         """L or R of a plain double, or of a part that is exact."""
         first, second = (self.code.shuffle(y, self.code.zero, lanes) for lanes in (which.first, which.second))
         return self.code.fma(second, self.code.constant(which.sign), first)
@@ -287,7 +287,7 @@ class Recurrence:
             for word in range(2):
                 self.code.store(pair[word], row, place + 8 * word)
 
-    def _put_plain(self, n: Index, y: list[Any]) -> list[Any]:
+    def _put_plain(self, n: Index, y: list[Value]) -> list[Value]:
         """Store a row; gives R, each L and each y."""
         row = self.row(n)
         right, left = self.side(y[0], RIGHT), [self.side(value, LEFT) for value in y]
@@ -298,7 +298,7 @@ class Recurrence:
             self.code.store(self.code.zero, row, self.layout.value(vector) + 8)
         return [right, *left, *y]
 
-    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Value]) -> list[Value]:
         """Σ L_m R_other in words (s, c), c unordered."""
         code, left, right = self.code, self.row(m), self.row(other)
         found: list[Any] = []
@@ -307,22 +307,22 @@ class Recurrence:
             found += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
         return found
 
-    def _accumulate(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+    def _accumulate(self, m: Index, other: Index, sums: list[Value]) -> list[Value]:
         left, right = self.row(m), self.row(other)
         high = self.code.load(right, 0)
         return [
             self.code.fma(self.code.load(left, self.layout.left(vector)), high, sums[vector]) for vector in self.vectors
         ]
 
-    def _gather(self, word: Any, part: int) -> Any:
+    def _gather(self, word: Value, part: int) -> Value:
         """One of the four summands of the products, without its signs; 0 where there is none."""
         lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
-    def _signed(self, value: Any, part: int) -> Any:
+    def _signed(self, value: Value, part: int) -> Value:
         return value if min(_signs(part)) >= 0 else self.code.multiply(value, self.code.constant(_signs(part)))
 
-    def _anywhere(self, word: Any, part: int) -> Any:
+    def _anywhere(self, word: Value, part: int) -> Value:
         """One of the four summands, and any number where there is none."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
@@ -331,7 +331,7 @@ class Recurrence:
         place = 24 * ((1 + self.layout.linear) * vector + row)
         return (*self.pair(self.table, place), self.code.load(self.table, place + 16))
 
-    def gathered(self, total: Any) -> Any:
+    def gathered(self, total: Value) -> Value:
         """The sums of products that the field needs, where they are exact."""
         found = self.code.multiply(self._anywhere(total, 0), self.code.constant(_signs(0)))
         for k in range(1, len(GATHERED)):
@@ -344,12 +344,12 @@ class Recurrence:
         found = [self.code.spread(self.code.builder.load(self.code.address(base, k))) for k in range(2)]
         return found[0], found[1]
 
-    def _table_row(self, n: Index) -> Any:
+    def _table_row(self, n: Index) -> Value:
         code = self.code
         offset = code.builder.mul(code.integer(n), code.integer(self.layout.table_row))
         return code.address(self.table, code.builder.add(offset, code.integer(24 * self.layout.constants)))
 
-    def _over(self, n: Index, vector: int, row: int) -> Any:
+    def _over(self, n: Index, vector: int, row: int) -> Value:
         """A constant over n + 1, a double."""
         return self.code.load(self._table_row(n), 8 * (1 + (1 + self.layout.linear) * vector + row))
 
@@ -372,7 +372,7 @@ class Recurrence:
         after, high, low = (code.spread(code.builder.load(code.address(base, k))) for k in range(3))
         return code.quick_two_sum(*divided(code, result, after, (high, low)))
 
-    def _next(self, n: Index, vector: int, total: Any, y: Any) -> Any:
+    def _next(self, n: Index, vector: int, total: Value, y: Value) -> Value:
         code = self.code
         linear = code.zero
         for k, lanes in enumerate(turned(self.system), 1):
@@ -383,11 +383,11 @@ class Recurrence:
         one = code.fma(*second, code.fma(*first, linear))
         return code.add(one, code.fma(*fourth, code.multiply(*third)))
 
-    def orders_in_pairs(self, first: list[Pair], low_order: Any) -> list[Any]:
+    def orders_in_pairs(self, first: list[Pair], low_order: Value) -> list[Value]:
         """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
         code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
 
-        def order(n: Any, words: list[Any]) -> list[Any]:
+        def order(n: Value, words: list[Value]) -> list[Value]:
             y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
             sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
             sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
@@ -396,15 +396,15 @@ class Recurrence:
         words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
         return code.loop(1, low_order, order, words)
 
-    def _inner_pairs(self, n: Any, m: Any, sums: list[Any]) -> list[Any]:
+    def _inner_pairs(self, n: Value, m: Value, sums: list[Value]) -> list[Value]:
         return self._accumulate_pairs(m, self.code.builder.sub(n, m), sums)
 
-    def _stored_pairs(self, n: Index, sums: list[Any], y: list[Pair]) -> list[Any]:
+    def _stored_pairs(self, n: Index, sums: list[Value], y: list[Pair]) -> list[Value]:
         following = [self._next_pair(n, v, (sums[2 * v], sums[2 * v + 1]), y[v]) for v in self.vectors]
         self.put(self.code.builder.add(self.code.integer(n), self.code.integer(1)), following)
         return [word for pair in following for word in pair]
 
-    def plain_orders(self, low_order: Any, order: Any, last: list[Any]) -> None:
+    def plain_orders(self, low_order: Value, order: Value, last: list[Value]) -> None:
         """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
         b, row = self.code.builder, self.row(low_order)
         sides = [self.code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
@@ -426,7 +426,7 @@ class Recurrence:
             b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
         b.position_at_end(after)
 
-    def _plain_order(self, n: int, known: list[Any]) -> list[Any]:
+    def _plain_order(self, n: int, known: list[Value]) -> list[Value]:
         """R, each L and each y of order n + 1 from those of n, with four sums side by side.
 
         The products of y_n come last, and do not wait until it is stored.

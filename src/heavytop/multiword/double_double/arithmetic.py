@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
 
 from llvmlite import ir
 
-from heavytop.multiword.codegen.machine_code import DOUBLE, INT, INT_VECTOR, LANES, VECTOR, Code, Pair
+from heavytop.multiword.codegen.machine_code import DOUBLE, INT, INT_VECTOR, LANES, VECTOR, Code, Pair, Value
 
 _FRACTION_BITS = 52
 _BIAS = 1023
@@ -23,7 +22,7 @@ _POWER = (-0.30407153, -0.07912522)
 _LEAST_EXPONENT = -900.0
 _STEP_BITS, _LARGEST_STEP = 10, 6
 
-Constant = tuple[Any, Any, Any]
+Constant = tuple[Value, Value, Value]
 """A number in three words: their vectors."""
 
 
@@ -52,7 +51,7 @@ def by_constant(code: Code, constant: Constant, a: Pair) -> Pair:
     return product, code.fma(constant[0], a[1], code.add(error, rest))
 
 
-def times(code: Code, a: Pair, factor: Any) -> Pair:
+def times(code: Code, a: Pair, factor: Value) -> Pair:
     """a times a double."""
     product, error = code.two_product(a[0], factor)
     return product, code.fma(a[1], factor, error)
@@ -68,7 +67,7 @@ def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
     return high, code.add(total[1], code.add(rest, low))
 
 
-def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
+def divided(code: Code, a: Pair, divisor: Value, inverse: Pair) -> Pair:
     """a over an integer whose inverse is given in two words.
 
     A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
@@ -79,20 +78,20 @@ def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
     return high, code.fma(rest, inverse[0], code.multiply(rest, inverse[1]))
 
 
-def later(code: Code, time: Pair, length: Any) -> Pair:
+def later(code: Code, time: Pair, length: Value) -> Pair:
     """time + length, in order."""
     total, error = code.two_sum(time[0], length)
     return code.quick_two_sum(total, code.add(error, time[1]))
 
 
-def covered(code: Code, time: Pair, target: Pair) -> Any:
+def covered(code: Code, time: Pair, target: Pair) -> Value:
     """Whether time is the target or behind it."""
     b = code.builder
     level = b.and_(b.fcmp_ordered("==", time[0], target[0]), b.fcmp_ordered(">=", time[1], target[1]))
     return b.or_(b.fcmp_ordered(">", time[0], target[0]), level)
 
 
-def behind(code: Code, time: Pair, began: Pair, sign: Any) -> tuple[Pair, Any]:
+def behind(code: Code, time: Pair, began: Pair, sign: Value) -> tuple[Pair, Value]:
     """± (time − began), doubles in order, and a bit: whether it surely is what :func:`split` makes of the exact one.
 
     The exact difference is s + l + e, where s is the nearest double to s + l, with more to spare than |e| or e = 0.
@@ -112,11 +111,11 @@ def behind(code: Code, time: Pair, began: Pair, sign: Any) -> tuple[Pair, Any]:
     return (code.multiply(high, sign), code.multiply(low, sign)), sure
 
 
-def polynomial(code: Code, order: Any, at: Pair, count: int, row: Callable[[Any], list[Pair]]) -> list[Any]:
+def polynomial(code: Code, order: Value, at: Pair, count: int, row: Callable[[Value], list[Pair]]) -> list[Value]:
     """The words of Σ row(n) at^n, for each of the ``count`` numbers of a row, from the highest order."""
 
-    def term(k: Any, words: list[Any]) -> list[Any]:
-        found: list[Any] = []
+    def term(k: Value, words: list[Value]) -> list[Value]:
+        found: list[Value] = []
         for i, coefficient in enumerate(row(code.builder.sub(order, k))):
             total = multiply(code, (words[2 * i], words[2 * i + 1]), at)
             found += code.quick_two_sum(*add(code, total, coefficient))
@@ -125,7 +124,7 @@ def polynomial(code: Code, order: Any, at: Pair, count: int, row: Callable[[Any]
     return code.loop(0, code.builder.add(order, code.integer(1)), term, [code.zero] * (2 * count))
 
 
-def step_length(code: Code, radii: Sequence[Any], reach: Any) -> Any:
+def step_length(code: Code, radii: Sequence[Value], reach: Value) -> Value:
     """h, from log2 of the radius of convergence as the last two coefficients have it; in a few bits."""
     b = code.builder
     least = b.select(b.fcmp_ordered("<", radii[0], radii[1]), radii[0], radii[1])
@@ -156,7 +155,7 @@ def _split_ratio(top: int, bottom: int) -> tuple[float, float, float]:
     return high, low, float(Fraction(top, bottom) - Fraction(high) - Fraction(low))
 
 
-def log2(code: Code, value: Any) -> Any:
+def log2(code: Code, value: Value) -> Value:
     """log2 of a double that is not negative, to 1e-3, or of each of eight; about -1023 for 0."""
     b, of = code.builder, _Like(value)
     bits = b.bitcast(value, of.integers)
@@ -167,7 +166,7 @@ def log2(code: Code, value: Any) -> Any:
     return b.fadd(b.sitofp(exponent, value.type), _bent(code, fraction, _LOG))
 
 
-def power_of_two(code: Code, exponent: Any, most: int, bits: int) -> Any:
+def power_of_two(code: Code, exponent: Value, most: int, bits: int) -> Value:
     """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits; of a double, or of each of eight."""
     b, of = code.builder, _Like(exponent)
     low, high = of.double(_LEAST_EXPONENT), of.double(float(most))
@@ -182,7 +181,7 @@ def power_of_two(code: Code, exponent: Any, most: int, bits: int) -> Any:
     return b.bitcast(b.add(b.and_(significand, of.integer(kept)), shifted), exponent.type)
 
 
-def _bent(code: Code, fraction: Any, bend: tuple[float, ...]) -> Any:
+def _bent(code: Code, fraction: Value, bend: tuple[float, ...]) -> Value:
     """f + f (1 - f) times a polynomial in f."""
     b, of = code.builder, _Like(fraction)
     total = of.double(bend[-1])
@@ -194,15 +193,15 @@ def _bent(code: Code, fraction: Any, bend: tuple[float, ...]) -> Any:
 class _Like:
     """Constants of the shape of a value: one, or eight."""
 
-    def __init__(self, value: Any) -> None:
+    def __init__(self, value: Value) -> None:
         self.eight = value.type == VECTOR
         self.integers = INT_VECTOR if self.eight else INT
         self.doubles = value.type
 
-    def integer(self, value: int) -> Any:
+    def integer(self, value: int) -> Value:
         one = ir.Constant(INT, value)
         return ir.Constant(INT_VECTOR, [one] * LANES) if self.eight else one
 
-    def double(self, value: float) -> Any:
+    def double(self, value: float) -> Value:
         one = ir.Constant(DOUBLE, value)
         return ir.Constant(VECTOR, [one] * LANES) if self.eight else one

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy
 
@@ -18,6 +17,7 @@ from heavytop.multiword.codegen.machine_code import (
     Doubles,
     Pair,
     Processor,
+    Value,
     doubles,
     once,
     pointer,
@@ -298,13 +298,13 @@ class LaneOrders:
     coefficients, of Ω and of γ, and their slope.
     """
 
-    def __init__(self, code: Code, system: System, arrays: tuple[Any, Any, Any], units: Any) -> None:
+    def __init__(self, code: Code, system: System, arrays: tuple[Value, Value, Value], units: Value) -> None:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
         self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
 
-    def write(self, pair_order: Any, low_order: Any, order: Any) -> tuple[Any, list[Any]]:
+    def write(self, pair_order: Value, low_order: Value, order: Value) -> tuple[Value, list[Value]]:
         """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
         code, b = self.code, self.code.builder
         code.loop(0, pair_order, self._pair_order, [])
@@ -316,15 +316,15 @@ class LaneOrders:
         code.either(self.absent[2], lambda: plain(_OMEGA[:2]), lambda: plain(_OMEGA))
         return splitting, peaks
 
-    def row(self, n: Any) -> Any:
+    def row(self, n: Value) -> Value:
         """Where the row of order n begins."""
         return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
 
-    def pair(self, row: Any, i: int) -> Pair:
+    def pair(self, row: Value, i: int) -> Pair:
         """Both words of a component of a row."""
         return self.code.load(row, LANES * i), self.code.load(row, LOW + LANES * i)
 
-    def _put(self, row: Any, i: int, y: Pair) -> None:
+    def _put(self, row: Value, i: int, y: Pair) -> None:
         for word, table in zip(y, (0, LOW), strict=True):
             self.code.store(word, row, table + LANES * i)
 
@@ -332,28 +332,28 @@ class LaneOrders:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
         return high, middle, low
 
-    def _is_zero(self, k: int) -> Any:
+    def _is_zero(self, k: int) -> Value:
         """Whether a coefficient is 0 in every lane, a bit."""
         return self.code.all_of(self.code.builder.fcmp_ordered("==", self._coefficient(k)[0], self.code.zero))
 
-    def _sums(self, group: Products, sums: Callable[[Products], list[Any]]) -> list[Any]:
+    def _sums(self, group: Products, sums: Callable[[Products], list[Value]]) -> list[Value]:
         """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
         if group is not _OMEGA:
             return sums(group)
 
-        def two() -> list[Any]:
+        def two() -> list[Value]:
             found = sums(group[:2])
             return [*found, *[self.code.zero] * (len(found) // 2)]
 
         return self.code.either(self.absent[2], two, lambda: sums(group))
 
-    def _quotient(self, n: Any) -> Pair:
+    def _quotient(self, n: Value) -> Pair:
         """1/(n + 1) in every lane."""
         place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
         words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
         return self.code.spread(words[0]), self.code.spread(words[1])
 
-    def _pair_order(self, n: Any, _: list[Any]) -> None:
+    def _pair_order(self, n: Value, _: list[Value]) -> None:
         """y_(n+1) in double-double."""
         code, b = self.code, self.code.builder
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
@@ -371,18 +371,18 @@ class LaneOrders:
                 self._put(following, i, (high, low))
 
     def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
-        def added() -> list[Any]:
+        def added() -> list[Value]:
             return [*add(self.code, total, by_constant(self.code, self._coefficient(k), y))]
 
         high, low = self.code.either(self.absent[k], lambda: [*total], added)
         return high, low
 
-    def _pair_sums(self, n: Any, group: Products) -> list[Any]:
+    def _pair_sums(self, n: Value, group: Products) -> list[Value]:
         products = partial(self._pair_products, n, group)
         stop = self.code.builder.add(n, self.code.integer(1))
         return self.code.loop(1, stop, products, products(self.code.integer(0), []))
 
-    def _pair_products(self, n: Any, group: Products, m: Any, words: list[Any]) -> list[Any]:
+    def _pair_products(self, n: Value, group: Products, m: Value, words: list[Value]) -> list[Value]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
         found = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
@@ -396,12 +396,12 @@ class LaneOrders:
             found[at : at + 2] = multiply(code, x, y) if total[0] is None else accumulated(code, total, x, y)
         return found
 
-    def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
+    def _split_row(self, m: Value, peaks: list[Value]) -> list[Value]:
         """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
         row = self.row(m)
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
-    def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
+    def _put_parts(self, m: Value, y: list[Pair], peaks: list[Value]) -> list[Value]:
         code, row, found = self.code, self.row(m), []
         up, down = rises(code, m, code.load(self.units, 16))
         for k, (rows, _) in enumerate(_GROUPS):
@@ -414,7 +414,7 @@ class LaneOrders:
             found.append(code.larger(code.multiply(largest, down), peaks[k]))
         return found
 
-    def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
+    def _split_order(self, n: Value, peaks: list[Value]) -> list[Value]:
         """y_(n+1) from split coefficients."""
         code, b = self.code, self.code.builder
         y, following = self.row(n), self.row(b.add(n, code.integer(1)))
@@ -434,12 +434,12 @@ class LaneOrders:
                 found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
-    def _split_sums(self, n: Any, group: Products) -> list[Any]:
+    def _split_sums(self, n: Value, group: Products) -> list[Value]:
         code = self.code
         zeros = [code.zero] * 3 * (1 + group[-1][2] % 3)
         return code.loop(0, code.builder.add(n, code.integer(1)), partial(self._split_products, n, group), zeros)
 
-    def _split_products(self, n: Any, group: Products, m: Any, sums: list[Any]) -> list[Any]:
+    def _split_products(self, n: Value, group: Products, m: Value, sums: list[Value]) -> list[Value]:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
         found = list(sums)
         for first, second, component, sign in group:
@@ -453,7 +453,7 @@ class LaneOrders:
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
-    def _plain_orders(self, start: Any, stop: Any, omega: Products) -> list[Any]:
+    def _plain_orders(self, start: Value, stop: Value, omega: Products) -> list[Value]:
         """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
         code, b, one = self.code, self.code.builder, self.code.integer(1)
         count = b.sub(stop, start)
@@ -463,17 +463,17 @@ class LaneOrders:
         two = partial(self._two_plain_orders, omega)
         return code.loop(0, b.lshr(count, one), lambda k, _: two(b.add(begin, b.shl(k, one))), [])
 
-    def _plain_order(self, group: Products, n: Any) -> None:
+    def _plain_order(self, group: Products, n: Value) -> None:
         """y_(n+1)."""
         code, b = self.code, self.code.builder
 
-        def products(m: Any, sums: list[Any]) -> list[Any]:
+        def products(m: Value, sums: list[Value]) -> list[Value]:
             return self._both(group, self._highs(m), self._highs(b.sub(n, m)), sums)
 
         sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
         self._plain_rates(n, range(6), sums)
 
-    def _two_plain_orders(self, group: Products, n: Any) -> None:
+    def _two_plain_orders(self, group: Products, n: Value) -> None:
         """y_(n+1) and y_(n+2).
 
         Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
@@ -482,10 +482,10 @@ class LaneOrders:
         code, b = self.code, self.code.builder
         after = b.add(n, code.integer(1))
 
-        def alone(m: Any, sums: list[Any]) -> list[Any]:
+        def alone(m: Value, sums: list[Value]) -> list[Value]:
             return self._plain(group, self._highs(m), self._highs(b.sub(n, m)), sums)
 
-        def beside(m: Any, values: list[Any]) -> list[Any]:
+        def beside(m: Value, values: list[Value]) -> list[Value]:
             y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
             gamma = self._plain(_GAMMA, y, omega, values[:3])
             return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
@@ -496,15 +496,15 @@ class LaneOrders:
         last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
         self._plain_rates(after, range(6), last)
 
-    def _highs(self, n: Any) -> list[Any]:
+    def _highs(self, n: Value) -> list[Value]:
         """The high words of y_n."""
         row = self.row(n)
         return [self.code.load(row, LANES * i) for i in range(6)]
 
-    def _both(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+    def _both(self, group: Products, y: list[Value], omega: list[Value], sums: list[Value]) -> list[Value]:
         return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
 
-    def _plain(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+    def _plain(self, group: Products, y: list[Value], omega: list[Value], sums: list[Value]) -> list[Value]:
         """Three sums with the products of Ω and of the same part of y."""
         code, found = self.code, list(sums)
         for first, second, component, sign in group:
@@ -512,7 +512,7 @@ class LaneOrders:
             found[component % 3] = code.fma(factor, omega[second], found[component % 3])
         return found
 
-    def _plain_rates(self, n: Any, components: Sequence[int], sums: list[Any]) -> None:
+    def _plain_rates(self, n: Value, components: Sequence[int], sums: list[Value]) -> None:
         """Components of y_(n+1) from their sums."""
         code, b = self.code, self.code.builder
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)[0]

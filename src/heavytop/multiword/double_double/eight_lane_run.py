@@ -26,6 +26,7 @@ from heavytop.multiword.codegen.machine_code import (
     Machine,
     Pair,
     Processor,
+    Value,
     compiled,
     doubles,
     function,
@@ -94,7 +95,7 @@ def build(system: System, processor: Processor | None = None) -> Machine:
     _Round(module, system).write()
     _write_sample(module)
     integer = ctypes.c_int64
-    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
+    signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]] = {
         "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
         "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
     }
@@ -106,7 +107,7 @@ def _write_sample(module: ir.Module) -> None:
     scratch, order, times_, result = made.args
     b = code.builder
 
-    def row(n: Any) -> list[Pair]:
+    def row(n: Value) -> list[Pair]:
         at = code.address(scratch, b.mul(n, code.integer(ROW)))
         return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
@@ -126,10 +127,10 @@ class _Round:
         *arrays, self.most = made.args[6:]
         self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
 
-    def _address(self, place: int) -> Any:
+    def _address(self, place: int) -> Value:
         return self.code.address(self.clock, 8 * place)
 
-    def _clock(self, place: int) -> Any:
+    def _clock(self, place: int) -> Value:
         return self.code.load(self.clock, 8 * place)
 
     def write(self) -> None:
@@ -154,32 +155,32 @@ class _Round:
         b.position_at_end(out)
         b.ret(taken)
 
-    def _norm(self, n: Any) -> Any:
+    def _norm(self, n: Value) -> Value:
         row, found = self.series.row(n), self.code.zero
         for i in range(6):
             found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
         return log2(self.code, found)
 
-    def _length(self, start: Any) -> Any:
+    def _length(self, start: Value) -> Value:
         """Each lane's h > 0, as in :mod:`heavytop.multiword.double_double.steps`."""
         code, b = self.code, self.code.builder
 
-        def radius(n: Any) -> Any:
+        def radius(n: Value) -> Value:
             return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
 
         radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
         return step_length(code, radii, self._clock(REACH))
 
-    def _sums(self, h: Any) -> list[Pair]:
+    def _sums(self, h: Value) -> list[Pair]:
         """Σ y_n h^n of each component, from the highest order."""
         code, b = self.code, self.code.builder
 
-        def plain(k: Any, totals: list[Any]) -> list[Any]:
+        def plain(k: Value, totals: list[Value]) -> list[Value]:
             row = self.series.row(b.sub(self.order, k))
             return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
-        def pairs(k: Any, words: list[Any]) -> list[Any]:
-            row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
+        def pairs(k: Value, words: list[Value]) -> list[Value]:
+            row, found = self.series.row(b.sub(self.low_order, k)), list[Value]()
             for i in range(6):
                 found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
             return found
@@ -189,7 +190,7 @@ class _Round:
         words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
         return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
-    def _finish(self, peaks: list[Any], splitting: Any) -> Any:
+    def _finish(self, peaks: list[Value], splitting: Value) -> Value:
         """Move the lanes that can go; whether any did, or has to try again."""
         code, b = self.code, self.code.builder
         start = self._norm(code.integer(0))
@@ -215,7 +216,7 @@ class _Round:
         moved = b.bitcast(b.or_(going, again), ir.IntType(8))
         return b.icmp_unsigned("!=", moved, ir.Constant(ir.IntType(8), 0))
 
-    def _fits(self, peaks: list[Any], splitting: Any, start: Any, length: Any) -> tuple[Any, Any]:
+    def _fits(self, peaks: list[Value], splitting: Value, start: Value, length: Value) -> tuple[Value, Value]:
         """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
         code, b = self.code, self.code.builder
         units = [self._clock(UNITS + k) for k in range(2)]
@@ -235,11 +236,11 @@ class _Round:
         tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(MOST_TRIES))
         return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
 
-    def _slope(self, length: Any) -> Any:
+    def _slope(self, length: Value) -> Value:
         b = self.code.builder
         return b.fadd(b.fsub(self._clock(REACH), log2(self.code, length)), self.code.constant(SLACK))
 
-    def _follow(self, peaks: list[Any], length: Any, going: Any, again: Any) -> None:
+    def _follow(self, peaks: list[Value], length: Value, going: Value, again: Value) -> None:
         """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
         code, b = self.code, self.code.builder
         either = b.or_(going, again)
@@ -248,7 +249,7 @@ class _Round:
         for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
             code.store(b.select(either, value, self._clock(place)), self.clock, 8 * place)
 
-    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any, tried: Any) -> Any:
+    def _judged(self, start: Value, length: Value, results: list[Pair], moves: Value, tried: Value) -> Value:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
         code, b = self.code, self.code.builder
         above = b.add(self.low_order, code.integer(1))
@@ -260,7 +261,7 @@ class _Round:
             one = b.fcmp_ordered("<", code.absolute(word), infinity)
             finite = one if finite is None else b.and_(finite, one)
 
-        def flag(condition: Any, value: int) -> Any:
+        def flag(condition: Value, value: int) -> Value:
             chosen = ir.Constant(INT_VECTOR, [value] * 8)
             return b.select(condition, chosen, ir.Constant(INT_VECTOR, [0] * 8))
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 import ctypes
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from llvmlite import ir
 
@@ -33,6 +32,7 @@ from heavytop.multiword.codegen.machine_code import (
     Pair,
     Processor,
     Stepping,
+    Value,
     compiled,
     function,
 )
@@ -87,7 +87,7 @@ LOG2_OF_A_UNIT = math.log2(1.5) + _FRACTION_BITS
 _ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
 
 
-def splits(code: Code, units: list[Any], slope: Any) -> Any:
+def splits(code: Code, units: list[Value], slope: Value) -> Value:
     """Whether there are such units, a bit; units: 1.5 · 2^52 of them, lane by lane."""
     b = code.builder
     steepest = STEEPEST << SLOPE_BITS
@@ -97,13 +97,13 @@ def splits(code: Code, units: list[Any], slope: Any) -> Any:
     return found
 
 
-def in_range(code: Code, unit: Any) -> Any:
+def in_range(code: Code, unit: Value) -> Value:
     """Whether 1.5 · 2^52 units are far from the ends of the exponents of doubles, lane by lane."""
     low, high = (code.constant(2.0 ** (_FRACTION_BITS + sign * _MOST_UNIT_BITS)) for sign in (-1, 1))
     return code.builder.and_(code.builder.fcmp_ordered(">", unit, low), code.builder.fcmp_ordered("<", unit, high))
 
 
-def next_unit(code: Code, unit: Any, peak: Any) -> tuple[Any, Any]:
+def next_unit(code: Code, unit: Value, peak: Value) -> tuple[Value, Value]:
     """Whether the units of a step were good, and those of the next, lane by lane.
 
     unit: 1.5 · 2^52 of them.  peak: the largest |y_m| 2^(e_0 - e_m).
@@ -119,7 +119,7 @@ def next_unit(code: Code, unit: Any, peak: Any) -> tuple[Any, Any]:
     return b.or_(nothing, fits), code.multiply(unit, factor)
 
 
-def rises(code: Code, m: Any, slope: Any) -> Pair:
+def rises(code: Code, m: Value, slope: Value) -> Pair:
     """2^(e_m - e_0) and its inverse, lane by lane, for slopes that are doubles."""
     b = code.builder
     rounded = code.fma(code.spread(b.sitofp(m, DOUBLE)), slope, code.constant(1.5 * 2.0**_FRACTION_BITS))
@@ -128,7 +128,7 @@ def rises(code: Code, m: Any, slope: Any) -> Pair:
     return b.bitcast(b.add(one, shift), slope.type), b.bitcast(b.sub(one, shift), slope.type)
 
 
-def parts(code: Code, y: Pair, big: Any) -> Pair:
+def parts(code: Code, y: Pair, big: Value) -> Pair:
     """y as a multiple of a unit and the rest; big: 1.5 · 2^52 units."""
     coarse = code.subtract(code.add(y[0], big), big)
     return coarse, code.add(code.subtract(y[0], coarse), y[1])
@@ -154,7 +154,7 @@ def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]
     return code.quick_two_sum(found, code.multiply(rest, inverse))
 
 
-def first_split(code: Code, units: list[Any], slope: Any, reach: Any, depth: Any) -> Any:
+def first_split(code: Code, units: list[Value], slope: Value, reach: Value, depth: Value) -> Value:
     """The order from which split coefficients are exact enough, an integer.
 
     depth: log2 of the state and how many bits below it the products of the units of Ω and the largest may be.
@@ -176,7 +176,7 @@ def first_split(code: Code, units: list[Any], slope: Any, reach: Any, depth: Any
     return b.fptosi(b.select(b.fcmp_ordered("<", bounded, most), bounded, most), INT)
 
 
-def judged(code: Code, units: list[Any], largest: list[Any]) -> tuple[Any, list[Any]]:
+def judged(code: Code, units: list[Value], largest: list[Value]) -> tuple[Value, list[Value]]:
     """Whether the units of a step were good, a bit, and those of the next.
 
     largest: |y_m| 2^(e_0 - e_m), lane by lane.
@@ -193,13 +193,13 @@ def judged(code: Code, units: list[Any], largest: list[Any]) -> tuple[Any, list[
     return good, following
 
 
-def near(code: Code, slope: Any, asked: Any) -> Any:
+def near(code: Code, slope: Value, asked: Value) -> Value:
     """Whether units that rise with ``slope`` are fine enough where ``asked`` is wanted, a bit."""
     b = code.builder
     return b.icmp_signed("<", b.sub(slope, asked), code.integer(int(TOLERATED_SLOPE * 2**SLOPE_BITS)))
 
 
-def slope_of(code: Code, reach: Any, length: Any) -> Any:
+def slope_of(code: Code, reach: Value, length: Value) -> Value:
     """The slope that goes with a step of this length: log2 of the inverse radius of convergence, and a little more."""
     b = code.builder
     value = b.fadd(b.fsub(reach, log2(code, length)), ir.Constant(DOUBLE, SLACK + 2.0 * _BIAS))
@@ -215,15 +215,15 @@ class SplitOrders:
     """
 
     series: Recurrence
-    units: list[Any]
-    slope: Any
-    zero_row: Any
+    units: list[Value]
+    slope: Value
+    zero_row: Value
 
-    def begin(self, last: Any) -> list[Any]:
+    def begin(self, last: Value) -> list[Value]:
         """Split y_0 to y_last; gives the largest |y_m| 2^(e_0 - e_m), lane by lane."""
         series = self.series
 
-        def one(m: Any, largest: list[Any]) -> list[Any]:
+        def one(m: Value, largest: list[Value]) -> list[Value]:
             row = series.row(m)
             y = [series.pair(row, series.layout.value(v)) for v in series.vectors]
             return self._put(m, y, largest)[-len(largest) :]
@@ -231,11 +231,13 @@ class SplitOrders:
         stop = series.code.builder.add(last, series.code.integer(1))
         return series.code.loop(0, stop, one, [series.code.zero for _ in series.vectors])
 
-    def orders(self, start: Any, stop: Any, last: list[Any], largest: list[Any]) -> tuple[list[Any], list[Any]]:
+    def orders(
+        self, start: Value, stop: Value, last: list[Value], largest: list[Value]
+    ) -> tuple[list[Value], list[Value]]:
         """y_(start+1) to y_stop; gives the words of the last, and the largest |y_m| as :meth:`begin` does."""
         code, series, width = self.series.code, self.series, len(self.series.vectors)
 
-        def order(n: Any, values: list[Any]) -> list[Any]:
+        def order(n: Value, values: list[Value]) -> list[Value]:
             words, sides = values[: 2 * width], values[2 * width : -width]
             products = self._products(n, sides)
             following = [self._next(n, v, sums, (words[2 * v], words[2 * v + 1])) for v, sums in enumerate(products)]
@@ -257,7 +259,7 @@ class SplitOrders:
         lefts = (self.series.layout.left(v) for v in self.series.vectors)
         return [0, 16, 24, *(place + k for place in lefts for k in (16, 24))]
 
-    def _rise(self, m: Any) -> Pair:
+    def _rise(self, m: Value) -> Pair:
         """2^(e_m - e_0) and its inverse."""
         code, b = self.series.code, self.series.code.builder
         half = code.integer(1 << (SLOPE_BITS - 1))
@@ -266,12 +268,12 @@ class SplitOrders:
         up, down = (code.spread(b.bitcast(shift, DOUBLE)) for shift in shifts)
         return up, down
 
-    def _put(self, m: Any, y: list[Pair], largest: list[Any]) -> list[Any]:
+    def _put(self, m: Value, y: list[Pair], largest: list[Value]) -> list[Value]:
         """Split both sides of order m and store them; gives R and its parts, the parts of each L, and the largest |y|
         2^(e_0 - e_m), this one with it.
         """
         code, series = self.series.code, self.series
-        row, sides, peaks = series.row(m), list[Any](), []
+        row, sides, peaks = series.row(m), list[Value](), []
         up, down = self._rise(m)
         for v in series.vectors:
             big = code.multiply(self.units[v], up)
@@ -287,16 +289,16 @@ class SplitOrders:
                         code.store(word, row, place + 16 + 8 * k)
         return sides + peaks
 
-    def _products(self, n: Any, sides: list[Any]) -> list[Pair]:
+    def _products(self, n: Value, sides: list[Value]) -> list[Pair]:
         """Σ L_m R_(n−m) of each vector: the exact sums of the coarse parts, and the rest."""
         code, b, width = self.series.code, self.series.code.builder, len(self.series.vectors)
         one = code.integer(1)
 
-        def row(m: Index) -> list[Any]:
+        def row(m: Index) -> list[Value]:
             at = self.series.row(m)
             return [code.load(at, place) for place in self._places]
 
-        def both(m: Any, sums: list[Any]) -> list[Any]:
+        def both(m: Value, sums: list[Value]) -> list[Value]:
             one, other = row(m), row(b.sub(n, m))
             return self._added(one, other, sums[: 3 * width]) + self._added(other, one, sums[3 * width :])
 
@@ -308,7 +310,7 @@ class SplitOrders:
         total = [code.add(x, y) for x, y in zip(first, second, strict=True)]
         return [(total[3 * v], code.add(total[3 * v + 1], total[3 * v + 2])) for v in self.series.vectors]
 
-    def _added(self, one: list[Any], other: list[Any], sums: list[Any]) -> list[Any]:
+    def _added(self, one: list[Value], other: list[Value], sums: list[Value]) -> list[Value]:
         """Three sums of each vector, with the products of L of one order and R of another."""
         whole, coarse, fine = other[:3]
         found = []
@@ -318,7 +320,7 @@ class SplitOrders:
                 found.append(self.series.code.fma(left, right, total))
         return found
 
-    def _next(self, n: Any, vector: int, sums: Pair, y: Pair) -> Pair:
+    def _next(self, n: Value, vector: int, sums: Pair, y: Pair) -> Pair:
         """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
         code, series = self.series.code, self.series
         factors = [(series.constant(vector, 0), (series.gathered(sums[0]), series.gathered(sums[1])))]
@@ -328,7 +330,7 @@ class SplitOrders:
         return quotient(code, None, factors, series.divisor(n))
 
 
-def _all(value: int) -> Any:
+def _all(value: int) -> Value:
     return ir.Constant(INT_VECTOR, [ir.Constant(INT, value)] * LANES)
 
 
@@ -381,10 +383,10 @@ def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
     code.builder.ret_void()
 
 
-def _put_sample(rows: Recurrence, layout: Layout, order: Any, time: Pair, result: Any) -> None:
+def _put_sample(rows: Recurrence, layout: Layout, order: Value, time: Pair, result: Value) -> None:
     """The polynomial of the last step, at a time behind its beginning."""
 
-    def row(n: Any) -> list[Pair]:
+    def row(n: Value) -> list[Pair]:
         place = rows.row(n)
         return [rows.pair(place, layout.value(v)) for v in rows.vectors]
 
@@ -396,7 +398,7 @@ def _put_sample(rows: Recurrence, layout: Layout, order: Any, time: Pair, result
 class _Follow:
     """Writes ``follow``."""
 
-    def __init__(self, module: ir.Module, layout: Layout, system: System, advance: Any) -> None:
+    def __init__(self, module: ir.Module, layout: Layout, system: System, advance: Value) -> None:
         kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
         made, self.code = function(module, "follow", ir.VoidType(), kinds)
         self.arrays, (highs, lows, self.progress, self.count, self.most, self.result) = made.args[:5], made.args[5:]
@@ -433,10 +435,10 @@ class _Follow:
         b.position_at_end(out)
         b.ret_void()
 
-    def _clock(self, place: int) -> Any:
+    def _clock(self, place: int) -> Value:
         return self._word(self.arrays[1], place)
 
-    def _word(self, array: Any, place: Any) -> Any:
+    def _word(self, array: Value, place: Value) -> Value:
         return self.code.builder.load(self.code.address(array, place))
 
 
@@ -451,11 +453,11 @@ class _Step(Stepping):
         self.layout = layout
         self.series = Recurrence(self.code, layout, system, table, scratch)
 
-    def covered(self) -> Any:
+    def covered(self) -> Value:
         time, low, target, target_low = (self.time(k) for k in (TIME, TIME_LOW, TARGET, TARGET_LOW))
         return covered(self.code, (time, low), (target, target_low))
 
-    def write_step(self) -> Any:
+    def write_step(self) -> Value:
         """One step; whether it stands."""
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
         first = [self.series.pair(self.state, 16 * v) for v in self.series.vectors]
@@ -472,7 +474,7 @@ class _Step(Stepping):
         self._accept(good, length, low_order, result)
         return good
 
-    def _orders(self, first: list[Pair], start: Any, units: list[Any], slope: Any) -> tuple[Any, list[Any]]:
+    def _orders(self, first: list[Pair], start: Value, units: list[Value], slope: Value) -> tuple[Value, list[Value]]:
         """y_1 to y_N; whether some are split, a bit, and the largest of their units."""
         code, b, series = self.code, self.code.builder, self.series
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
@@ -488,7 +490,7 @@ class _Step(Stepping):
         series.plain_orders(low_order, order, [words[2 * v] for v in series.vectors])
         return split, largest
 
-    def _units_fit(self, split: Any, units: list[Any], slope: Any, largest: list[Any], length: Any) -> Any:
+    def _units_fit(self, split: Value, units: list[Value], slope: Value, largest: list[Value], length: Value) -> Value:
         """Whether the units of split coefficients were good, a bit; puts those of what comes next."""
         code, b = self.code, self.code.builder
         fits, following = judged(code, units, largest)
@@ -498,23 +500,23 @@ class _Step(Stepping):
             code.store(unit, self.state, self.layout.units + 8 * v)
         return b.or_(b.and_(fits, near(code, slope, asked)), b.not_(split))
 
-    def _norm(self, n: Index) -> Any:
+    def _norm(self, n: Index) -> Value:
         row, found = self.series.row(n), self.code.zero
         for v in self.series.vectors:
             found = self.code.larger(self.code.absolute(self.code.load(row, self.layout.value(v))), found)
         return self.code.largest(found)
 
-    def _length(self, order: Any, start: Any) -> Any:
+    def _length(self, order: Value, start: Value) -> Value:
         """h > 0, from log2 |y_0| and the last two coefficients."""
         b = self.code.builder
 
-        def radius(n: Any) -> Any:
+        def radius(n: Value) -> Value:
             return b.fdiv(b.fsub(start, log2(self.code, self._norm(n))), b.sitofp(n, DOUBLE))
 
         radii = radius(order), radius(b.sub(order, self.code.integer(1)))
         return step_length(self.code, radii, self.time(REACH))
 
-    def _sum(self, order: Any, low_order: Any, step: Any) -> list[Pair]:
+    def _sum(self, order: Value, low_order: Value, step: Value) -> list[Pair]:
         """Σ y_n h^n: four sums in h^4 side by side, each from its highest order, then those of h^2 and h."""
         code, b, series, two = self.code, self.code.builder, self.series, self.code.integer(2)
         square = b.fmul(step, step)
@@ -522,19 +524,19 @@ class _Step(Stepping):
         top, low_top = b.lshr(order, two), b.lshr(low_order, two)
         places = [(i, v) for i in range(4) for v in series.vectors]
 
-        def row(k: Any, i: int) -> Any:
+        def row(k: Value, i: int) -> Value:
             return series.row(b.add(b.shl(k, two), code.integer(i)))
 
-        def plain(k: Any, sums: list[Any]) -> list[Any]:
+        def plain(k: Value, sums: list[Value]) -> list[Value]:
             at = b.sub(top, k)
             return [
                 code.fma(total, h4, code.load(row(at, i), self.layout.value(v)))
                 for total, (i, v) in zip(sums, places, strict=True)
             ]
 
-        def pairs(k: Any, words: list[Any]) -> list[Any]:
+        def pairs(k: Value, words: list[Value]) -> list[Value]:
             at = b.sub(low_top, k)
-            found: list[Any] = []
+            found: list[Value] = []
             for index, (i, v) in enumerate(places):
                 total = times(code, (words[2 * index], words[2 * index + 1]), h4)
                 found += add(code, total, series.pair(row(at, i), self.layout.value(v)))
@@ -550,7 +552,7 @@ class _Step(Stepping):
             found.append(code.quick_two_sum(*add(code, times(code, odd, h), even)))
         return found
 
-    def _judge(self, length: Any, low_order: Any, start: Any, result: list[Pair]) -> Any:
+    def _judge(self, length: Value, low_order: Value, start: Value, result: list[Pair]) -> Value:
         """Whether the step stands; sets the status, and the n0 of what comes next."""
         code, b, one = self.code, self.code.builder, self.code.integer(1)
         time, room = self.time(TIME), self.time(ROOM)
@@ -572,7 +574,7 @@ class _Step(Stepping):
         again = b.and_(b.fcmp_ordered(">", above, b.fadd(room, ir.Constant(DOUBLE, _TOLERATED))), can_rise)
         return b.and_(b.not_(again), b.icmp_signed("==", status, code.integer(FINE)))
 
-    def _follow(self, good: Any, fits: Any, units: list[Any], slope: Any) -> None:
+    def _follow(self, good: Value, fits: Value, units: list[Value], slope: Value) -> None:
         """What split coefficients the step was done with, if it stands, and how often the next was tried."""
         code, b = self.code, self.code.builder
         tries = self.count(TRIES)
@@ -584,13 +586,13 @@ class _Step(Stepping):
         again = b.select(fits, tries, b.add(tries, code.integer(1)))
         self.set_count(b.select(good, code.integer(0), again), TRIES)
 
-    def _rounding(self, n: Any, length: Any, start: Any) -> Any:
+    def _rounding(self, n: Value, length: Value, start: Value) -> Value:
         """log2 of |y_n| h^n / |y_0|."""
         b = self.code.builder
         power = b.fmul(b.sitofp(n, DOUBLE), log2(self.code, length))
         return b.fsub(b.fadd(log2(self.code, self._norm(n)), power), start)
 
-    def _accept(self, good: Any, length: Any, low_order: Any, result: list[Pair]) -> None:
+    def _accept(self, good: Value, length: Value, low_order: Value, result: list[Pair]) -> None:
         code, b = self.code, self.code.builder
         time, low = self.time(TIME), self.time(TIME_LOW)
         with b.if_then(good):

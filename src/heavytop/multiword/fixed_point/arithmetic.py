@@ -18,7 +18,6 @@ import ctypes
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ldexp
-from typing import Any
 
 import numpy
 from llvmlite import ir
@@ -32,6 +31,7 @@ from heavytop.multiword.codegen.machine_code import (
     Code,
     Doubles,
     Machine,
+    Value,
     compiled,
     function,
     once,
@@ -105,10 +105,10 @@ class Accumulator:
     code: Code
     grid: Grid
     base: int
-    sums: list[Any]
-    seen: Any
+    sums: list[Value]
+    seen: Value
 
-    def add_product(self, a: list[Any], b: list[Any], each: bool = False, below: bool = False) -> None:
+    def add_product(self, a: list[Value], b: list[Value], each: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
         What goes to the last level is added up before it gets there: its sum is what the next product waits for.
@@ -154,7 +154,7 @@ class Accumulator:
             self.look(k)
 
 
-def in_pairs(code: Code, values: list[Any]) -> Any:
+def in_pairs(code: Code, values: list[Value]) -> Value:
     """Their sum, exact for multiples of one unit; in pairs."""
     while len(values) > 1:
         pairs = zip(values[::2], values[1::2], strict=False)
@@ -162,7 +162,7 @@ def in_pairs(code: Code, values: list[Any]) -> Any:
     return values[0]
 
 
-def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
+def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Value]:
     """Functions (left, right, count, sums, seen): S += Σ_m left[m] right[-m] in the levels from the q-th last on.
 
     left goes up by a row for each product and right goes down; both point to their first word that is not zero.
@@ -171,7 +171,7 @@ def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
     return [_write_kernel(module, grid, count, row) for count in range(1, grid.words + 1)]
 
 
-def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
+def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Value:
     arguments = [POINTER, POINTER, INT, POINTER, POINTER]
     made, code = function(module, f"products_{count}", ir.VoidType(), arguments)
     made.linkage = "internal"
@@ -179,7 +179,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
     left, right, terms, sums, seen = made.args
     base, b = grid.words - count, code.builder
 
-    def term(m: Any, values: list[Any]) -> list[Any]:
+    def term(m: Value, values: list[Value]) -> list[Value]:
         total = Accumulator(code, grid, base, list(values[:-1]), values[-1])
         at = code.address(left, b.mul(m, code.integer(row)))
         against = code.address(right, b.mul(m, code.integer(-row)))
@@ -197,7 +197,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
     return made
 
 
-def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[Any]:
+def bounded_product(code: Code, grid: Grid, a: list[Value], b: list[Value]) -> list[Value]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
 
     a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
@@ -205,7 +205,7 @@ def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[
     2^3 + 2^2 + 2 (k − 1): less than 2^51 units for 24 words of 45 bits.
     """
     last = grid.words - 1
-    found, lows = [], [list[Any]() for _ in range(grid.words)]
+    found, lows = [], [list[Value]() for _ in range(grid.words)]
     for k in range(last):
         centre = total = code.constant(grid.centre(k))
         for i in range(k + 1):
@@ -221,12 +221,12 @@ def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[
     return [found[0], *(code.add(found[k], in_pairs(code, lows[k])) for k in range(1, last + 1))]
 
 
-def centred(code: Code, grid: Grid, count: int) -> list[Any]:
+def centred(code: Code, grid: Grid, count: int) -> list[Value]:
     """The beginning of all sums."""
     return [code.constant(grid.centre(k)) for k in range(count)]
 
 
-def carried(code: Code, grid: Grid, words: list[Any]) -> list[Any]:
+def carried(code: Code, grid: Grid, words: list[Value]) -> list[Value]:
     """The same number with each word but the first near b bits wide again."""
     carries = [None]
     for k in range(1, grid.words):
@@ -314,7 +314,7 @@ def machine(words: int, vectors: int) -> Machine:
     for k in range(words * vectors):
         code.store(code.zero, added, 8 * k)
 
-    def order(n: Any, _: list[Any]) -> None:
+    def order(n: Value, _: list[Value]) -> None:
         at = code.address(rows, b.mul(n, code.integer(8 * row)))
         side = [code.load(at, 8 * k) for k in range(row)]
         for k, word in enumerate(side):
@@ -335,7 +335,7 @@ def machine(words: int, vectors: int) -> Machine:
     return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 4])})
 
 
-def _component(code: Code, left: Any) -> Any:
+def _component(code: Code, left: Value) -> Value:
     """A word of y, exactly."""
     half = code.shuffle(left, code.zero, _SECOND)
     return code.fma(half, code.constant(-0.5), code.shuffle(left, code.zero, _FIRST))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from llvmlite import ir
 
@@ -20,6 +19,7 @@ from heavytop.multiword.codegen.machine_code import (
     Code,
     Doubles,
     Index,
+    Value,
     function,
 )
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Sum
@@ -47,11 +47,11 @@ class Rows(ABC):
     grid: Grid
     vectors: int
     orders: int
-    rows: Any
-    sums: Any
-    places: Any
-    seen: Any
-    kernels: list[Any]
+    rows: Value
+    sums: Value
+    places: Value
+    seen: Value
+    kernels: list[Value]
 
     @staticmethod
     @abstractmethod
@@ -60,7 +60,7 @@ class Rows(ABC):
 
     @staticmethod
     @abstractmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
         """The functions that sum products; which is best depends on how many registers there are, no result does."""
 
     @staticmethod
@@ -69,31 +69,31 @@ class Rows(ABC):
         """The eight lanes of L of an order, out of the rows."""
 
     @abstractmethod
-    def stored(self, n: Any, vector: int) -> list[Any]:
+    def stored(self, n: Value, vector: int) -> list[Value]:
         """L of an order as K words, not carried."""
 
     @abstractmethod
-    def begin(self, y: list[Any], wide: Any) -> Any:
+    def begin(self, y: list[Value], wide: Value) -> Value:
         """Store y_0; gives the largest word over its limit."""
 
     @abstractmethod
-    def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+    def keep(self, n: Index, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
         """Store y_n; gives y_n as it was stored, the zeros from now on, and the largest word over its limit.
 
         zeros: an integer about leading zeros, which begins at 0.
         """
 
     @abstractmethod
-    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
         """S_n = Σ L_m ∘ R_(n−m) of a vector: K words, not carried."""
 
-    def sides(self, y: list[Any]) -> list[list[Any]]:
+    def sides(self, y: list[Value]) -> list[list[Value]]:
         """R, and L of each vector, word by word."""
         words = self.grid.words
         parts = [y[words * v : words * (v + 1)] for v in range(self.vectors)]
         return [_side(self.code, parts[0], RIGHT), *(_side(self.code, part, LEFT) for part in parts)]
 
-    def largest_sum(self, y: list[Any]) -> Any:
+    def largest_sum(self, y: list[Value]) -> Value:
         """The largest sum of |words| of a component, a double."""
         code, words = self.code, self.grid.words
         largest = code.zero
@@ -104,13 +104,13 @@ class Rows(ABC):
             largest = code.larger(one, largest)
         return code.largest(largest)
 
-    def watch(self, wide: Any, value: Any, k: int, bits: int = WIDEST) -> Any:
+    def watch(self, wide: Value, value: Value, k: int, bits: int = WIDEST) -> Value:
         """The largest word so far, over 2^bits of its unit."""
         share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-bits / self.grid.unit(k)))
         return self.code.larger(share, wide)
 
 
-def _side(code: Code, y: list[Any], which: Sum) -> list[Any]:
+def _side(code: Code, y: list[Value], which: Sum) -> list[Value]:
     signs = code.constant(which.sign)
     return [
         code.fma(code.shuffle(word, code.zero, which.second), signs, code.shuffle(word, code.zero, which.first))
@@ -134,7 +134,7 @@ _PRODUCTS = 120
 _ROUND = 1.5 * 2.0**52
 
 
-def rounded(code: Code, value: Any, place: int = 0) -> Any:
+def rounded(code: Code, value: Value, place: int = 0) -> Value:
     """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
     big = code.constant(_ROUND * 2.0**place)
     return code.subtract(code.add(value, big), big)
@@ -154,7 +154,7 @@ class _Tiles:
 _WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
 
 
-def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Any:
+def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Value:
     """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
 
     Split at 2^24: what is whole multiples of that is added to the level before.
@@ -173,7 +173,7 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> An
     most = _PRODUCTS // max(map(len, pairs))
     begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
 
-    def order(m: Any, values: list[Any]) -> list[Any]:
+    def order(m: Value, values: list[Value]) -> list[Value]:
         at, found = b.load(code.address(where, m)), list(values)
         one, other = code.address(left, at), code.address(right, b.neg(at))
         a = [code.load(one, LANES * i) for i in range(side)]
@@ -185,7 +185,7 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> An
                     found[place] = code.multiply_add(a[i], c, found[place])
         return found
 
-    def group(g: Any, _: list[Any]) -> None:
+    def group(g: Value, _: list[Value]) -> None:
         start = b.mul(g, code.integer(most))
         stop = b.add(start, code.integer(most))
         stop = b.select(b.icmp_signed("<", stop, orders), stop, orders)
@@ -196,7 +196,7 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> An
     return made
 
 
-def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> None:
+def _add_levels(code: Code, sums: Value, begins: list[int], values: list[Value]) -> None:
     """sums += the values of each level, split at 2^24."""
     carries, rest = [], []
     for level in range(len(begins) - 1):
@@ -212,7 +212,7 @@ def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> 
         code.store(code.multiply_add(carry, down, total), sums, place)
 
 
-def write_sums(module: ir.Module, wide: bool) -> Any:
+def write_sums(module: ir.Module, wide: bool) -> Value:
     """(left, right, where, orders, levels, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels.
 
     sums begins with what is whole multiples of a level before the first.  where counts doubles, a digit has eight.
@@ -236,13 +236,13 @@ def write_sums(module: ir.Module, wide: bool) -> Any:
         b.ret_void()
     parts = b.sdiv(b.add(levels, code.integer(side - 1)), code.integer(side))
 
-    def some(g: Any, _: list[Any]) -> None:
+    def some(g: Value, _: list[Value]) -> None:
         start = b.mul(g, group)
         rest = b.sub(orders, start)
         count = b.select(b.icmp_signed("<", rest, group), rest, group)
 
-        def one(i: Any, _: list[Any]) -> None:
-            def other(j: Any, _: list[Any]) -> None:
+        def one(i: Value, _: list[Value]) -> None:
+            def other(j: Value, _: list[Value]) -> None:
                 ahead = b.add(i, j)
                 both = [code.address(base, b.mul(k, tile)) for base, k in ((left, i), (right, j))]
                 places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
@@ -257,7 +257,7 @@ def write_sums(module: ir.Module, wide: bool) -> Any:
     return made
 
 
-def _call(code: Code, tiles: list[Any], levels: Any, arguments: list[Any]) -> None:
+def _call(code: Code, tiles: list[Value], levels: Value, arguments: list[Value]) -> None:
     """The tile of so many levels, if there are any, or the last."""
     b = code.builder
     end = b.append_basic_block("end")
@@ -307,7 +307,7 @@ class DigitRows(Rows):
         return Size(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
         return [write_sums(module, wide)]
 
     @staticmethod
@@ -321,7 +321,7 @@ class DigitRows(Rows):
             for lane in range(LANES)
         ]
 
-    def stored(self, n: Any, vector: int) -> list[Any]:
+    def stored(self, n: Value, vector: int) -> list[Value]:
         code, grid, count = self.code, self.grid, digits_of(self.grid)
         row = code.integer(self.size(grid, self.vectors, 1).row)
         at = code.address(self.rows, code.builder.mul(n, row))
@@ -339,10 +339,10 @@ class DigitRows(Rows):
             found[k] = code.add(found[k], value)
         return found
 
-    def begin(self, y: list[Any], wide: Any) -> Any:
+    def begin(self, y: list[Value], wide: Value) -> Value:
         return self.keep(0, y, self.code.integer(0), wide)[2]
 
-    def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+    def keep(self, n: Index, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
         code, b, grid = self.code, self.code.builder, self.grid
         for place, word in enumerate(y):
             wide = self.watch(wide, word, place % grid.words, grid.most_bits(place % grid.words))
@@ -359,7 +359,7 @@ class DigitRows(Rows):
         self._put_place(n, z)
         return y, self._larger(z, zeros), wide
 
-    def _put_place(self, n: Index, z: Any) -> None:
+    def _put_place(self, n: Index, z: Value) -> None:
         code, b = self.code, self.code.builder
         row = code.integer(self.size(self.grid, self.vectors, 1).row)
         b.store(z, code.address(self.places, n))
@@ -367,10 +367,10 @@ class DigitRows(Rows):
         b.store(place, code.address(self._where, n))
 
     @property
-    def _where(self) -> Any:
+    def _where(self) -> Value:
         return self.code.address(self.places, self.orders)
 
-    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
         code, b, count = self.code, self.code.builder, digits_of(self.grid)
         level = self._level(n, zeros)
         for k in range(count + 1):
@@ -389,7 +389,7 @@ class DigitRows(Rows):
         b.call(self.kernels[0], arguments)
         return self._words([code.load(self.sums, LANES * k) for k in range(count + 1)])
 
-    def _level(self, n: Any, most: Any) -> Any:
+    def _level(self, n: Value, most: Value) -> Value:
         """s; where some z(m) exceeds s + 2, it counts as s + 2, so that s is looked for again."""
         code, b = self.code, self.code.builder
         before, search = b.block, b.append_basic_block("level")
@@ -399,7 +399,7 @@ class DigitRows(Rows):
         largest.add_incoming(most, before)
         half = b.add(b.ashr(n, code.integer(1)), code.integer(1))
 
-        def lower(m: Any, values: list[Any]) -> list[Any]:
+        def lower(m: Value, values: list[Value]) -> list[Value]:
             pair = [b.load(code.address(self.places, k)) for k in (m, b.sub(n, m))]
             return [self._smaller(values[0], b.add(*pair))]
 
@@ -409,7 +409,7 @@ class DigitRows(Rows):
         b.cbranch(b.icmp_signed(">", largest, limit), again, found)
         b.position_at_end(again)
 
-        def clip(m: Any, _: list[Any]) -> None:
+        def clip(m: Value, _: list[Value]) -> None:
             self._put_place(m, self._smaller(b.load(code.address(self.places, m)), limit))
 
         code.loop(0, b.add(n, code.integer(1)), clip, [])
@@ -418,16 +418,16 @@ class DigitRows(Rows):
         b.position_at_end(found)
         return level
 
-    def _smaller(self, a: Any, c: Any) -> Any:
+    def _smaller(self, a: Value, c: Value) -> Value:
         return self.code.builder.select(self.code.builder.icmp_signed("<", a, c), a, c)
 
-    def _larger(self, a: Any, c: Any) -> Any:
+    def _larger(self, a: Value, c: Value) -> Value:
         return self.code.builder.select(self.code.builder.icmp_signed(">", a, c), a, c)
 
-    def _digits(self, words: list[Any]) -> list[Any]:
+    def _digits(self, words: list[Value]) -> list[Value]:
         """The digits of words, the last rounded."""
         code, grid, count = self.code, self.grid, digits_of(self.grid)
-        found: list[Any] = [None] * count
+        found: list[Value] = [None] * count
         for k, word in enumerate(words):
             rest = _times(code, word, _raised(grid))
             for j in range(self._first_digit(k), count):
@@ -441,7 +441,7 @@ class DigitRows(Rows):
         carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
         return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
-    def _carried(self, digit: Any, out: Any, into: Any) -> Any:
+    def _carried(self, digit: Value, out: Value, into: Value) -> Value:
         value = digit if out is None else self.code.subtract(digit, out)
         return value if into is None else self.code.add(value, into)
 
@@ -453,10 +453,10 @@ class DigitRows(Rows):
         """Where the digits of word k begin."""
         return max(0, (_HEAD + self.grid.bits * k + BITS - 2) // BITS - 1)
 
-    def _words(self, sums: list[Any]) -> list[Any]:
+    def _words(self, sums: list[Value]) -> list[Value]:
         """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
         code, grid = self.code, self.grid
-        found: list[Any] = [None] * grid.words
+        found: list[Value] = [None] * grid.words
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
             rest = _times(code, sums[index], unit + _raised(grid))
@@ -475,7 +475,7 @@ def _raised(grid: Grid) -> int:
     return 500 if grid.total > 800 else 0
 
 
-def _times(code: Code, value: Any, exponent: int) -> Any:
+def _times(code: Code, value: Value, exponent: int) -> Value:
     """value 2^exponent."""
     while exponent:
         part = max(-1000, min(1000, exponent))
@@ -500,7 +500,7 @@ class WordRows(Rows):
         return Size(row, row * orders, 8 * grid.words, grid.words + 2)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
         return write_kernels(module, grid, row)
 
     @staticmethod
@@ -509,13 +509,13 @@ class WordRows(Rows):
         block = rows[start : start + 8 * grid.words]
         return [exact(block[lane::8]) for lane in range(8)]
 
-    def stored(self, n: Any, vector: int) -> list[Any]:
+    def stored(self, n: Value, vector: int) -> list[Value]:
         code, words = self.code, self.grid.words
         row = code.integer(self.size(self.grid, self.vectors, 1).row)
         at = code.address(self.rows, code.builder.mul(n, row))
         return [code.load(at, 8 * (words * (1 + vector) + k)) for k in range(words)]
 
-    def begin(self, y: list[Any], wide: Any) -> Any:
+    def begin(self, y: list[Value], wide: Value) -> Value:
         code = self.code
         self._put(0, y)
         code.builder.store(code.integer(0), code.address(self.places, 0))
@@ -523,30 +523,30 @@ class WordRows(Rows):
             code.builder.store(code.integer(_FAR), code.address(self.places, k))
         return wide
 
-    def keep(self, n: Any, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+    def keep(self, n: Value, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
         code, b, words = self.code, self.code.builder, self.grid.words
         zeros_after = self._leading_zeros(y, zeros)
 
-        def begin(k: Any, _: list[Any]) -> None:
+        def begin(k: Value, _: list[Value]) -> None:
             b.store(n, code.address(self.places, b.add(k, code.integer(1))))
 
         # several at once, where the first order is far smaller than the state
         code.loop(zeros, zeros_after, begin, [])
-        folded: list[Any] = []
+        folded: list[Value] = []
         for v in range(self.vectors):
             one, wide = self._folded(y[words * v : words * (v + 1)], zeros_after, wide)
             folded += one
         self._put(n, folded)
         return folded, zeros_after, wide
 
-    def _put(self, n: Index, y: list[Any]) -> None:
+    def _put(self, n: Index, y: list[Value]) -> None:
         code = self.code
         row = code.integer(self.size(self.grid, self.vectors, 1).row)
         at = code.address(self.rows, code.builder.mul(code.integer(n), row))
         for k, word in enumerate(word for one in self.sides(y) for word in one):
             code.store(word, at, 8 * k)
 
-    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
         # for each number u of leading zero words on the left and w on the right, where orders have those
         code, b, words = self.code, self.code.builder, self.grid.words
         rows, sums, places, seen = self.rows, self.sums, self.places, self.seen
@@ -555,19 +555,19 @@ class WordRows(Rows):
             code.store(centre, sums, 8 * k)
         one, zero = code.integer(1), code.integer(0)
 
-        def smaller(a: Any, c: Any) -> Any:
+        def smaller(a: Value, c: Value) -> Value:
             return b.select(b.icmp_signed("<", a, c), a, c)
 
-        def larger(a: Any, c: Any) -> Any:
+        def larger(a: Value, c: Value) -> Value:
             return b.select(b.icmp_signed(">", a, c), a, c)
 
-        def place(k: Any) -> Any:
+        def place(k: Value) -> Value:
             return b.load(code.address(places, k))
 
-        def left(u: Any, _: list[Any]) -> None:
+        def left(u: Value, _: list[Value]) -> None:
             begin, end = place(u), place(b.add(u, one))
 
-            def right(w: Any, _: list[Any]) -> None:
+            def right(w: Value, _: list[Value]) -> None:
                 low = larger(larger(begin, b.add(b.sub(n, place(b.add(w, one))), one)), zero)
                 high = smaller(smaller(end, b.add(b.sub(n, place(w)), one)), b.add(n, one))
                 count = b.sub(high, low)
@@ -593,7 +593,7 @@ class WordRows(Rows):
         code.store(b.bitcast(watched.seen, VECTOR), seen, 0)
         return [code.subtract(s, c) for s, c in zip(found, centred(code, self.grid, words), strict=True)]
 
-    def _call(self, skipped: Any, arguments: list[Any]) -> None:
+    def _call(self, skipped: Value, arguments: list[Value]) -> None:
         """The kernel for the levels behind ``skipped`` leading zero words."""
         b, words = self.code.builder, self.grid.words
         end = b.append_basic_block("called")
@@ -606,7 +606,7 @@ class WordRows(Rows):
             b.branch(end)
         b.position_at_end(end)
 
-    def _leading_zeros(self, y: list[Any], before: Any) -> Any:
+    def _leading_zeros(self, y: list[Value], before: Value) -> Value:
         """How many leading words are 0 in every lane, all but the last at most; never fewer than before."""
         code, b, words = self.code, self.code.builder, self.grid.words
         count, only = code.integer(0), ir.Constant(ir.IntType(1), 1)
@@ -618,7 +618,7 @@ class WordRows(Rows):
             count = b.select(only, code.integer(k + 1), count)
         return b.select(b.icmp_signed(">", count, before), count, before)
 
-    def _folded(self, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any]:
+    def _folded(self, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value]:
         """Words that count as 0 and are not: added to the first that does not."""
         code, b = self.code, self.code.builder
         found, left = [], code.zero

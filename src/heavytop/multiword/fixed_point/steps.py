@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, field
-from typing import Any
 
 from llvmlite import ir
 
@@ -27,6 +26,7 @@ from heavytop.multiword.codegen.machine_code import (
     Machine,
     Processor,
     Stepping,
+    Value,
     compiled,
     function,
 )
@@ -87,11 +87,11 @@ class Series:
     system: System
     vectors: int
     wide: bool
-    made: Any = field(init=False)
+    made: Value = field(init=False)
     code: Code = field(init=False)
     rows: Rows = field(init=False)
 
-    def write(self) -> Any:
+    def write(self) -> Value:
         """The function."""
         kind = rows_of(self.grid)
         room = most_orders(self.grid) + 2
@@ -119,7 +119,7 @@ class Series:
         b.ret(b.select(quiet, found, code.integer(FIRED)))
         return self.made
 
-    def _orders(self, first: list[Any]) -> tuple[Any, Any, Any, list[Any]]:
+    def _orders(self, first: list[Value]) -> tuple[Value, Value, Value, list[Value]]:
         """The loop over orders: their number, how many were small at the end, the largest word, the sum."""
         code, b = self.code, self.code.builder
         wide_before = self.rows.begin(first, code.zero)
@@ -158,10 +158,10 @@ class Series:
         b.position_at_end(out)
         return n, small, wide, [code.add(word, rest[k]) if k in rest else word for k, word in enumerate(total)]
 
-    def _order(self, n: Any, zeros: Any, wide: Any, y: list[Any]) -> tuple[list[Any], Any]:
+    def _order(self, n: Value, zeros: Value, wide: Value, y: list[Value]) -> tuple[list[Value], Value]:
         """y_(n+1) and the largest word over its limit."""
         words = self.grid.words
-        found: list[Any] = []
+        found: list[Value] = []
         for v in range(self.vectors):
             products = self.rows.products(n, zeros, v)
             rates, wide = self._rates(v, products, y[words * v : words * (v + 1)], wide)
@@ -170,19 +170,19 @@ class Series:
             found += quotient
         return found, wide
 
-    def _rates(self, vector: int, sums: list[Any], y: list[Any], wide: Any) -> tuple[list[Any], Any]:
+    def _rates(self, vector: int, sums: list[Value], y: list[Value], wide: Value) -> tuple[list[Value], Value]:
         """A ∘ gathered S + Σ B ∘ permuted y, and the largest word."""
         grid, gathered = self.grid, self._gathered(carried(self.code, self.grid, sums))
         wide = self.rows.watch(wide, gathered[0], 0, grid.most_bits(0))
         total = self._bounded_rates(vector, gathered, y) if grid.bounded else self._watched_rates(vector, gathered, y)
         return carried(self.code, grid, total), wide
 
-    def _constants(self, row: int) -> list[Any]:
+    def _constants(self, row: int) -> list[Value]:
         """The words of a row of the constants."""
         words = self.grid.words
         return [self.code.load(self.made.args[1], 8 * (words * row + i)) for i in range(words)]
 
-    def _bounded_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+    def _bounded_rates(self, vector: int, gathered: list[Value], y: list[Value]) -> list[Value]:
         code, grid, (permutations, second) = self.code, self.grid, beside(self.system)
         place = (1 + len(permutations)) * vector
         found = bounded_product(code, grid, self._constants(place), gathered)
@@ -199,7 +199,7 @@ class Series:
             found = [code.add(a, b) for a, b in zip(found, linear, strict=True)]
         return found
 
-    def _watched_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+    def _watched_rates(self, vector: int, gathered: list[Value], y: list[Value]) -> list[Value]:
         code, b, grid, seen, linear = self.code, self.code.builder, self.grid, self.made.args[6], turned(self.system)
         sources = [gathered, *([code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear)]
         gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
@@ -211,7 +211,7 @@ class Series:
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
         return [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, grid.words), strict=True)]
 
-    def _gathered(self, total: list[Any]) -> list[Any]:
+    def _gathered(self, total: list[Value]) -> list[Value]:
         code, zero = self.code, self.code.zero
         found = []
         for word in total:
@@ -224,11 +224,11 @@ class Series:
             found.append(code.add(code.add(parts[0], parts[1]), others))
         return found
 
-    def _raised(self, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
+    def _raised(self, words: list[Value], wide: Value) -> tuple[list[Value], Value]:
         """Multiplied by 16 as often as is asked; seldom at all."""
         code, sixteen = self.code, self.code.constant(16.0)
 
-        def once(_: Any, values: list[Any]) -> list[Any]:
+        def once(_: Value, values: list[Value]) -> list[Value]:
             products = [code.multiply(word, sixteen) for word in values[:-1]]
             widest = values[-1]
             for k, word in enumerate(products):
@@ -238,7 +238,7 @@ class Series:
         values = code.loop(0, self.made.args[8], once, [*words, wide])
         return values[:-1], values[-1]
 
-    def _times(self, words: list[Any]) -> list[Any]:
+    def _times(self, words: list[Value]) -> list[Value]:
         """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
         code, found, left = self.code, [], None
         factor = code.spread(self.made.args[7])
@@ -250,7 +250,7 @@ class Series:
             left = low
         return found
 
-    def _divided(self, n: Any, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
+    def _divided(self, n: Value, words: list[Value], wide: Value) -> tuple[list[Value], Value]:
         """Divided by n + 1, digit by digit: each remainder is exact and goes to the next word."""
         code, b = self.code, self.code.builder
         after = b.sitofp(b.add(n, code.integer(1)), DOUBLE)
@@ -299,11 +299,11 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> None:
     b, words = code.builder, grid.words
     kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, None, None, None, [])
 
-    def one(place: Any, _: list[Any]) -> None:
+    def one(place: Value, _: list[Value]) -> None:
         start = b.mul(place, code.integer(words))
         x = [code.spread(b.load(code.address(at, b.add(start, code.integer(k))))) for k in range(words)]
 
-        def term(k: Any, values: list[Any]) -> list[Any]:
+        def term(k: Value, values: list[Value]) -> list[Value]:
             found, largest = [], values[-1]
             for v in range(vectors):
                 product = bounded_product(code, grid, x, values[words * v : words * (v + 1)])
@@ -365,7 +365,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
 class _Advance(Stepping):
     """Writes ``advance``."""
 
-    def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Any) -> None:
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Value) -> None:
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, POINTER, POINTER, INT_POINTER, INT]
         made, code = function(module, "advance", INT, arguments)
         self.scratch, self.result = made.args[:7], made.args[7]
@@ -373,10 +373,10 @@ class _Advance(Stepping):
         super().__init__(code, clock, counts, most, STATUS)
         self.grid, self.size, self.series = grid, grid.words * vectors, series
 
-    def covered(self) -> Any:
+    def covered(self) -> Value:
         return self.code.builder.fcmp_ordered(">=", self.time(TIME), self.time(TARGET))
 
-    def write_step(self) -> Any:
+    def write_step(self) -> Value:
         """One step; whether it stands."""
         code, b = self.code, self.code.builder
         halvings = self.count(HALVINGS)
@@ -407,7 +407,7 @@ class _Advance(Stepping):
         self._set_length(good, orders, halvings, length)
         return good
 
-    def _set_length(self, good: Any, orders: Any, halvings: Any, length: Any) -> None:
+    def _set_length(self, good: Value, orders: Value, halvings: Value, length: Value) -> None:
         code, b, one = self.code, self.code.builder, self.code.integer(1)
         few, many = (code.integer(int(share * self.grid.total)) for share in (_FEW_ORDERS, _MANY_ORDERS))
         doubled = b.fadd(length, length)
@@ -427,7 +427,7 @@ def raises_of(exponent: int) -> tuple[float, int]:
     return 2.0 ** (exponent - 4 * raises), raises
 
 
-def _power(code: Code, halvings: Any) -> Any:
+def _power(code: Code, halvings: Value) -> Value:
     """2^-halvings."""
     b = code.builder
     return b.bitcast(b.shl(b.sub(code.integer(1023), halvings), code.integer(52)), DOUBLE)
