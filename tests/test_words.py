@@ -12,14 +12,14 @@ RULES = [
     if not line.startswith("#")
 ]
 REFUSED = re.compile("|".join(rf"\b(?:{phrase})\b" for phrase, _ in RULES), re.IGNORECASE)
-QUOTED = ("one might suspect", '"arithmetic": "whole numbers"')
-"""What a source says in its own words, and a documented value in the rows of a report."""
+QUOTED = ("one might suspect", '"arithmetic": "whole numbers"', "and no digit is left from t = {self.until} on")
+"""What a source says in its own words, and two texts in the rows of reports, which stay readable."""
 TEXTS = [
     *(
         path
         for folder in ("src", "docs", "examples")
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".md", ".toml", ".html")
+        if path.suffix in (".py", ".md", ".toml", ".html", ".j2")
     ),
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "results/README.md")),
 ]

@@ -255,7 +255,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             return self.method
         if self.how == "computed":
             agreed = f" agree within {self.radius}" if self.radius else ""
-            ends = f", and all significant digits are lost from t = {self.until} on" if self.until else ""
+            ends = f", and no digit is left from t = {self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
         said = ", for the first start; ".join(each.text for each in self.certificates)

@@ -1,0 +1,19 @@
+"""How many files a flow goes through: whoever follows one reads no more of them than before."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOPS = Path(__file__).parents[1] / "benchmarks" / "hops.py"
+MOST = {"drift": 70, "propagate": 17, "compare": 16, "reference": 27}
+
+
+@pytest.mark.parametrize("flow", MOST)
+def test_a_flow_goes_through_no_more_files_than_before(flow: str) -> None:
+    done = subprocess.run([sys.executable, HOPS, flow], capture_output=True, text=True, check=True, timeout=300)
+    said = re.match(rf"{flow}: (\d+) files, (\d+) without the mathematics\n", done.stdout)
+    assert said, done.stdout
+    assert int(said[2]) <= int(said[1]) <= MOST[flow]
