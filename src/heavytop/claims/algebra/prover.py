@@ -165,7 +165,7 @@ class Region:
         if all(tower.generators[i].kind == "symbol" for i in used(p)):
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
         if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
-            return self._has_parameters(p) and self._is_analytic(p) and self.is_for_no_parameters(p)
+            return False
         return any(self._is_nonzero_at(p, place) for place in self.places)
 
     def _has_parameters(self, p: Any) -> bool:
@@ -309,7 +309,10 @@ class Region:
                 all(map(self._is_thin_for_each, self._factors(square)))
                 if square is not None
                 else self.field.tower.signs.of(p).strict
-                or (self.is_for_no_parameters(p) and self.is_zero_nowhere_dense(p))
+                or (
+                    self.is_for_no_parameters(p)
+                    and (self.is_zero_nowhere_dense(p) or (self._has_parameters(p) and self._is_analytic(p)))
+                )
             )
         return self._thin_for_each[key]
 

@@ -18,6 +18,8 @@ from heavytop.claims.algebra.structure import Defined
 
 _ORDERS = 4
 """Derivatives that are looked at where a formula is no polynomial."""
+_MOST_OPERATIONS = 60
+"""Of a formula that is looked at."""
 _MAY_JUMP = (sympy.Abs, sympy.sign, sympy.DiracDelta, sympy.atan2)
 
 
@@ -35,7 +37,7 @@ def for_no_parameters(
     parameters = e.free_symbols & assumptions.parameters
     if not parameters:
         return True
-    if e.atoms(Defined):
+    if e.atoms(Defined) or sympy.count_ops(e) > _MOST_OPERATIONS:
         return False
     moving = sorted(e.free_symbols - parameters, key=str)
     if is_small_polynomial(e):
