@@ -1,6 +1,6 @@
-"""Makes docs/hardest-tops.md: the worst that a hunt finds for heyoka, multiword, DOP853 and a splitting.
+"""Makes results/hardest-tops.md: the worst that a hunt finds for heyoka, multiword, DOP853 and a splitting.
 
-python benchmarks/hardest_tops.py > docs/hardest-tops.md
+python benchmarks/hardest_tops.py > results/hardest-tops.md
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HUNTS = (("heyoka", 2000, 100), ("multiword", 500, 100), ("scipy:DOP853", 200, 2
 HEAD = """# The hardest tops
 What `heavytop hunt` finds for four integrators in double, made by
 [`benchmarks/hardest_tops.py`](../benchmarks/hardest_tops.py); the command above each part searches the same again.
-How a hunt searches, and what counts as explained, is in [hunt.md](hunt.md).
+How a hunt searches, and what counts as explained, is in [hunt.md](../docs/hunt.md).
 """
 
 

@@ -213,11 +213,11 @@ def test_a_third_party_integrator_cannot_silence_it() -> None:
     """Its descriptors are shut while it runs: the line goes out all the same."""
     script = """if True:
         import time
-        from heavytop.cli import output, progress
+        from heavytop.cli import output
         from heavytop.integrate.peers.contract import quiet
         output.prepare()
-        progress.SILENCE = 0.1
-        with progress.told_when_slow("run"), quiet():
+        output.SILENCE = 0.1
+        with output.told_when_slow("run"), quiet():
             time.sleep(0.5)
     """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

@@ -9,9 +9,11 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from contextlib import suppress
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from glob import glob
-from multiprocessing import current_process, spawn
+from multiprocessing import current_process, resource_tracker, spawn
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
 from threading import Lock, get_ident
@@ -36,7 +38,11 @@ class _Child(SpawnProcess):
     """A spawned process that is told nothing of the caller's script.
 
     A daemon of multiprocessing, such as the worker of Dask, may start one: it ends with its parent, however that ends.
+
+    mark: what its environment holds from the beginning, for :func:`kill_marked`; nothing where that is empty.
     """
+
+    mark = ""
 
     def start(self) -> None:
         config = current_process()._config  # type: ignore[attr-defined]
@@ -61,18 +67,47 @@ class _Child(SpawnProcess):
                 return data
 
             spawn.get_preparation_data = without_script
+            resource_tracker.ensure_running()  # which outlives the child, and so has no mark
             try:
-                return SpawnProcess._Popen(process_obj)
+                with _environment(process_obj.mark):
+                    return SpawnProcess._Popen(process_obj)
             finally:
                 spawn.get_preparation_data = prepare
+
+
+@contextmanager
+def _environment(mark: str) -> Iterator[None]:
+    """What is started meanwhile has the mark: a process shows the environment that it began with, forked ones too."""
+    if not mark:
+        yield
+        return
+    former = os.environ.get(MARK)
+    os.environ[MARK] = mark
+    try:
+        yield
+    finally:
+        if former is None:
+            del os.environ[MARK]
+        else:
+            os.environ[MARK] = former
 
 
 class ChildContext(SpawnContext):
     """In the place of ``multiprocessing.get_context("spawn")``: spawned, as a forked child would share the state of
     heyoka's compiler and threads, and without the caller's script.
+
+    mark: what the environment of its processes holds, for :func:`kill_marked`.
     """
 
-    Process = _Child
+    def __init__(self, mark: str = "") -> None:
+        super().__init__()
+        self._mark = mark
+
+    def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
+        """A process that is not yet started."""
+        child = _Child(*arguments, **options)
+        child.mark = self._mark
+        return child
 
 
 def new_mark() -> str:
@@ -80,10 +115,9 @@ def new_mark() -> str:
     return uuid4().hex
 
 
-def lead_group(mark: str) -> None:
-    """In a new process: it leads a process group of its own, and what it starts is marked for a :class:`Guard`."""
+def lead_group() -> None:
+    """In a new process: it leads a process group of its own."""
     os.setpgid(0, 0)
-    os.environ[MARK] = mark
 
 
 class Guard:
@@ -93,7 +127,7 @@ class Guard:
     ``setsid`` or becomes a daemon: what a process starts inherits its environment.  That takes a Linux /proc; elsewhere
     the group alone is killed.
 
-    group: the process group that it joins; a new one where that is 0.  mark: of :func:`lead_group`; else a new one.
+    group: the process group that it joins; a new one where that is 0.  mark: of :class:`ChildContext`; else a new one.
     """
 
     def __init__(self, group: int = 0, mark: str = "") -> None:
@@ -126,15 +160,36 @@ class Guard:
         """Kills every process of the group, the guard too, and those that left it."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.group, signal.SIGKILL)
-        for _ in range(_ROUNDS):
-            if not (left := _marked(self._mark)):
-                break
-            for process in left:
-                with suppress(ProcessLookupError, PermissionError):
-                    os.kill(process, signal.SIGKILL)
+        kill_marked(self._mark)
         self._shell.wait()
         with suppress(OSError):
             os.close(self._lifeline)
+
+
+def kill_marked(mark: str) -> None:
+    """Kills every process that has this mark, also where it has left its group or lost its parent."""
+    for _ in range(_ROUNDS):
+        if not (left := _marked(mark)):
+            break
+        for process in left:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(process, signal.SIGKILL)
+
+
+def end_pool(pool: ProcessPoolExecutor, guard: Guard | None, mark: str) -> None:
+    """Kills the processes of a pool, each the leader of a group, and whatever they started, however it left them.
+
+    Only then its threads end: they wait for pipes that a forked process holds too.
+    """
+    for process in list((pool._processes or {}).values()):
+        if process.pid is not None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+    if guard is not None:
+        guard.end()
+    kill_marked(mark)
+    pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _marked(mark: str) -> list[int]:

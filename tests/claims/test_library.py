@@ -10,7 +10,8 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.claims.audit.audit import audit, claim_from_table
+from heavytop.claims.audit import audit as auditing
+from heavytop.claims.audit.audit import claim_from_table
 from heavytop.claims.library import entry as entries
 from heavytop.suite import claim_library
 from support import in_process
@@ -52,7 +53,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     library = tmp_path / "library"
     library.mkdir()
     monkeypatch.setattr(entries, "FOLDER", library)
-    monkeypatch.setattr(audit, "FOLDER", library)
+    monkeypatch.setattr(auditing, "FOLDER", library)
     monkeypatch.setattr(claim_library, "FOLDER", library)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     put(library, HEAD | CLAIM | {"corrects": MISPRINT["id"], "aliases": ["Lagrange's spin"]})
@@ -112,19 +113,19 @@ def test_the_exit_code_tells_whether_verdicts_are_the_expected_ones(
 def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = ht.claim_library().verdicts
     calls: list[str] = []
-    audited = audit.audited
+    audited = auditing.audited
 
     def counted(entry: entries.Entry) -> Any:
         calls.append(entry.id)
         return audited(entry)
 
-    monkeypatch.setattr(audit, "audited", counted)
+    monkeypatch.setattr(auditing, "audited", counted)
     assert ht.claim_library().verdicts == first
     assert calls == []
     put(folder, HEAD | CLAIM | {"note": "Another note."})
     assert ht.claim_library().verdicts[HEAD["id"]].verdict == "holds"
     assert calls == [HEAD["id"]]
-    for kept in Path(str(audit._cache_folder())).glob("*.json"):  # damaged: read as nothing
+    for kept in Path(str(auditing._cache_folder())).glob("*.json"):  # damaged: read as nothing
         kept.write_bytes(kept.read_bytes()[:-7])
     assert ht.claim_library("lagrange").verdicts[MISPRINT["id"]].verdict == "refuted"
     assert sorted(calls[1:]) == sorted([HEAD["id"], MISPRINT["id"]])

@@ -214,6 +214,8 @@ def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:
         integrate(gyrostat.top, gyrostat.start, TIMES, DOUBLE, system=GYROSTAT)
     with pytest.raises(Unsupported, match="does not carry the attitude"):
         ht.propagate(CASE.top, CASE.start, [1], integrator=forward, xi=(0, 1, 0))
+    with pytest.raises(Unsupported, match="The integrator rk4 hands over no polynomial of its steps"):
+        ht.events(CASE.top, CASE.start, 1, "omega1", integrator=forward)
     with pytest.raises(PeerFailed, match="exit code 1"):  # any number of bits is sent
         integrate(CASE.top, CASE.start, TIMES, real(100))
 

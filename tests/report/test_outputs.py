@@ -20,7 +20,7 @@ from heavytop.precision import exact
 from heavytop.records import Law, Report, Series
 from heavytop.render.comparison import comparison
 from heavytop.render.export import comparison_junit, comparison_markdown
-from heavytop.render.history import history_json, history_page, history_text
+from heavytop.render.history import _ticks, history_json, history_page, history_text
 from heavytop.render.text import table
 from support.reports import compare, comparison_page, history, replace, report_page, summary
 from support.small_reports import error, report, row
@@ -222,3 +222,9 @@ def test_no_name_is_broken_inside_a_word_however_narrow_the_terminal(width: int)
     assert max(map(len, text.splitlines())) <= width
     for word in (*names, "double-double", "1.25e-13"):
         assert word in text
+
+
+def test_reports_of_one_folder_name_stand_by_their_number_on_the_axis() -> None:
+    found = report(row())
+    assert _ticks(["v1/out", "v2/out"], [found, found]) == ["1", "2"]
+    assert _ticks(["out/v1", "out/v2"], [found, found]) == ["v1", "v2"]

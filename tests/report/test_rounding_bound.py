@@ -161,6 +161,25 @@ def test_reruns_within_what_step_control_does_are_reproducible_and_excuse_no_mor
     assert judged(one("1e-14", 0.848), one("1e-12", 0.848))[0] == "same"
 
 
+@pytest.mark.parametrize(
+    ("value", "changes", "expected"),
+    [
+        ("3e-8", {}, "same"),  # within the loss
+        ("5e-8", {}, "worse"),  # beyond it, by no rounding of these steps
+        ("5e-8", {"evaluations": 6401}, "same"),  # a step was tried again: what step control does
+        ("2e-7", {"evaluations": 6401}, "worse"),  # and no more
+    ],
+)
+def test_where_every_step_is_the_same_one_no_step_control_is_allowed_for(value, changes, expected) -> None:
+    def third_party(value: str, **changes) -> Row:
+        same = {"measure": "work_precision", "integrator": "mine:rk4", "data": FREE, "evaluations": 6400}
+        return one(value, None, "drift_energy_max", **same | changes)
+
+    assert judged(third_party("1e-8"), third_party(value, **changes))[0] == expected
+    # two errors that the roundings of the steps bring apart
+    assert judged(third_party("1e-12"), third_party("8e-12"))[0] == "same"
+
+
 def test_an_escape_whose_reruns_part_excuses_nothing() -> None:
     def at(value: str, band: float) -> Row:
         metric = replace(error(value), kind="duration", band=band)

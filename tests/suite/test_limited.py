@@ -49,11 +49,22 @@ def stuck(given):  # in one call of C that holds the interpreter
     subprocess.Popen(["sleep", "987"], start_new_session=True)
     re.match("(a+)+$", 60 * "a" + "b")
 
+def leaves(given):  # a forked process of another session, which holds the pipes of this one
+    if child := os.fork():
+        (Path(__file__).parent / "left").write_text(str(child))
+    else:
+        os.setsid()
+    time.sleep(987)
+
+def interrupts(given):
+    raise KeyboardInterrupt
+
 forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])
 """
 PLAN = """name = "faults"
 row_timeout = "5"
-integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward"]
+integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward", "mine.py:leaves",
+    "mine.py:interrupts"]
 [[integrator]]
 name = "silent"
 command = ["{python}", "{program}", "silent"]
@@ -98,21 +109,24 @@ def gone(*words: str) -> bool:
 
 
 def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Path) -> None:
-    names = ("mine.py:solve", "mine.py:stuck", "silent")
+    names = ("mine.py:solve", "mine.py:stuck", "silent", "mine.py:leaves", "mine.py:interrupts")
     file = plan(tmp_path, *names)
     line = [sys.executable, "-m", "heavytop", "run", "--plan", str(file), "--out", str(tmp_path / "out")]
     done = subprocess.run([*line, "--workers", "1"], capture_output=True, text=True, timeout=240, check=False)
     assert (done.returncode, without_progress(done.stderr)) == (3, "")
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     outcomes = {row["integrator"]: row["outcome"] for row in report["rows"]}
-    expected = ("success", "out_of_time", "out_of_time")
+    expected = ("success", "out_of_time", "out_of_time", "out_of_time", "failed")
     assert outcomes == dict(zip(names, expected, strict=True))
     against = {row["integrator"]: row["against"] for row in report["rows"]}
     assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 5 s in euler"
+    assert against["mine.py:interrupts"] == "nothing: mine.py:interrupts raised KeyboardInterrupt in euler"
     assert "mine.py:stuck was stopped after 5 s in euler in double" in done.stdout
     assert report["environment"]["integrators"] == {"silent": "faulty 1.2"}
     for words in ((str(PROGRAM),), ("sleep", "987")):
         assert gone(*words)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "left").read_text()), 0)
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])

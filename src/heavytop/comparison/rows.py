@@ -17,6 +17,7 @@ from heavytop.comparison.noise import (
     Policy,
     RoundingBound,
     allowed_loss,
+    apart,
     irreproducible,
     noisier,
     of_starts,
@@ -391,7 +392,7 @@ class RowComparison:
         if why := irreproducible(metric, least_of[0], bound):
             return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
         known, found = of_starts(metric, old), of_starts(match, new)
-        noise = kind.assumed_band(old.key.subject) if metric.band is None else kind.least_band(old.starts)
+        noise = self._assumed(metric, match, old, new) if metric.band is None else kind.least_band(old.starts)
         if noise > (known.band or 0.0):
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
@@ -533,6 +534,21 @@ class RowComparison:
         kind = kind_of(old, self.kinds)
         largest = max(size(metric), size(match))
         return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
+
+    def _assumed(self, metric: Metric, match: Metric, old: Row, new: Row) -> float:
+        """Decades of the noise of a row without bands; none where the steps are the same ones, whose truncation step
+        control has not changed, and the two errors further apart than roundings of these steps bring them.
+        """
+        kind = kind_of(old, self.kinds)
+        noise = kind.assumed_band(old.key.subject)
+        counted = bool(old.steps and old.evaluations)
+        if not noise or not counted or (old.steps, old.evaluations) != (new.steps, new.evaluations):
+            return noise
+        low, high = sorted((size(metric), size(match)))
+        if metric.kind != "error" or math.isinf(low):
+            return noise
+        by_rounding = RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
+        return noise if by_rounding else 0.0
 
     def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
         """The same of what a series is largest."""

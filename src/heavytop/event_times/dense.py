@@ -15,11 +15,11 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
-from heavytop.errors import OutOfReach, Unsupported, quoted
+from heavytop.errors import OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
 from heavytop.integrate.heyoka.engines import load
 from heavytop.integrate.heyoka.motions import Stepper
-from heavytop.integrate.integrator import expected_steps
+from heavytop.integrate.integrator import expected_steps, name_of
 from heavytop.integrate.multiword.engines import choose
 from heavytop.integrate.multiword.engines import compiled as compile_words
 from heavytop.integrate.multiword.motions import OUTCOMES
@@ -283,7 +283,7 @@ def dense(
     made = _DENSE.get(integrator) if isinstance(integrator, str) else None
     if made is None:
         raise Unsupported(
-            f"The integrator {quoted(integrator)} hands over no polynomial of its steps.",
+            f"The integrator {name_of(integrator)} hands over no polynomial of its steps, so it locates no events.",
             f"Events are located by {' and '.join(_DENSE)}.",
         )
     end = exact(number(until, problem.precision))

@@ -152,11 +152,14 @@ def _made(report: AnyReport) -> tuple[str, str]:
 
 
 def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
-    """What stands on the axis for each report: heavytop's version where all differ, else the name of its folder."""
+    """What stands on the axis for each report: heavytop's version, else the name of its folder, else its number, the
+    first by which all differ.
+    """
     versions = [_made(report)[0] for report in reports]
     if all(versions) and len(set(versions)) == len(versions):
         return [clip(version, _NAME) for version in versions]
-    return [clip(PurePath(name).name or name, _NAME) for name in names]
+    folders = [clip(PurePath(name).name or name, _NAME) for name in names]
+    return folders if len(set(folders)) == len(folders) else [str(number) for number in range(1, len(names) + 1)]
 
 
 def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:

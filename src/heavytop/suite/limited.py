@@ -8,7 +8,6 @@ an integrator started does not outlive it.
 from __future__ import annotations
 
 import os
-import signal
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -20,7 +19,7 @@ from time import monotonic
 from typing import Any
 
 from heavytop.errors import OutOfTime
-from heavytop.processes import ChildContext, Guard, lead_group, new_mark
+from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.rows import Kind, Kinds, Task, begin_worker, died, ended_its_process, failed, measure
@@ -108,7 +107,7 @@ class _Worker:
         if self._pool is None:
             self._mark = new_mark()
             self._pool = ProcessPoolExecutor(
-                1, mp_context=ChildContext(), initializer=_begin, initargs=(self._mark, tuple(self._kinds.values()))
+                1, mp_context=ChildContext(self._mark), initializer=_begin, initargs=tuple(self._kinds.values())
             )
             self._hello = self._pool.submit(os.getpid)
         try:
@@ -131,20 +130,12 @@ class _Worker:
     def end(self) -> None:
         """Kills the process and whatever it started."""
         if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
-                if process.pid is not None:
-                    with suppress(ProcessLookupError, PermissionError):
-                        os.killpg(process.pid, signal.SIGKILL)
-                process.kill()
-        if self._guard is not None:
-            self._guard.end()
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+            end_pool(self._pool, self._guard, self._mark)
         self._pool = self._guard = self._hello = self.row = None
 
 
-def _begin(mark: str, kinds: tuple[Kind, ...]) -> None:
-    lead_group(mark)
+def _begin(*kinds: Kind) -> None:
+    lead_group()
     begin_worker(*kinds)
 
 
@@ -242,7 +233,9 @@ def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row |
     """The row of a worker that has ended or had to be; None where it goes on.  Raises BrokenProcessPool."""
     assert worker.row is not None
     if worker.row.done():
-        row = worker.row.result()
+        # a child leaves interrupts to this process, so one that comes from there was raised by its integrator
+        interrupted = isinstance(worker.row.exception(), KeyboardInterrupt)
+        row = failed(task, f"{task.key.subject.name} raised KeyboardInterrupt") if interrupted else worker.row.result()
         worker.row = None
         limits.finished(task, cost, monotonic() - worker.began)
         return row

@@ -243,9 +243,22 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
 
 
 def _amplification(problem: Problem, horizon: Fraction) -> float | None:
-    """That of the motion of a problem, to three digits; None for data beyond double."""
-    found = amplification(problem.system, problem.parameters, tuple(problem.start.flat), horizon)
+    """That of the motion of a problem, to three digits; None for data beyond double.
+
+    Of the data rounded to double: all formats of a case share one path.
+    """
+    try:
+        parameters = problem.parameters.mapped(_in_double)
+        start = tuple(map(_in_double, problem.start.flat))
+    except OverflowError:
+        return None
+    found = amplification(problem.system, parameters, start, horizon)
     return float(f"{found:.3g}") if math.isfinite(found) else None
+
+
+def _in_double(value: Fraction) -> Fraction:
+    """The nearest double; the value itself where that is 0.  Raises OverflowError beyond them."""
+    return Fraction(float(value)) or Fraction(value)
 
 
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:

@@ -8,9 +8,12 @@ the units of the data nor a renaming of the axes matters.  An estimate, not a bo
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
+from operator import itemgetter
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
@@ -61,12 +64,10 @@ def amplification(
         return 1.0
     try:
         span = float(scale * abs(horizon))
-        # backwards in time is forwards with the field reversed
-        linear, products = _taken_apart(system, parameters, scale if horizon > 0 else -scale)
-        state = [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)]
+        path = _path(system, parameters, start, horizon > 0)
     except OverflowError:
         return math.inf
-    largest, done = _followed(linear, products, state, span, steps)
+    largest, done = path.largest(span, steps)
     if done >= span or not done:
         return min(largest, _LARGEST)
     further = span / done
@@ -112,28 +113,66 @@ def _nearest(value: Any) -> float:
     return float(Fraction(int(value.numerator), int(value.denominator))) if value else 0.0
 
 
-def _followed(
-    linear: NDArray[Any], products: NDArray[Any], start: Sequence[float], span: float, steps: int
-) -> tuple[float, float]:
-    """The largest amplification up to ``span``, or as far as ``steps`` steps go, and how far that is."""
-    import numpy
+class _Path:
+    """A motion and its Φ, followed by full steps as far as anyone asked; every format and horizon shares it.
 
-    state, carried, time, largest = numpy.array(start), numpy.eye(6), 0.0, 1.0
-    flat = products.reshape(36, 6)
-    for _ in range(steps):
-        series = _series(linear, flat, state)
+    Each entry of ``steps``: the time after a step, the state, Φ, the largest amplification up to it.
+    """
+
+    def __init__(self, linear: NDArray[Any], products: NDArray[Any], start: Sequence[float]) -> None:
+        import numpy
+
+        self._linear, self._flat = linear, products.reshape(36, 6)
+        self._steps = [(0.0, numpy.array(start), numpy.eye(6), 1.0)]
+        self._ended = False
+        self._lock = Lock()
+
+    def largest(self, span: float, steps: int) -> tuple[float, float]:
+        """The largest amplification up to ``span``, or as far as ``steps`` steps go, and how far that is."""
+        with self._lock:
+            while not self._ended and self._steps[-1][0] < span and len(self._steps) <= steps:
+                self._advance()
+        place = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
+        if place == min(len(self._steps), steps + 1):
+            time, *_, largest = self._steps[place - 1]
+            return largest, time
+        before = self._steps[max(place - 1, 0)]
+        time, *_, largest = self._step(before, span - before[0]) or before
+        return largest, time
+
+    def _advance(self) -> None:
+        found = self._step(self._steps[-1], math.inf)
+        if found is not None:
+            self._steps.append(found)
+        self._ended = found is None or found[3] > FOLLOWED or found[0] == math.inf
+
+    def _step(self, before: _Step, most: float) -> _Step | None:
+        """One step, no longer than ``most``; None where Φ is beyond double or time stands still."""
+        import numpy
+
+        time, state, carried, largest = before
+        series = _series(self._linear, self._flat, state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
-        step = min(span - time, _TOLERANCE ** (1 / _ORDER) / last if last else span)
-        powers = step ** numpy.arange(_ORDER + 1)
-        there = numpy.tensordot(powers, series, 1)
+        step = min(most, _TOLERANCE ** (1 / _ORDER) / last if last else most)
+        if step == math.inf:
+            return math.inf, state, carried, largest
+        there = numpy.tensordot(step ** numpy.arange(_ORDER + 1), series, 1)
         state, carried = there[:, 0], there[:, 1:] @ carried
         size = math.sqrt(float((carried * carried).sum()) / 6)
         if not math.isfinite(size) or time + step == time:
-            break
-        time, largest = time + step, max(largest, size)
-        if time >= span or largest > FOLLOWED:
-            break
-    return largest, time
+            return None
+        return time + step, state, carried, max(largest, size)
+
+
+_Step = tuple[float, Any, Any, float]
+
+
+@lru_cache(maxsize=64)
+def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], forwards: bool) -> _Path:
+    """The path of a motion; backwards in time is forwards with the field reversed."""
+    scale = rate(system, parameters, start)
+    linear, products = _taken_apart(system, parameters, scale if forwards else -scale)
+    return _Path(linear, products, [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
 
 
 def _series(linear: NDArray[Any], flat: NDArray[Any], state: NDArray[Any]) -> NDArray[Any]:

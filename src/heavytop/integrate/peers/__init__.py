@@ -183,7 +183,7 @@ def available() -> dict[str, str | None]:
             try:
                 peer(name)
             except InputError as error:
-                found[name] = str(error)
+                found[name] = f"{error.cause} {error.remedy}"
     return found
 
 

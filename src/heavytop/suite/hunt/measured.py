@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import os
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -30,7 +29,7 @@ from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number, real, round_to
-from heavytop.processes import ChildContext, Guard, lead_group, new_mark
+from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.suite.sweeps import Random
 from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
@@ -85,7 +84,7 @@ class Apart:
     """
 
     def __init__(self, integrator: ChosenIntegrator, seconds: float = SECONDS) -> None:
-        self._integrator, self._seconds = integrator, seconds
+        self._integrator, self._seconds, self._mark = integrator, seconds, ""
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
 
@@ -96,7 +95,11 @@ class Apart:
                 self._begin()
             assert self._pool is not None
             asked = self._pool.submit(follow, self._integrator, top, start, times, precision)
-            return asked.result(timeout=self._seconds)
+            if isinstance(
+                asked.exception(timeout=self._seconds), KeyboardInterrupt
+            ):  # of the integrator, not of a user
+                return Run(FAILED, (), f"{self._integrator.name} raised KeyboardInterrupt")
+            return asked.result()
         except TimeoutError:
             self.end()
             return Run(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {self._seconds:.3g} s")
@@ -105,35 +108,27 @@ class Apart:
             return Run(FAILED, (), f"{self._integrator.name} ended its whole process")
 
     def _begin(self) -> None:
-        mark = new_mark()
-        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(), initializer=lead_group, initargs=(mark,))
+        self._mark = new_mark()
+        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(self._mark), initializer=lead_group)
         try:
             process = self._pool.submit(_hello, self._integrator).result(timeout=_BEGIN)
         except TimeoutError:
             self.end()
             raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
         with suppress(OSError):
-            self._guard = Guard(process, mark)
+            self._guard = Guard(process, self._mark)
 
     def end(self) -> None:
         """Kill the process and whatever it started."""
         pool, guard, self._pool, self._guard = self._pool, self._guard, None, None
         if pool is not None:
-            for process in list((pool._processes or {}).values()):
-                if process.pid is not None:
-                    with suppress(ProcessLookupError, PermissionError):
-                        os.killpg(process.pid, signal.SIGKILL)
-                process.kill()
-        if guard is not None:
-            guard.end()
-        if pool is not None:
-            pool.shutdown(wait=True, cancel_futures=True)
+            end_pool(pool, guard, self._mark)
 
 
 def _hello(integrator: ChosenIntegrator) -> int:
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
-    with suppress(HeavyTopError):
+    with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
         follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], _double())
     return os.getpid()
 
