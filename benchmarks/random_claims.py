@@ -2,8 +2,9 @@
 
 Every claim is made of a known true motion or first integral, in which parts are replaced by equal ones (roots,
 inverse functions, quotients, half angles, exponentials), and of mistakes: a wrong term, a jump, a formula that is
-nowhere real, a side condition that the flow does not keep.  mpmath evaluates the formulas as written, in real numbers,
-at random points, and takes the derivatives by differences: nothing of heavytop's algebra is used for it.
+nowhere real, a divisor that a parameter makes 0, a side condition that the flow does not keep.  mpmath evaluates the
+formulas as written, in real numbers, at random points, and takes the derivatives by differences: nothing of heavytop's
+algebra is used for it.
 
     python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1] [--traps]
 
@@ -275,8 +276,11 @@ def motion_claim(draw: random.Random) -> Claim:
     if kind < 0.5:
         return Claim(table, "true", make.__name__, about)
     if kind < 0.75:
-        motion[part][index] = f"{motion[part][index]} + {draw.choice(_WRONG)}"
-        return Claim(table, "false", make.__name__, about)
+        wrong = draw.choice(_WRONG)
+        motion[part][index] = f"{motion[part][index]} + {wrong}"
+        # an upright top spins at any constant rate
+        spins = make is _upright and (part, index) == ("omega", 2) and "t" not in wrong
+        return Claim(table, "true" if spins else "false", make.__name__, about)
     if kind < 0.85:
         motion[part][index] = f"{motion[part][index]} + {draw.choice(_NEVER)}"
         return Claim(table, "trap", "nowhere", about)
@@ -349,9 +353,20 @@ def integral_claim(draw: random.Random) -> Claim:
         return Claim(_integral(draw.choice(_FALSE_INTEGRALS).format(*pair), _STATES), "false", "integral")
     if kind < 0.8:
         return Claim(_integral(draw.choice(_TRAPS).format(*pair), _STATES), "trap", "integral")
-    if kind < 0.9:
+    if kind < 0.87:
         return _conditional(draw)
-    return _not_kept(draw)
+    return _not_kept(draw) if kind < 0.95 else _with_open_parameter(draw, pair)
+
+
+def _with_open_parameter(draw: random.Random, pair: list[str]) -> Claim:
+    """A first integral, divided and multiplied by what is 0 everywhere where u is 0: a trap unless that is excluded."""
+    divisor = draw.choice(["u", "u*Omega1", "sin(u*Omega2)", f"u*{pair[1]}", "(u^3 - 2*u^2)", "u*gamma3"])
+    table = _integral(f"{pair[0]}*{divisor}/({divisor})", _STATES)
+    table["parameters"] |= {"u": ["1/2", "3"]}
+    is_excluded = draw.random() < 0.5
+    if is_excluded:
+        table["assume"] = [*table["assume"], "u != 0", *(["u != 2"] if "u^3" in divisor else [])]
+    return Claim(table, "true" if is_excluded else "trap", "open parameter")
 
 
 def _conditional(draw: random.Random) -> Claim:

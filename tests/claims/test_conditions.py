@@ -250,3 +250,93 @@ def test_formulas_are_printed_as_files_have_them() -> None:
     said = [row.residual for row in report.rows] + [c.text for row in report.rows for c in row.conditions]
     assert any("^" in text for text in said)
     assert not any("**" in text for text in said)
+
+
+SPIN = {
+    "name": "spin",
+    "kind": "integral",
+    "parameters": {"g": ["1", "2"], "h": ["4", "-3"]},
+    "top": {"inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]},
+}
+UPRIGHT = SPIN | {"kind": "motion", "motion": {"gamma": ["0", "0", "1"]}}
+
+
+@pytest.fixture
+def unhurried(monkeypatch):
+    """As many seconds for assumptions that would decide as a busy machine takes."""
+    monkeypatch.setattr("heavytop.claims.audit.audit._SEARCH", 600.0)
+
+
+def _verdict(table: dict, assume: list[str]) -> tuple[str, dict[str, str]]:
+    report = audit_claim(claim_from_table(table | {"assume": assume}, "claim"))
+    return report.verdict, dict(report.deciding)
+
+
+def _spinning(value: str) -> dict:
+    """The claim that a formula is constant; or, of the time, that it is the spin of an upright top."""
+    if "Omega" in value:
+        return SPIN | {"integral": {"value": value}}
+    return UPRIGHT | {"motion": UPRIGHT["motion"] | {"omega": ["0", "0", value]}}
+
+
+@pytest.mark.parametrize(
+    ("value", "missing"),
+    [
+        ("Omega3*g/g", "g != 0"),
+        ("Omega3*(g*Omega1)/(g*Omega1)", "g != 0"),
+        ("Omega3/(g*Omega3)", "g != 0"),
+        ("Omega3*(g - h)*gamma1/((g - h)*gamma1)", "g - h != 0"),
+        ("Omega3 + 0*log(g^2)", "g^2 > 0"),
+        ("Omega3*sin(g*Omega1)/sin(g*Omega1)", "g > 0"),
+        ("Omega3*(g*Omega1 + h)/(g*Omega1 + h)", "g > 0"),
+        ("Omega3*(g*Omega1 + gamma1^2 + gamma2^2 + gamma3^2 - 1)/(g*Omega1)", "g != 0"),
+        ("1 + 0/(g*Omega3)", "g != 0"),
+        ("g*t/(g*t)", "g != 0"),
+        ("sin(g*t)/sin(g*t)", "g > 0"),
+        ("(g*t + h)/(g*t + h)", "g > 0"),
+    ],
+)
+@pytest.mark.usefixtures("unhurried")
+def test_a_divisor_that_is_0_all_over_for_some_parameters_is_not_removable(value: str, missing: str) -> None:
+    table = _spinning(value)
+    verdict, deciding = _verdict(table, [])
+    assert verdict == "undecided"
+    assert deciding[missing] == "holds"
+    assert _verdict(table, [missing])[0] == "holds"
+    if missing == "g > 0":
+        assert _verdict(table, ["g != 0"])[0] == "holds"
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["Omega3*(2*Omega1 + g)/(2*Omega1 + g)", "Omega3*(g*Omega1 + gamma1^2)/(g*Omega1 + gamma1^2)", "(t + g)/(t + g)"],
+)
+def test_a_divisor_that_no_parameters_make_0_all_over_is_removable(value: str) -> None:
+    assert _verdict(_spinning(value), [])[0] == "holds"
+
+
+@pytest.mark.parametrize("domain", ["all", "t<=0", "t>0"])
+def test_a_zero_of_a_divisor_is_removable_on_each_half_of_the_time(domain: str) -> None:
+    table = _spinning("sin(-g*t)/sin(-g*t)") | {"domain": domain}
+    assert _verdict(table, ["g != 0"])[0] == "holds"
+    assert _verdict(table, [])[0] == "undecided"
+
+
+@pytest.mark.usefixtures("unhurried")
+def test_what_is_assumed_to_be_unequal_is_of_no_sign() -> None:
+    table = SPIN | {"parameters": {"g": ["1", "2"]}, "integral": {"value": "Omega1*(sqrt(g^2) - g)"}}
+    assert _verdict(table, ["g != 0"]) == ("undecided", {"g > 0": "holds"})
+    for text in ("g != 1", "g != g", "2 != 2"):
+        with pytest.raises(InputError, match=f"breaks the assumption {text}"):
+            _verdict(table | {"parameters": {"g": ["1"]}}, [text])
+    for text in ("g !=", "!= 0", "g != 0 != 1", "g ! 0", "g != 0 > 1"):
+        with pytest.raises(InputError):
+            _verdict(table, [text])
+
+
+def test_components_of_gamma_lie_between_minus_1_and_1() -> None:
+    for value, verdict in (("sin(asin(gamma1)) - gamma1", "holds"), ("sin(asin(2*gamma1)) - 2*gamma1", "undecided")):
+        assert _verdict(SPIN | {"integral": {"value": value}}, [])[0] == verdict
+    for value in ("asin(sin(Omega1)) - Omega1", "sqrt(Omega3^2) - Omega3 + 0*Omega1"):
+        top = SPIN["top"] | {"inertia": ["2", "3", "4"], "centre": ["1", "1", "1"]}
+        assert _verdict(SPIN | {"top": top, "integral": {"value": value}}, [])[0] == "refuted"

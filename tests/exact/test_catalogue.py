@@ -25,7 +25,7 @@ from heavytop.exact.catalogue import find, matches, table
 from heavytop.exact.closed_form import ALL, ClosedForm, Renamed, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.precision import round_to
-from heavytop.top.equations import GYROSTAT
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_solves
 
@@ -169,3 +169,18 @@ def test_data_of_any_length_are_refused_in_words():
     third = round_to(Fraction(1, 3), 20_000)
     top = HeavyTop((3 + third, 2, 1), 1, (third, 0, third))
     assert list(matches(top, State((third, 1, third), (third, third, third)))) == []
+
+
+@pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
+def test_a_rotor_without_momentum_leaves_the_closed_forms_of_the_heavy_top(case):
+    motion = SAMPLES[case]
+    data = motion.top.inertia, motion.top.weight, motion.top.centre
+    own = find(HeavyTop(*data), motion.start)
+    for top in (HeavyTop(*data), HeavyTop(*data, (0, 0, 0))):
+        found = find(top, motion.start, HEAVY_GYROSTAT)
+        assert not isinstance(found, Validated), found.method
+        pairs = zip(found.state(F(7, 3), 100), own.state(F(7, 3), 100), strict=True)
+        assert all(ours.overlaps(theirs) for ours, theirs in pairs)
+    turned = HeavyTop(*data, (0, F(1, 10**9), 0))
+    kept = {type(each).__name__ for each in matches(turned, motion.start, HEAVY_GYROSTAT)}
+    assert kept <= {"ZhukovskyVolterra", "Staude", "LagrangeGyrostat", "Renamed"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from random import Random as Dice
 
@@ -28,7 +29,7 @@ from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
 from heavytop.suite.rows import failed
 from heavytop.suite.survey import measured as records
-from heavytop.suite.survey.gathered import gathered
+from heavytop.suite.survey.gathered import gathered, read_chunk
 from heavytop.suite.survey.measured import chunks, drawn
 from heavytop.suite.sweeps import Grid, Random
 from support.in_process import heavytop
@@ -161,6 +162,19 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     assert compare(none, none, Policy()).verdict == "same"
 
 
+def test_records_do_not_depend_on_where_chunks_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def recorded(count: int, size: int) -> list[list[dict[str, object]]]:
+        monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", size)
+        rows = [KINDS["survey"].measure(task, Saved()) for task in read(str(plan(tmp_path, count)), KINDS)[2]]
+        return [read_chunk(row.chunk).to_pylist() for row in rows]  # type: ignore[arg-type]
+
+    (whole,) = recorded(9, 9)
+    for count in (1, 3, 4, 5, 8, 9):
+        parts = recorded(count, 4)
+        assert [len(part) for part in parts] == [4] * (count // 4) + [count % 4] * (count % 4 > 0)
+        assert list(chain.from_iterable(parts)) == whole[:count]
+
+
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 3)
     file, whole, half = plan(tmp_path, 6), tmp_path / "whole", tmp_path / "half"
@@ -257,6 +271,7 @@ def _surveyed(folder: Path, monkeypatch: pytest.MonkeyPatch, fault: float = 0.0,
     file = plan(folder, 80)
     with monkeypatch.context() as patch:
         patch.setattr(records, "_runs", faulty)
+        patch.setattr("heavytop.api.run_folder.page.write_report", lambda *given: None)
         ht.run(file, folder / "out", workers=1)
     return folder / "out"
 

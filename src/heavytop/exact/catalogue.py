@@ -144,6 +144,7 @@ def table() -> list[tuple[str, str, str, str]]:
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
     """Every closed form of this motion, the simplest first; none for a motion that has none here.
 
+    A heavy gyrostat whose rotor has no momentum has those of the heavy top too.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     yield from (found for found in _attempts(top, start, system) if not isinstance(found, LevelNotDone))
@@ -165,6 +166,9 @@ def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolu
                 continue
             yield found if axes == _KEEP[0] else Renamed(found, inverse(axes))
             break
+    if system is HEAVY_GYROSTAT and not any(top.rotor or ()):
+        # with k = 0 the motion is one of the top without a rotor
+        yield from _attempts(HeavyTop(top.inertia, top.weight, top.centre), start, HEAVY_TOP)
 
 
 def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:

@@ -101,6 +101,7 @@ class Field:
         self._transcendental = Transcendental(self, self._divisors)
         a = self.assumptions
         solved = {solution.symbol for solution in a.solved}
+        self._ranges = {symbol: ends for symbol, ends in a.ranges if symbol not in solved}
         for symbol in a.positive:
             if symbol != a.variable and symbol not in solved:
                 self._add(symbol, sign=Sign(1, True))
@@ -109,9 +110,6 @@ class Field:
         for symbol in a.nonzero:
             if symbol not in solved:
                 self._add(symbol, sign=Sign(0, True))
-        for symbol, ends in a.ranges:
-            if symbol not in solved:
-                self.tower.signs.ranges[_index(self.enter(symbol))] = ends
         facts = [(fact, True) for fact in (*a.facts, *(symbol for symbol in a.positive if symbol in solved))]
         for symbol, bound in a.greater:
             if solved & {symbol, *bound.free_symbols}:
@@ -152,6 +150,8 @@ class Field:
         index = self.tower.add(meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind)
         self._expressions[index] = meaning
         self._known[meaning] = self.tower.polynomial(self.tower.gens[index])
+        if meaning in self._ranges:
+            self.tower.signs.ranges[index] = self._ranges[meaning]
         return index
 
     def means(self, index: int, meaning: sympy.Expr) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -19,6 +20,7 @@ from heavytop.claims.algebra.rational import Quotient
 from heavytop.claims.algebra.signs import NUMBER_BITS, PLUS, Unprovable, used
 from heavytop.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
 from heavytop.claims.algebra.structure import sign_of
+from heavytop.claims.algebra.vanishing import for_no_parameters, is_never_zero
 from heavytop.exact.flint.balls import working_precision
 from heavytop.precision import shown
 
@@ -41,13 +43,13 @@ _SOME_STATE = {
 class Condition:
     """A condition of a proof: whether it is discharged, and how, or what stands against it.
 
-    positive: the formula that has to be > 0 for it, where it is one of the parameters alone.
+    assumption: what would discharge it, where that is about the parameters alone.
     """
 
     text: str
     discharged: bool
     reason: str
-    positive: str = ""
+    assumption: str = ""
 
 
 class Region:
@@ -60,6 +62,7 @@ class Region:
         self._flow = statement.flow
         self.places = [place for place in places if self._holds(place)]
         self._thin: dict[str, bool] = {}
+        self._thin_for_each: dict[str, bool] = {}
         self._kept: dict[str, bool] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
         self._needs = statement.formulas.needs
@@ -154,10 +157,9 @@ class Region:
         return self._thin[key]
 
     def _is_thin(self, p: Any) -> bool:
-        tower = self.field.tower
-        index = next(iter(used(p)))
-        if len(used(p)) == 1 and p == tower.gens[index] and tower.generators[index].kind == "root":
-            return self.is_zero_nowhere_dense(tower.radicand(index))
+        tower, square = self.field.tower, self._square(p)
+        if square is not None:
+            return self.is_zero_nowhere_dense(square)
         if tower.signs.of(p).strict:
             return True
         if all(tower.generators[i].kind == "symbol" for i in used(p)):
@@ -166,19 +168,26 @@ class Region:
             return False
         return any(self._is_nonzero_at(p, place) for place in self.places)
 
-    def is_connected(self, indices: set[int]) -> bool:
-        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them."""
+    def _has_parameters(self, p: Any) -> bool:
+        inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
+        return bool(inside & self._setting.parameters)
+
+    def is_connected(self, indices: set[int], fixed: Collection[sympy.Symbol] = ()) -> bool:
+        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them.
+
+        fixed: symbols that do not move.
+        """
         a = self.field.assumptions
         bounds = [bound for bound in a.bounds() if bound.free_symbols]
         zeros = [relation for relation in a.relations if relation not in self._always]
-        near = set().union(*(self.field.meaning(index).free_symbols for index in indices))
-        bound_together = [e.free_symbols for e in (*bounds, *zeros, *self._always)]
+        near = set().union(*(self.field.meaning(index).free_symbols for index in indices)).difference(fixed)
+        bound_together = [e.free_symbols.difference(fixed) for e in (*bounds, *zeros, *self._always)]
         while more := set().union(*(symbols for symbols in bound_together if symbols & near)) - near:
             near |= more
         cut = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
         round_ = set().union(*(zero.free_symbols for zero in self._always))
         return not near & cut and all(
-            not bound.free_symbols & round_ and is_small_polynomial(bound) and sympy.Poly(bound).total_degree() <= 1
+            not bound.free_symbols & round_ and is_small_polynomial(bound) and _degree(bound, fixed) <= 1
             for bound in bounds
             if bound.free_symbols & near
         )
@@ -217,10 +226,22 @@ class Region:
         """How it is discharged all over the region; "" where it is not."""
         if self.fails_everywhere(need):
             return ""
-        on_relations = on_conditions(need.expression, [*self._setting.relations, *self._always])
-        return self._discharge(need) or (
-            self._discharge(replace(need, expression=on_relations)) if on_relations != need.expression else ""
-        )
+        on_relations = self._on_relations(need)
+        how = self._discharge(need) or (self._discharge(on_relations) if on_relations != need else "")
+        return "" if how == KEPT and not self.is_met_for_each(need) else how
+
+    def _on_relations(self, need: Need) -> Need:
+        return replace(need, expression=on_conditions(need.expression, [*self._setting.relations, *self._always]))
+
+    def is_met_for_each(self, need: Need) -> bool:
+        """Where it asks that its expression is not 0: it is so somewhere, for any values of the parameters."""
+        if need.kind is not Kind.NONZERO:
+            return True
+        try:
+            value = self.field.enter(self._on_relations(need).expression)
+        except Unprovable:
+            return not need.expression.free_symbols & self._setting.parameters
+        return bool(value.numerator) and all(map(self.is_for_no_parameters, self._factors(value.numerator)))
 
     def fails_everywhere(self, need: Need) -> str:
         """What its expression is at every state of a body, where that does not meet it; else ""."""
@@ -266,7 +287,7 @@ class Region:
         )
 
     def is_removable(self, need: Need) -> bool:
-        """It fails on a set without interior at most."""
+        """It fails, for any values of the parameters, on a set without interior at most."""
         if self._setting.relations:  # on them it may fail all over
             return False
         try:
@@ -274,7 +295,69 @@ class Region:
         except Unprovable:
             return False
         weak = need.kind is Kind.NONZERO or self.field.tower.sign(value).value > 0
-        return weak and bool(value.numerator) and self.is_zero_nowhere_dense(value.numerator)
+        return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
+
+    def _factors(self, p: Any) -> list[Any]:
+        return [factor for factor, _ in self.field.tower.signs.factors(p)[1]]
+
+    def _is_thin_for_each(self, p: Any) -> bool:
+        """0 on a set without interior at most, whatever the parameters are."""
+        key = str(p)
+        if key not in self._thin_for_each:
+            square = self._square(p)
+            self._thin_for_each[key] = (
+                all(map(self._is_thin_for_each, self._factors(square)))
+                if square is not None
+                else self.field.tower.signs.of(p).strict
+                or (
+                    self.is_for_no_parameters(p)
+                    and (self.is_zero_nowhere_dense(p) or (self._has_parameters(p) and self._is_analytic(p)))
+                )
+            )
+        return self._thin_for_each[key]
+
+    def _square(self, p: Any) -> Any:
+        """The radicand of a polynomial that is a root by itself; None of another."""
+        tower, (index, *others) = self.field.tower, sorted(used(p))
+        alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
+        return tower.radicand(index) if alone else None
+
+    def _is_analytic(self, p: Any) -> bool:
+        """In what moves, over a domain in one piece."""
+        return self.is_connected(used(p), fixed=self._setting.parameters) and not (
+            self.everywhere.obstacle_of_generators(used(p), analytic=True)
+        )
+
+    def is_for_no_parameters(self, p: Any) -> bool:
+        """True only where p is 0 all over the region for no values of the parameters."""
+        flow, domain = self._statement.flow, self._statement.domain
+        try:
+            e = self.field.expression(Quotient(p, self.field.tower.one))
+        except Unprovable:
+            return False
+        if flow is not None:
+            state = {symbol: sympy.Rational(_SOME_STATE[str(symbol)]) for symbol in flow.state - flow.names.keys()}
+            at_rest = {symbol: value for symbol, value in state.items() if str(symbol).startswith("gamma")}
+            points = [{**state, **dict.fromkeys(state.keys() - at_rest.keys(), sympy.S.Zero), **at_rest}, state]
+            return for_no_parameters(e.xreplace(dict(flow.names)), self.field.assumptions, points, self._always)
+        # bounds of the variable may hold parameters, and no point lies within all of them
+        times = () if domain.facts else (0, *domain.points)
+        points = [{self._setting.variable: sympy.Rational(time)} for time in times]
+        return for_no_parameters(e, self.field.assumptions, points)
+
+    def assumption_for(self, need: Need) -> str:
+        """What, assumed of the parameters, would discharge it, or leave zeros that are removable; "" for nothing."""
+        parameters = self._setting.parameters
+        open_part = need.expression if need.expression.free_symbols <= parameters else None
+        if open_part is None and need.kind is Kind.NONZERO:
+            with suppress(Unprovable):
+                factors = self._factors(self.field.enter(need.expression).numerator)
+                parts = [self.field.expression(Quotient(f, self.field.tower.one)) for f in factors]
+                alone = [part for part in parts if part.free_symbols <= parameters]
+                open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
+        if open_part is None or not open_part.free_symbols:
+            return ""
+        return written(f"{open_part} {'!=' if need.kind is Kind.NONZERO else '>'} 0")
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
         """What stands against the values being real and continuous all over the region."""
@@ -306,6 +389,10 @@ class Region:
             tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)
             for factor, _ in tower.signs.factors(p)[1]
         )
+
+
+def _degree(bound: sympy.Expr, fixed: Collection[sympy.Symbol]) -> int:
+    return int(sympy.Poly(bound, *bound.free_symbols.difference(fixed)).total_degree())
 
 
 _CONTINUOUS = "the formulas are real and continuous all over the domain"
@@ -486,7 +573,8 @@ class Prover:
         against = whole.obstacle(moving), inner.obstacle(f.attitude)
         continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
         found = {
-            need: whole.discharge(need) or (KEPT if _is_kept(need.expression, statement) else "")
+            need: whole.discharge(need)
+            or (KEPT if _is_kept(need.expression, statement) and whole.is_met_for_each(need) else "")
             for need in _sorted(f.needs | f.angle_needs)
         }
         for need, how in found.items():
@@ -494,10 +582,7 @@ class Prover:
                 found[need] = _AT_THE_END
             elif not how and continuous and inner.is_removable(need):
                 found[need] = _REMOVABLE
-        conditions = [
-            Condition(need.text, bool(how), how or whole.fails_everywhere(need) or "not shown", self._bound(need))
-            for need, how in found.items()
-        ]
+        conditions = [_condition(need, how, whole) for need, how in found.items()]
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
@@ -505,18 +590,21 @@ class Prover:
             conditions.append(Condition(f.pole, continuous, "removable in gamma" if continuous else "not shown"))
         return [*conditions, *self._kept(statement, whole)]
 
-    def _bound(self, need: Need) -> str:
-        """The formula that has to be > 0 for the condition, where it is one of the parameters alone; "" for others."""
-        names = {str(symbol) for symbol in need.expression.free_symbols}
-        moving = {str(self._setting.variable), *(f"{name}{axis}" for name in ("Omega", "gamma") for axis in (1, 2, 3))}
-        return written(str(need.expression)) if names and not names & moving else ""
-
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""
         for text, rate in statement.flow.kept if statement.flow is not None else ():
             against = region.leaves(rate)
             reason = against or "its rate is a combination of the conditions"
             yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
+
+
+def _condition(need: Need, how: str, region: Region) -> Condition:
+    """On what the formulas need, discharged in this way; "" where it is not."""
+    if how:
+        return Condition(need.text, True, how)
+    missing = region.assumption_for(need)
+    reason = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
+    return Condition(need.text, False, region.fails_everywhere(need) or reason, missing)
 
 
 def _missed(statement: Statement, setting: Setting) -> str:

@@ -279,7 +279,7 @@ def _multiplied(a: Size, b: Size) -> Size:
     return Size(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
 
 
-# What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1"]``.
+# What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.
 
 
 Bound = tuple[sympy.Expr, sympy.Expr]
@@ -304,15 +304,42 @@ def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
     sign = ">" if ">" in text else "<"
     parts = [part.strip() for part in text.split(sign)]
     if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
-        raise InputError(f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula.")
+        raise InputError(
+            f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula, or formula != formula."
+        )
     links = list(pairwise(parts))
     return links if sign == ">" else [(right, left) for left, right in links]
 
 
+def inequalities(texts: Iterable[str]) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """What ``assume`` says: the (larger, smaller) of its comparisons, and both sides of each ``formula != formula``.
+
+    Raises InputError for anything else.
+    """
+    above: list[tuple[str, str]] = []
+    apart: list[tuple[str, str]] = []
+    for text in texts:
+        left, sign, right = (part.strip() for part in text.partition("!="))
+        if not sign:
+            above += comparisons(text)
+        elif left and right and not set("<>=!") & {*left, *right}:
+            apart.append((left, right))
+        else:
+            raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
+    return above, apart
+
+
 def assume(
-    bounds: Sequence[Bound], needs: Iterable[Need], moments: Iterable[sympy.Expr], symbols: Iterable[sympy.Symbol]
+    bounds: Sequence[Bound],
+    needs: Iterable[Need],
+    moments: Iterable[sympy.Expr],
+    symbols: Iterable[sympy.Symbol],
+    apart: Iterable[Bound] = (),
 ) -> Assumed:
-    """What follows from left > right of each bound, from what these need to be real, and from positive moments."""
+    """What follows from left > right of each bound, from what these need to be real, and from positive moments.
+
+    apart: the sides of what is assumed to be unequal.
+    """
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
@@ -335,6 +362,7 @@ def assume(
     asked = sorted(needs, key=lambda need: need.text)
     facts += [need.expression for need in asked if need.kind is Kind.POSITIVE]
     facts += [need.expression**2 for need in asked if need.kind is Kind.NONZERO]
+    facts += [(left - right) ** 2 for left, right in apart]
     weak = tuple(need.expression for need in asked if need.kind is Kind.NONNEGATIVE)
     return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
 

@@ -155,13 +155,14 @@ def would_decide(claim: Auditable, about: System, rows: Sequence[Row], seconds: 
     """
     if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
         return ()
-    open_ones = [c.positive for row in rows for c in row.conditions if c.positive and not c.discharged]
+    missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
     found: list[tuple[str, str]] = []
     began = perf_counter()
-    for formula in dict.fromkeys([*claim.unassumed, *open_ones]):
+    for bound in dict.fromkeys([*missing, *(f"{name} > 0" for name in claim.unassumed)]):
         if perf_counter() - began + 2 * seconds > _SEARCH or len(found) == _MOST_FOUND:
             break
-        bound = f"{formula} > 0"
+        if (bound.replace(">", "!="), "holds") in found:  # more than is needed
+            continue
         try:
             other = claim.assuming(bound)
             verdict = verdict_of(judge(other.statements(about), other.setting))
@@ -229,8 +230,6 @@ def _verdict(found: Audit) -> Verdict:
 @cache
 def own_system(name: str) -> str:
     """The system that an entry is about, by its file."""
-    pass  # REGROUP
-
     return read_claim(FOLDER / f"{name}.toml").about(None).name
 
 

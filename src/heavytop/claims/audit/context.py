@@ -24,7 +24,7 @@ from heavytop.claims.algebra.conditions import (
 )
 from heavytop.claims.algebra.evaluate import evaluate
 from heavytop.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
-from heavytop.claims.algebra.reader import Assumed, Formula, assume, comparisons, parse, symbol
+from heavytop.claims.algebra.reader import Assumed, Bound, Formula, assume, comparisons, inequalities, parse, symbol
 from heavytop.claims.algebra.signs import Unprovable
 from heavytop.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Setting
 from heavytop.claims.algebra.structure import rate_along
@@ -280,7 +280,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     for name in (*content.parameters, *content.definitions):
         if name in reserved or (name in content.parameters and name in content.definitions):
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
-    above = [link for text in content.assume for link in comparisons(text)]
+    above, apart = inequalities(content.assume)
     tensor = read_tensor(content.top.inertia)
     # the moments of inertia of a top are positive, said or not
     positive = {left for left, right in above if right == "0"} | {text.strip() for text in tensor.diagonal}
@@ -292,8 +292,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         names[name] = parse(text, names, f"definition of {name}")
-    sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in above]
-    bounds = [(left.expression, right.expression) for left, right in sides]
+    sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in (*above, *apart)]
+    pairs = [(left.expression, right.expression) for left, right in sides]
+    bounds, unequal = pairs[: len(above)], pairs[len(above) :]
     top = content.top
     moments = [parse(text, names, "top.inertia") for text in tensor.texts]
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
@@ -311,7 +312,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     context = Context(
         names,
         symbols,
-        assume(bounds, needs_of(side for link in sides for side in link), minors(inertia), symbols.values()),
+        assume(bounds, needs_of(side for link in sides for side in link), minors(inertia), symbols.values(), unequal),
         tuple(
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
@@ -325,7 +326,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         frozenset() if rotor is None else rotor.needs,
         tuple(part.expression for part in carried) or None,
     )
-    _check_samples(context, bounds)
+    _check_samples(context, bounds, unequal)
     return context
 
 
@@ -361,13 +362,16 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
-def _check_samples(context: Context, bounds: list[tuple[sympy.Expr, sympy.Expr]]) -> None:
+def _check_samples(context: Context, bounds: Sequence[Bound], unequal: Sequence[Bound]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in context.samples:
         shown = ", ".join(f"{name} = {value}" for name, value in sample.items())
         for left, right in bounds:
             if not _at(left - right, sample) > 0:
                 raise InputError(f"The sample {shown} breaks the assumption {left} > {right}.", "Change the sample.")
+        for left, right in unequal:
+            if is_exactly_zero(left - right, sample) is not False:
+                raise InputError(f"The sample {shown} breaks the assumption {left} != {right}.", "Change the sample.")
         for relation in context.relations:
             if is_exactly_zero(relation, sample) is False:
                 raise InputError(f"The sample {shown} breaks the relation {relation} = 0.", "Change the sample.")
@@ -448,8 +452,8 @@ class FileClaim:
 
     @property
     def unassumed(self) -> list[str]:
-        """Parameters that stand in no assumption."""
-        words = set(re.findall(r"\w+", " ".join(self.content.assume)))
+        """Parameters of whose sign no assumption says anything."""
+        words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
         return [name for name in self.content.parameters if name not in words]
 
     def assuming(self, bound: str) -> Self:

@@ -288,7 +288,12 @@ class _Search:
 
 
 Rate = Callable[[sympy.Expr], sympy.Expr]
-_STATES = (("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"), ("1", "2", "-1", "3/5", "0", "4/5"))
+_STATES = (
+    ("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"),
+    ("1", "2", "-1", "3/5", "0", "4/5"),
+    # of other signs, and beyond the first period of an angle
+    ("-4", "-7/2", "9/2", "-2/7", "6/7", "-3/7"),
+)
 # states of our own, where a file gives none
 _ENOUGH = 3
 _BITS = 192
@@ -341,7 +346,8 @@ class UserIntegral(FileClaim):
         conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
         samples = tuple({**row, **state} for row in self.context.samples for state in self._states(conditions, row))
         relations = (*base.relations, *conditions)
-        return replace(base, samples=samples, relations=(*relations, _OFF_SPHERE) if relations else ())
+        ranges = (*base.ranges, *((component, (Fraction(-1), Fraction(1))) for component in STATE[3:]))
+        return replace(base, samples=samples, relations=(*relations, _OFF_SPHERE) if relations else (), ranges=ranges)
 
     @property
     def _zero(self) -> tuple[Formula, ...]:
