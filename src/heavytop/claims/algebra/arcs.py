@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from math import gcd
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import sympy
-from flint import arb, fmpz_mat
+from flint import arb, fmpq_mpoly, fmpz_mat
 
 from heavytop.claims.algebra.evaluate import evaluate
 from heavytop.claims.algebra.rational import Quotient
@@ -42,9 +42,9 @@ class Arcs:
         self._region = region
         self._known = 0
         self._free: list[int] = []
-        self._forms: dict[int, Any] = {}
+        self._forms: dict[int, fmpq_mpoly] = {}
 
-    def without(self, p: Any) -> Any:
+    def without(self, p: fmpq_mpoly) -> fmpq_mpoly:
         """A polynomial that is ``p`` all over the region, in fewer inverse functions."""
         tower = self._region.field.tower
         self._look_for_more()
@@ -66,7 +66,7 @@ class Arcs:
                 else:
                     self._forms[index] = form
 
-    def _form_of(self, index: int) -> Any | None:
+    def _form_of(self, index: int) -> fmpq_mpoly | None:
         """Inverse function ``index`` through those before it and π; None where there is no such relation."""
         field = self._region.field
         is_log = field.tower.generators[index].kind == "log"
@@ -87,7 +87,7 @@ class Arcs:
                 total += gens[arc] * factor
         return total / -weights[index]
 
-    def _form_of_logarithm(self, logarithms: list[int]) -> Any | None:
+    def _form_of_logarithm(self, logarithms: list[int]) -> fmpq_mpoly | None:
         """The last logarithm through the others: a product of powers of what they are taken of is 1."""
         tower = self._region.field.tower
         factors = _integer_relation([self._values(index) for index in logarithms])

@@ -11,7 +11,7 @@ from math import comb, prod
 from typing import Any
 
 import sympy
-from flint import arb
+from flint import arb, fmpq_mpoly
 
 from heavytop.claims.algebra.evaluate import evaluate, wpinverse
 from heavytop.claims.algebra.fields import Assumptions, Field, Solution
@@ -338,7 +338,7 @@ def _solve(relation: sympy.Expr, known: Assumptions, parameters: Collection[symp
     return min(solutions, key=lambda s: (s.radicand is not None, sympy.count_ops(s.value)), default=None)
 
 
-def _factors_with_zeros(field: Field, p: Any) -> list[Any]:
+def _factors_with_zeros(field: Field, p: fmpq_mpoly) -> list[fmpq_mpoly]:
     """The factors of ``p`` that may be 0, but for those that are 0 at points where another is."""
     signs = field.tower.signs
     factors = [factor for factor, _ in signs.factors(p)[1] if not signs.of(factor).strict]
@@ -348,13 +348,13 @@ def _factors_with_zeros(field: Field, p: Any) -> list[Any]:
     return [*others, *(factor for factor in isolated if not any(_is_zero_there(other, factor) for other in others))]
 
 
-def _is_zero_there(p: Any, form: Any) -> bool:
+def _is_zero_there(p: fmpq_mpoly, form: fmpq_mpoly) -> bool:
     """``p`` is 0 where the generators of ``form`` are."""
     indices = used(form)
     return all(any(monomial[index] for index in indices) for monomial in p.to_dict())
 
 
-def _is_zero_at_origin_alone(p: Any) -> bool:
+def _is_zero_at_origin_alone(p: fmpq_mpoly) -> bool:
     """A form in two generators that is irreducible and has no real direction in which it is 0."""
     indices = sorted(used(p))
     terms = p.to_dict()
@@ -366,7 +366,9 @@ def _is_zero_at_origin_alone(p: Any) -> bool:
     return bool(line.degree() == degrees.pop() and line.eval(0) != 0 and line.count_roots() == 0)
 
 
-def _solutions(field: Field, p: Any, relation: sympy.Expr, parameters: Collection[sympy.Symbol]) -> Iterator[Solution]:
+def _solutions(
+    field: Field, p: fmpq_mpoly, relation: sympy.Expr, parameters: Collection[sympy.Symbol]
+) -> Iterator[Solution]:
     """The solutions of p = 0 for each of the parameters in it."""
     tower = field.tower
     zero = tower.context.constant(0)
@@ -387,7 +389,7 @@ def _solutions(field: Field, p: Any, relation: sympy.Expr, parameters: Collectio
                 yield Solution(symbol, sign.value * sympy.sqrt(square, evaluate=False), relation, square)
 
 
-def _occurs_inside(field: Field, index: int, p: Any) -> bool:
+def _occurs_inside(field: Field, index: int, p: fmpq_mpoly) -> bool:
     """Whether a root or a function in ``p`` holds the generator."""
     generators = [field.tower.generators[i] for i in used(p)]
     inner = [

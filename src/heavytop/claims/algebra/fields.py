@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 import sympy
+from flint import fmpq_mpoly
 
 from heavytop.claims.algebra.evaluate import evaluate
 from heavytop.claims.algebra.functions import Refine, Transcendental
@@ -193,12 +194,12 @@ class Field:
             return False
         return self._forces(relations, numerator, radical=radical)
 
-    def never_zero_on_relations(self, p: Any) -> bool:
+    def never_zero_on_relations(self, p: fmpq_mpoly) -> bool:
         """True only where the relations of the claim and p = 0 exclude each other."""
         relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
         return bool(relations) and self._forces([*relations, p], self.tower.one, radical=False)
 
-    def _forces(self, relations: list[Any], p: Any, *, radical: bool) -> bool:
+    def _forces(self, relations: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
         """Also where a factor that is never 0 has to be divided out of the ideal."""
         if not relations:
             return False
@@ -216,21 +217,21 @@ class Field:
             for index in self._open_parameters(relations)
         )
 
-    def _is_constant_by_name(self, p: Any) -> bool:
+    def _is_constant_by_name(self, p: fmpq_mpoly) -> bool:
         symbols = set().union(*(self.meaning(index).free_symbols for index in used(p)))
         return symbols <= self.assumptions.parameters.union(self.assumptions.positive)
 
-    def _is_of_parameters(self, p: Any) -> bool:
+    def _is_of_parameters(self, p: fmpq_mpoly) -> bool:
         generators = self.tower.generators
         names = self.assumptions.parameters
         return all(generators[i].kind == "symbol" and generators[i].meaning in names for i in used(p))
 
-    def _open_parameters(self, relations: list[Any]) -> list[int]:
+    def _open_parameters(self, relations: list[fmpq_mpoly]) -> list[int]:
         """Parameters that may be 0, in the relations between parameters."""
         indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
         return [index for index in sorted(indices) if not self.tower.generators[index].strict]
 
-    def _where_zero(self, relations: list[Any], index: int) -> list[Any]:
+    def _where_zero(self, relations: list[fmpq_mpoly], index: int) -> list[fmpq_mpoly]:
         """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
         signs, zero = self.tower.signs, self.tower.context.constant(0)
         found = [self.tower.gens[index]]
@@ -350,7 +351,7 @@ def _placeholder(index: int) -> sympy.Symbol:
     return sympy.Symbol(f"x{index}", real=True)
 
 
-def _polynomial(p: Any) -> sympy.Expr:
+def _polynomial(p: fmpq_mpoly) -> sympy.Expr:
     """A polynomial over placeholders, so that nothing is expanded into what they stand for."""
     terms = []
     for monomial, coefficient in p.to_dict().items():
@@ -423,7 +424,7 @@ class Regularity:
             return ""
         return f"{self._text(value.numerator, value.denominator)} {wanted} is not shown"
 
-    def _text(self, numerator: Any, denominator: Any = None) -> str:
+    def _text(self, numerator: fmpq_mpoly, denominator: Any = None) -> str:
         try:
             below = self._field.tower.one if denominator is None else denominator
             text = str(self._field.expression(Quotient(numerator, below)))

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import sympy
-from flint import fmpz
+from flint import fmpq_mpoly, fmpz
 
 from heavytop.claims.algebra import structure
 from heavytop.claims.algebra.evaluate import WEIERSTRASS, evaluate, wpinverse
@@ -426,7 +426,7 @@ class Transcendental:
                     total = t.sum((total, t.product((t.number(weight * int(power)), one))))
         return total
 
-    def _logarithm_of_factor(self, factor: Any) -> Quotient:
+    def _logarithm_of_factor(self, factor: fmpq_mpoly) -> Quotient:
         """ln of an irreducible positive polynomial."""
         t = self._tower
         index = _single(next(iter(factor.to_dict()))) if len(factor) == 1 else None

@@ -7,10 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
 
 import sympy
-from flint import arb
+from flint import arb, fmpq_mpoly
 
 from heavytop.claims.algebra.arcs import Arcs
 from heavytop.claims.algebra.conditions import Kind, Need, is_exactly_zero, is_small_polynomial, on_conditions, written
@@ -88,14 +87,14 @@ class Region:
         """0 by the relations of the claim, as in :meth:`~heavytop.claims.algebra.fields.Field.is_forced`."""
         return self.field.is_forced(expression, radical=radical, simpler=self._arcs.without)
 
-    def is_nowhere_zero(self, p: Any) -> bool:
+    def is_nowhere_zero(self, p: fmpq_mpoly) -> bool:
         """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
         return self.field.tower.signs.of(p).strict or self._is_apart(p) or self.is_kept(p)
 
-    def _is_apart(self, p: Any) -> bool:
+    def _is_apart(self, p: fmpq_mpoly) -> bool:
         return bool(self._setting.relations) and self.field.never_zero_on_relations(p)
 
-    def is_kept(self, p: Any) -> bool:
+    def is_kept(self, p: fmpq_mpoly) -> bool:
         """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
         key = str(p)
         if key not in self._kept:
@@ -103,7 +102,7 @@ class Region:
             self._kept[key] = self._flow is not None and self._is_kept(p, self._flow)
         return self._kept[key]
 
-    def _is_kept(self, p: Any, flow: Flow) -> bool:
+    def _is_kept(self, p: fmpq_mpoly, flow: Flow) -> bool:
         try:
             expression = self.field.expression(Quotient(p, self.field.tower.one))
             if not expression.free_symbols & flow.state:
@@ -136,7 +135,7 @@ class Region:
         divisor = next(own.divisors(forced=True), "")
         return divisor and f"its rate is divided by {divisor}, which may be 0 there"
 
-    def _is_excluded(self, p: Any) -> bool:
+    def _is_excluded(self, p: fmpq_mpoly) -> bool:
         """The claim is made where p is not 0, as it is written, and p keeps its sign."""
         one = self.field.tower.one
         for need in self._needs:
@@ -149,14 +148,14 @@ class Region:
                     return self.is_kept(p)
         return False
 
-    def is_zero_nowhere_dense(self, p: Any) -> bool:
+    def is_zero_nowhere_dense(self, p: fmpq_mpoly) -> bool:
         """0 on a set without interior at most."""
         key = str(p)
         if key not in self._thin:
             self._thin[key] = all(self._is_thin(factor) for factor, _ in self.field.tower.signs.factors(p)[1])
         return self._thin[key]
 
-    def _is_thin(self, p: Any) -> bool:
+    def _is_thin(self, p: fmpq_mpoly) -> bool:
         tower, square = self.field.tower, self._square(p)
         if square is not None:
             return self.is_zero_nowhere_dense(square)
@@ -168,7 +167,7 @@ class Region:
             return False
         return any(self._is_nonzero_at(p, place) for place in self.places)
 
-    def _has_parameters(self, p: Any) -> bool:
+    def _has_parameters(self, p: fmpq_mpoly) -> bool:
         inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
         return bool(inside & self._setting.parameters)
 
@@ -192,7 +191,7 @@ class Region:
             if bound.free_symbols & near
         )
 
-    def _is_nonzero_at_some_state(self, p: Any, flow: Flow) -> bool:
+    def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
         """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
         try:
             expression = self.field.expression(Quotient(p, self.field.tower.one)).xreplace(dict(flow.names))
@@ -204,7 +203,7 @@ class Region:
         except Unprovable:
             return False
 
-    def _is_nonzero_at(self, p: Any, place: Place) -> bool:
+    def _is_nonzero_at(self, p: fmpq_mpoly, place: Place) -> bool:
         meanings = {index: self.field.meaning(index) for index in used(p)}
         try:
             balls = {index: evaluate(meaning, place, NUMBER_BITS) for index, meaning in meanings.items()}
@@ -281,7 +280,7 @@ class Region:
         below = self.field.tower.signs.factors(value.denominator)[1]
         return kind is Kind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
 
-    def _factors_nowhere_zero(self, p: Any) -> bool:
+    def _factors_nowhere_zero(self, p: fmpq_mpoly) -> bool:
         return all(
             self.field.tower.signs.of(f).strict or self._is_apart(f) for f, _ in self.field.tower.signs.factors(p)[1]
         )
@@ -297,10 +296,10 @@ class Region:
         weak = need.kind is Kind.NONZERO or self.field.tower.sign(value).value > 0
         return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
 
-    def _factors(self, p: Any) -> list[Any]:
+    def _factors(self, p: fmpq_mpoly) -> list[fmpq_mpoly]:
         return [factor for factor, _ in self.field.tower.signs.factors(p)[1]]
 
-    def _is_thin_for_each(self, p: Any) -> bool:
+    def _is_thin_for_each(self, p: fmpq_mpoly) -> bool:
         """0 on a set without interior at most, whatever the parameters are."""
         key = str(p)
         if key not in self._thin_for_each:
@@ -316,19 +315,19 @@ class Region:
             )
         return self._thin_for_each[key]
 
-    def _square(self, p: Any) -> Any:
+    def _square(self, p: fmpq_mpoly) -> fmpq_mpoly | None:
         """The radicand of a polynomial that is a root by itself; None of another."""
         tower, (index, *others) = self.field.tower, sorted(used(p))
         alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
         return tower.radicand(index) if alone else None
 
-    def _is_analytic(self, p: Any) -> bool:
+    def _is_analytic(self, p: fmpq_mpoly) -> bool:
         """In what moves, over a domain in one piece."""
         return self.is_connected(used(p), fixed=self._setting.parameters) and not (
             self.everywhere.obstacle_of_generators(used(p), analytic=True)
         )
 
-    def is_for_no_parameters(self, p: Any) -> bool:
+    def is_for_no_parameters(self, p: fmpq_mpoly) -> bool:
         """True only where p is 0 all over the region for no values of the parameters."""
         flow, domain = self._statement.flow, self._statement.domain
         try:
@@ -383,7 +382,7 @@ class Region:
                 except Unprovable:
                     yield text
 
-    def _divisor_is_never_zero(self, p: Any) -> bool:
+    def _divisor_is_never_zero(self, p: fmpq_mpoly) -> bool:
         tower = self.field.tower
         return all(
             tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)

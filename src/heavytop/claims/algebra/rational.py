@@ -13,7 +13,7 @@ from fractions import Fraction
 from math import isqrt, lcm
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from heavytop.claims.algebra.signs import NUMBER_BITS, Sign, Signs, Unprovable, used
 from heavytop.exact.flint.balls import working_precision
@@ -32,7 +32,7 @@ _DEPTH = 3
 _MAX_TERMS = 40
 
 
-def denested(tower: Tower, p: Any, depth: int = _DEPTH) -> Quotient | None:
+def denested(tower: Tower, p: fmpq_mpoly, depth: int = _DEPTH) -> Quotient | None:
     """√p through roots that are nested less, for a polynomial ``p`` in roots; None where there is no such sum.
 
     It is √p wherever that is real.
@@ -50,14 +50,16 @@ def denested(tower: Tower, p: Any, depth: int = _DEPTH) -> Quotient | None:
     return _through_conjugate(tower, p) if roots else None
 
 
-def _as_sum(tower: Tower, p: Any, index: int, depth: int) -> Quotient | None:
+def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | None:
     """√(A + B R), R = √C the generator ``index``."""
     parts = tower.by_power(p, index)
     if parts.keys() != {0, 1}:
         return None
     a, b = parts[0], parts[1]
     s = tower.signs.of(b).value
-    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), tower.radicand(index)))
+    radicand = tower.radicand(index)
+    assert radicand is not None  # R is a root
+    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), radicand))
     if not s or tower.signs.of(a).value <= 0:
         return None
     d = _plain_root(tower, norm, any_sign=s > 0)
@@ -69,12 +71,12 @@ def _as_sum(tower: Tower, p: Any, index: int, depth: int) -> Quotient | None:
     return tower.sum((halves[0], tower.product((tower.number(s), halves[1]))))
 
 
-def _simpler_root(tower: Tower, p: Any, depth: int) -> Quotient | None:
+def _simpler_root(tower: Tower, p: fmpq_mpoly, depth: int) -> Quotient | None:
     plain = _plain_root(tower, p)
     return denested(tower, p, depth) if plain is None else plain
 
 
-def _plain_root(tower: Tower, p: Any, *, any_sign: bool = False) -> Quotient | None:
+def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quotient | None:
     """√p where that nests no root, from factors of known sign; with ``any_sign`` some D with D² = p."""
     if not p:
         return tower.number(0)
@@ -106,7 +108,7 @@ def _needs_no_sign(power: Any, any_sign: bool) -> bool:
     return bool(power % 4 == 0 or (any_sign and power % 2 == 0))
 
 
-def _through_conjugate(tower: Tower, p: Any) -> Quotient | None:
+def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
     """√p = √(p q)/√q, for a root √q of the tower with p q the square of something plain: √(√2 − 1) = 1/√(√2 + 1)."""
     for index in reversed(range(len(tower.generators))):
         q = tower.radicand(index)
@@ -135,7 +137,7 @@ _FACTORED_BITS = 64
 class Quotient:
     """numerator / denominator, reduced by its tower."""
 
-    numerator: Any
+    numerator: fmpq_mpoly
     denominator: Any
 
 
@@ -162,12 +164,12 @@ class Tower:
         self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
         self.gens = self.context.gens()
         self.generators: list[Generator] = []
-        self._radicands: dict[int, Any] = {}
+        self._radicands: dict[int, fmpq_mpoly] = {}
         self._roots: dict[str, int] = {}
         self.one = self.context.constant(1)
         self.signs = Signs(self)
         # what has been divided by so far, by its text: nothing is proven where one of them is 0
-        self.divisors: dict[str, Any] = {}
+        self.divisors: dict[str, fmpq_mpoly] = {}
 
     # --- generators -----------------------------------------------------------------------------------------------
 
@@ -187,7 +189,7 @@ class Tower:
         self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
         return len(self.generators) - 1
 
-    def add_root(self, meaning: Any, square: Any, *, sign: int, kind: str = "root") -> int:
+    def add_root(self, meaning: Any, square: fmpq_mpoly, *, sign: int, kind: str = "root") -> int:
         """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
         constant = all(self.generators[i].constant for i in used(square))
         strict = kind == "root" and self.signs.of(square).strict
@@ -200,21 +202,21 @@ class Tower:
                 self.signs.numbers[index] = number.sqrt()
         return index
 
-    def radicand(self, index: int) -> Any | None:
+    def radicand(self, index: int) -> fmpq_mpoly | None:
         """q of a root R² = q; None for a free generator."""
         return self._radicands.get(index)
 
-    def radicands(self) -> list[tuple[int, Any]]:
+    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
         """(R, q) of every root R² = q."""
         return list(self._radicands.items())
 
-    def relations(self) -> list[Any]:
+    def relations(self) -> list[fmpq_mpoly]:
         """R² − q for every root R = √q."""
         return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
 
     # --- arithmetic -----------------------------------------------------------------------------------------------
 
-    def polynomial(self, numerator: Any) -> Quotient:
+    def polynomial(self, numerator: fmpq_mpoly) -> Quotient:
         """A polynomial as a quotient."""
         return Quotient(self.reduce(numerator), self.one)
 
@@ -222,13 +224,13 @@ class Tower:
         """A rational number as a quotient."""
         return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one)
 
-    def times(self, a: Any, b: Any) -> Any:
+    def times(self, a: fmpq_mpoly, b: fmpq_mpoly) -> fmpq_mpoly:
         """The product of two polynomials; raises Unprovable where it would be too large to hold."""
         if len(a) * len(b) > _MAX_PRODUCT:
             raise Unprovable("A product of polynomials is too large.", "Split the claim into smaller ones.")
         return a * b
 
-    def reduce(self, p: Any) -> Any:
+    def reduce(self, p: fmpq_mpoly) -> fmpq_mpoly:
         """``p`` with every root to a power below 2."""
         degrees = p.degrees()
         for index in sorted(self._radicands, reverse=True):
@@ -241,14 +243,14 @@ class Tower:
                 p, degrees = total, total.degrees()
         return p
 
-    def raised(self, p: Any, exponent: int) -> Any:
+    def raised(self, p: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
         """A power of a polynomial; raises Unprovable where it would be too large to hold."""
         result = self.one
         for _ in range(exponent):
             result = self.times(result, p)
         return result
 
-    def by_power(self, p: Any, index: int) -> dict[int, Any]:
+    def by_power(self, p: fmpq_mpoly, index: int) -> dict[int, fmpq_mpoly]:
         """The coefficients of the powers of one generator."""
         parts: dict[int, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
@@ -263,7 +265,7 @@ class Tower:
             for monomial, coefficient in argument.numerator.to_dict().items()
         ]
 
-    def quotient(self, numerator: Any, denominator: Any) -> Quotient:
+    def quotient(self, numerator: fmpq_mpoly, denominator: Any) -> Quotient:
         """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
         degrees = denominator.degrees()
@@ -285,7 +287,7 @@ class Tower:
         lead = denominator.leading_coefficient()
         return Quotient(numerator / lead, denominator / lead)
 
-    def _divided_by(self, p: Any) -> None:
+    def _divided_by(self, p: fmpq_mpoly) -> None:
         if not p.is_constant():
             self.divisors.setdefault(str(p), p)
 
@@ -349,7 +351,7 @@ class Tower:
             self.polynomial(self._absolute(value.numerator)), self.polynomial(self._absolute(value.denominator))
         )
 
-    def _absolute(self, p: Any) -> Any:
+    def _absolute(self, p: fmpq_mpoly) -> fmpq_mpoly:
         constant, factors = p.factor()
         result = self.context.constant(abs(constant))
         for factor, power in factors:
@@ -365,7 +367,7 @@ class Tower:
             return self.number(0)
         return self.divide(self._root(square), self.polynomial(self._absolute(value.denominator)))
 
-    def _root(self, p: Any) -> Quotient:
+    def _root(self, p: fmpq_mpoly) -> Quotient:
         """√p: squares come out as absolute values, factors of known sign as roots of their own."""
         constant, factors = p.factor()
         outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
@@ -387,7 +389,7 @@ class Tower:
             )
         return self.product((self.polynomial(outside), *roots, self.root_of_number(abs(constant))))
 
-    def _simplest_root(self, square: Any) -> Quotient:
+    def _simplest_root(self, square: fmpq_mpoly) -> Quotient:
         """√square as a sum of simpler roots where there is one, else as a generator."""
         if self.known_root(square) is None:
             simpler = denested(self, square)
@@ -395,7 +397,7 @@ class Tower:
                 return simpler
         return self.polynomial(self.gens[self.root_of(square)])
 
-    def known_root(self, square: Any) -> int | None:
+    def known_root(self, square: fmpq_mpoly) -> int | None:
         """The generator √square, None where there is none yet."""
         return self._roots.get(str(square))
 
@@ -413,7 +415,7 @@ class Tower:
                 result = self.times(result, self.gens[self.root_of(self.context.constant(int(prime)))])
         return self.polynomial(result)
 
-    def root_of(self, square: Any) -> int:
+    def root_of(self, square: fmpq_mpoly) -> int:
         """The generator √square, made once."""
         key = str(square)
         if key not in self._roots:
@@ -428,7 +430,9 @@ class Tower:
 _LIMITS = (60, 2_000, 4_096)
 
 
-def forces_zero(relations: Sequence[Any], p: Any, *, radical: bool, never_zero: Sequence[Any] = ()) -> bool:
+def forces_zero(
+    relations: Sequence[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool, never_zero: Sequence[Any] = ()
+) -> bool:
     """True only where ``p`` is a combination of ``relations`` with polynomial factors, so 0 where they all are.
 
     radical: also where a power of ``p`` is (Rabinowitsch: the relations and 1 − y p = 0 exclude each other).

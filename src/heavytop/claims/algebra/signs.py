@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import sympy
-from flint import arb, fmpq
+from flint import arb, fmpq, fmpq_mpoly
 
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import working_precision
@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 _MOST_STEPS = 150
 Row = list[Fraction]
+Monomial = TypeVar("Monomial", bound=Hashable)
 
 
-def nonnegative_combination(target: Mapping[Hashable, Any], columns: Sequence[Mapping[Hashable, Any]]) -> Row | None:
+def nonnegative_combination(target: Mapping[Monomial, Any], columns: Sequence[Mapping[Monomial, Any]]) -> Row | None:
     """Weights c ≥ 0 with Σ c column = target, exactly; None where there are none, or none was found in time.
 
     target, columns: coefficients by monomial, those that are left out are 0.
@@ -51,11 +52,11 @@ def _fraction(value: Any) -> Fraction:
     return Fraction(int(value.p), int(value.q)) if hasattr(value, "p") else Fraction(value)
 
 
-def _useful(wanted: Mapping[Hashable, Fraction], parts: Sequence[Mapping[Hashable, Fraction]]) -> list[int]:
+def _useful(wanted: Mapping[Monomial, Fraction], parts: Sequence[Mapping[Monomial, Fraction]]) -> list[int]:
     """Columns that can have a weight: no monomial of theirs is left over with one sign."""
     kept = list(range(len(parts)))
     while True:
-        signs: dict[Hashable, set[bool]] = {}
+        signs: dict[Monomial, set[bool]] = {}
         for j in kept:
             for monomial, value in parts[j].items():
                 signs.setdefault(monomial, set()).add(value > 0)
@@ -131,7 +132,7 @@ def sum_of(signs: Iterable[Sign]) -> Sign:
     return Sign(values.pop(), strict) if values else Sign(1, False)
 
 
-def used(p: Any) -> set[int]:
+def used(p: fmpq_mpoly) -> set[int]:
     """The generators that occur in a polynomial."""
     return {index for index, degree in enumerate(p.degrees()) if degree > 0}
 
@@ -159,10 +160,10 @@ class Signs:
 
     def __init__(self, tower: Tower) -> None:
         self._tower = tower
-        self._forms: dict[int, Any] = {}
+        self._forms: dict[int, fmpq_mpoly] = {}
         self._below_one: set[int] = set()
-        self._facts: list[tuple[Any, Sign]] = []
-        self._products: list[tuple[Any, Sign]] = []
+        self._facts: list[tuple[fmpq_mpoly, Sign]] = []
+        self._products: list[tuple[fmpq_mpoly, Sign]] = []
         self._known: dict[str, tuple[Sign, int]] = {}
         self._factors: dict[str, Any] = {}
         self._left = _BUDGET
@@ -175,12 +176,12 @@ class Signs:
         self.pi: int | None = None
         self.turns: dict[int, tuple[Fraction, Fraction]] = {}
 
-    def declare_form(self, index: int, form: Any) -> None:
+    def declare_form(self, index: int, form: fmpq_mpoly) -> None:
         """Generator ``index`` is ``form``, a polynomial in generators of known sign."""
         self._forms[index] = form
         self._known.clear()
 
-    def can_have_form(self, index: int, form: Any) -> bool:
+    def can_have_form(self, index: int, form: fmpq_mpoly) -> bool:
         """Whether ``form`` may be declared: there is none yet, and nothing in it has the form of its reciprocal."""
         return index not in self._forms and not self._below_one & used(form)
 
@@ -188,7 +189,7 @@ class Signs:
         """1/x is the form of generator ``index``: it lies in (0, 1]."""
         self._below_one.add(index)
 
-    def declare(self, p: Any, sign: Sign) -> None:
+    def declare(self, p: fmpq_mpoly, sign: Sign) -> None:
         """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells.
 
         A sign that is not strict tells nothing of a factor where another may be 0.
@@ -218,7 +219,7 @@ class Signs:
             self._declare_each(open_factors, known)
         self._known.clear()
 
-    def _declare_each(self, factors: list[Any], known: Sign) -> None:
+    def _declare_each(self, factors: list[fmpq_mpoly], known: Sign) -> None:
         """Two factors whose product is > 0 have the sign of their sum, where that is known; or of a difference."""
         if len(factors) != 2 or not (known.value and known.strict):
             return
@@ -228,7 +229,7 @@ class Signs:
         if total.value and total.strict:
             self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
 
-    def never_zero(self, relations: Sequence[Any]) -> list[Any]:
+    def never_zero(self, relations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
         """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
         indices = set().union(*map(used, relations))
         found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
@@ -237,14 +238,14 @@ class Signs:
         found += [factor for factor in factors if self.of(factor).strict]
         return list({str(p): p for p in found}.values())
 
-    def factors(self, p: Any) -> Any:
+    def factors(self, p: fmpq_mpoly) -> Any:
         """(constant, [(factor, power)]), made once."""
         key = str(p)
         if key not in self._factors:
             self._factors[key] = p.factor()
         return self._factors[key]
 
-    def of(self, p: Any) -> Sign:
+    def of(self, p: fmpq_mpoly) -> Sign:
         """The sign of ``p``: the product of those of its factors."""
         if not p:
             return Sign(1, False)
@@ -273,7 +274,7 @@ class Signs:
         finally:
             self._depth -= 1
 
-    def _of_factor(self, p: Any) -> Sign:
+    def _of_factor(self, p: fmpq_mpoly) -> Sign:
         key = str(p)
         if key in self._known:
             known, depth = self._known[key]
@@ -294,7 +295,7 @@ class Signs:
         self._known[key] = found, self._depth if self._left > 0 else _DEPTH
         return found
 
-    def _rules(self, p: Any) -> Iterator[Callable[[Any], Sign]]:
+    def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
         if len(p) <= _MAX_PARTED and self._left > 0:
             yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
@@ -304,7 +305,7 @@ class Signs:
 
     # --- rules ------------------------------------------------------------------------------------------------------
 
-    def _by_facts(self, p: Any) -> Sign:
+    def _by_facts(self, p: fmpq_mpoly) -> Sign:
         found = UNKNOWN
         for fact, sign in self._facts:
             ratio = p.leading_coefficient() / fact.leading_coefficient()
@@ -313,7 +314,7 @@ class Signs:
                 found = Sign(found.value or one.value, found.strict or one.strict)
         return found
 
-    def ball(self, p: Any) -> arb | None:
+    def ball(self, p: fmpq_mpoly) -> arb | None:
         """The ball of a polynomial in numbers; None where another generator occurs."""
         if not used(p) <= self.numbers.keys():
             return None
@@ -327,14 +328,14 @@ class Signs:
                 total += term
             return total
 
-    def _by_number(self, p: Any) -> Sign:
+    def _by_number(self, p: fmpq_mpoly) -> Sign:
         """A number that is no fraction: its ball."""
         total = self.ball(p)
         if total is None or not total.is_finite() or total.contains(0):
             return UNKNOWN
         return Sign(1 if total > 0 else -1, True)
 
-    def _by_terms(self, p: Any) -> Sign:
+    def _by_terms(self, p: fmpq_mpoly) -> Sign:
         """By terms of one sign; their coefficients may be numbers that are no fractions."""
         groups: dict[Any, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
@@ -356,7 +357,7 @@ class Signs:
                 sign = sign.times(Sign(g.sign if power % 2 else 1, g.strict))
         return sign
 
-    def _by_forms(self, p: Any) -> Sign:
+    def _by_forms(self, p: fmpq_mpoly) -> Sign:
         """By terms, after each generator is written through positive ones."""
         turned = self._below_one & used(p)
         for index in turned:
@@ -372,7 +373,7 @@ class Signs:
         p = self._without_forms(p, turned)
         return self._by_terms(p) if p else UNKNOWN
 
-    def _without_forms(self, p: Any, turned: Collection[int] = ()) -> Any:
+    def _without_forms(self, p: fmpq_mpoly, turned: Collection[int] = ()) -> Any:
         """Every generator with a form written as that; raises Unprovable where that is too large.
 
         turned: generators that stand for their reciprocals in ``p``; others that lie below 1 are left as they are.
@@ -386,14 +387,14 @@ class Signs:
                 raise Unprovable("A polynomial is too large.", "Split the claim into smaller ones.")
         return p
 
-    def substituted(self, p: Any, index: int, form: Any) -> Any:
+    def substituted(self, p: fmpq_mpoly, index: int, form: fmpq_mpoly) -> fmpq_mpoly:
         """``p`` with a polynomial in the place of a generator."""
         total = self._tower.context.constant(0)
         for power, part in self._tower.by_power(p, index).items():
             total += self._tower.times(part, self._tower.raised(form, power))
         return total
 
-    def _by_roots_of_one_variable(self, p: Any) -> Sign:
+    def _by_roots_of_one_variable(self, p: fmpq_mpoly) -> Sign:
         """An irreducible polynomial in one generator without a real root in its range (Sturm)."""
         if len(used(p)) != 1:
             return UNKNOWN
@@ -435,7 +436,7 @@ class Signs:
             high = sympy.Integer(0) if high is None else min(high, sympy.Integer(0))
         return low, high
 
-    def _by_generators(self, p: Any) -> Sign:
+    def _by_generators(self, p: fmpq_mpoly) -> Sign:
         """As a polynomial in one of its generators, with coefficients of known sign."""
         found = UNKNOWN
         for index in sorted(used(p), reverse=True):
@@ -446,7 +447,7 @@ class Signs:
                     return found
         return found
 
-    def _as_polynomial_in(self, index: int, p: Any, parts: dict[int, Any]) -> Iterator[Sign]:
+    def _as_polynomial_in(self, index: int, p: fmpq_mpoly, parts: dict[int, Any]) -> Iterator[Sign]:
         g, degree = self._tower.generators[index], max(parts)
         if len(parts) > 1:
             yield sum_of(
@@ -475,10 +476,10 @@ class Signs:
             if first.value == second.value != 0:
                 yield Sign(first.value, first.strict or second.strict)
 
-    def _constant(self, value: Fraction) -> Any:
+    def _constant(self, value: Fraction) -> fmpq_mpoly:
         return self._tower.context.constant(fmpq(value.numerator, value.denominator))
 
-    def _of_root_sum(self, a: Any, b: Any, radicand: Any, sign: int) -> Sign:
+    def _of_root_sum(self, a: fmpq_mpoly, b: fmpq_mpoly, radicand: fmpq_mpoly, sign: int) -> Sign:
         """a + b R with R² = radicand >= 0: the larger of a² and b² R² decides."""
         difference = self.of(self._tower.reduce(a * a - b * b * radicand))
         if difference.value > 0:
@@ -487,7 +488,7 @@ class Signs:
             return Sign(self.of(b).value * sign, difference.strict)
         return UNKNOWN
 
-    def _by_half_angle(self, p: Any) -> Sign:
+    def _by_half_angle(self, p: fmpq_mpoly) -> Sign:
         """Sine 2τ/(1 + τ²) and cosine (1 − τ²)/(1 + τ²), and apart from them the angle π, where τ is infinite."""
         for sine, cosine in self.circles.items():
             if cosine not in used(p):
@@ -513,7 +514,7 @@ class Signs:
             self._half_angles[sine] = self._tower.add(f"tangent of half the angle of x{sine}", constant=False)
         return self._half_angles[sine]
 
-    def _by_difference_from_facts(self, p: Any) -> Sign:
+    def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
         """p = q·fact + r with q and r of one sign."""
         for fact, sign in self._facts:
             for part in (fact, -fact):
@@ -525,12 +526,12 @@ class Signs:
                         return found
         return UNKNOWN
 
-    def _at_once(self, p: Any) -> Sign:
+    def _at_once(self, p: fmpq_mpoly) -> Sign:
         """The sign of ``p`` by the rules that ask for no other sign."""
         found = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
         return next((sign for sign in found if sign.value), UNKNOWN)
 
-    def _by_squares(self, p: Any) -> Sign:
+    def _by_squares(self, p: fmpq_mpoly) -> Sign:
         """With a generator g ≥ 0 written as R², where there is a root R of g."""
         for root, square in self._tower.radicands():
             (index, *others) = used(square) or {-1}
@@ -542,7 +543,7 @@ class Signs:
 
     # --- combinations of products -----------------------------------------------------------------------------------
 
-    def _by_products_of_facts(self, p: Any) -> Sign:
+    def _by_products_of_facts(self, p: fmpq_mpoly) -> Sign:
         """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
         still = all(
             g.constant and g.kind in ("symbol", "root") for g in map(self._tower.generators.__getitem__, used(p))
@@ -562,7 +563,7 @@ class Signs:
                 return Sign(sign, any(weight and strict for weight, (_, strict) in zip(weights, products, strict=True)))
         return UNKNOWN
 
-    def _atoms_for(self, p: Any) -> list[tuple[Any, bool]]:
+    def _atoms_for(self, p: fmpq_mpoly) -> list[tuple[fmpq_mpoly, bool]]:
         """(polynomial ≥ 0, whether it is never 0): facts and generators that have to do with ``p``."""
         facts = []
         for fact, sign in self._facts:
@@ -585,7 +586,7 @@ class Signs:
                 chosen.append((self._tower.gens[index] * g.sign, g.strict))
         return chosen[:_MAX_ATOMS]
 
-    def _products_of(self, atoms: list[tuple[Any, bool]], degree: int) -> list[tuple[Any, bool]]:
+    def _products_of(self, atoms: list[tuple[fmpq_mpoly, bool]], degree: int) -> list[tuple[fmpq_mpoly, bool]]:
         """1 and the products of up to ``degree`` atoms, as many as are tried."""
         found = level = [(self._tower.one, True, 0)]
         for _ in range(degree):
