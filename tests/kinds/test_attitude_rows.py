@@ -15,7 +15,7 @@ mass = "2"
 gravity = "9.81"
 about = "pivot"
 centre = ["0.1", "-0.2", "0.3"]
-inertia = ["0.5", "0.7", "0.9", "0.1", "-0.05", "0.02"]
+inertia = ["0.7", "0.7", "0.9", "0.1", "-0.05", "0.02"]
 omega = ["1", "2", "-3"]
 euler = "ZYX:30deg,0.2,1"
 [[top]]
@@ -107,7 +107,7 @@ def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
     task = next(iter(expand(load(str(tmp_path / "plan.toml"), KINDS)[0])))
     assert task.case is not None
     assert task.case.body is not None
-    assert task.case.body.tensor[0] == (Fraction(1, 2), Fraction(1, 10), Fraction(-1, 20))
+    assert task.case.body.tensor[0] == (Fraction(7, 10), Fraction(1, 10), Fraction(-1, 20))
     assert sum(g * g for g in task.case.start.gamma) == 1
 
 

@@ -23,6 +23,7 @@ from heavytop.integrate.integrator import expected_steps, name_of
 from heavytop.integrate.multiword.engines import choose
 from heavytop.integrate.multiword.engines import compiled as compile_words
 from heavytop.integrate.multiword.motions import OUTCOMES
+from heavytop.integrate.peers.contract import said
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import Run, Scaled, Status
@@ -282,8 +283,9 @@ def dense(
     """A run of that integrator; raises Unsupported for one that hands over no polynomial of its steps."""
     made = _DENSE.get(integrator) if isinstance(integrator, str) else None
     if made is None:
+        name = said(name_of(integrator))
         raise Unsupported(
-            f"The integrator {name_of(integrator)} hands over no polynomial of its steps, so it locates no events.",
+            f"The integrator {name} hands over no polynomial of its steps, so it locates no events.",
             f"Events are located by {' and '.join(_DENSE)}.",
         )
     end = exact(number(until, problem.precision))
