@@ -1,7 +1,7 @@
 """How much of a noise band a comparison allows, and when a candidate is noisier by more than chance.
 
 What is allowed comes from the baseline: a candidate must not excuse itself.  And a band is rounding noise or it is no
-band: reruns that part by more than rounding makes of them (:mod:`heavytop.comparison.noise`) excuse nothing.
+band: reruns that part by more than rounding makes of them excuse nothing.
 
 A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
 wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides

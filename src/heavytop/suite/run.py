@@ -31,7 +31,7 @@ _AHEAD = 4
 _ANSWER = 10.0
 """Seconds that a Dask scheduler has to answer."""
 _PATIENCE = 30
-"""Seconds without any worker after which a cluster is given up."""
+"""Seconds without any worker after which a cluster is abandoned."""
 _SAME = "Install the same versions on every machine."
 _one_task = Lock()
 """A Dask worker with several threads measures one task at a time all the same: another beside it would spoil the

@@ -9,8 +9,8 @@ attitude.
 Euler angles (a, b, c) of a sequence "IJK" are intrinsic: R = R_I(a) R_J(b) R_K(c).  For "ZXZ" the angles of the paper,
 (3.2), are (ψ, θ, φ) in this order: its γ depends on φ, the last.
 
-Rows are three sequences of three numbers.  ``lib`` is a namespace with the elementary functions of the numbers at hand,
-as in :mod:`heavytop.top.attitude`.
+Rows are three sequences of three numbers.  ``lib`` is a namespace with the elementary functions of the numbers at hand:
+``math``, or those of balls.
 """
 
 from __future__ import annotations
@@ -462,8 +462,8 @@ def perpendicular(gamma: Vector) -> Vector:
 
 # What is told of an attitude: quaternion, matrix, Euler angles, the position of a point, Ω in space axes.
 #
-# Each is a function of a state (Ω, γ) and of ξ over any ring; the conventions are those of
-# :mod:`heavytop.top.attitude`. A point p of the body, in body axes, stands at pivot + R p in space: the fixed point is
+# Each is a function of a state (Ω, γ) and of ξ over any ring; the conventions are those
+# above. A point p of the body, in body axes, stands at pivot + R p in space: the fixed point is
 # the origin unless a pivot is given, and p is the centre of mass unless a point is given.
 
 

@@ -426,7 +426,7 @@ class Tower:
 # Membership in the ideal of a few polynomial relations: the proof that they force another polynomial to be 0.
 
 
-# elements of the basis, terms and bits of each: more is given up, which leaves the verdict undecided
+# elements of the basis, terms and bits of each: more is abandoned, which leaves the verdict undecided
 _LIMITS = (60, 2_000, 4_096)
 
 

@@ -138,7 +138,7 @@ def used(p: fmpq_mpoly) -> set[int]:
 
 
 _DEPTH = 4
-# calls a question: what takes more is given up
+# calls a question: what takes more is abandoned
 _BUDGET = 120
 _MAX_TERMS = 200
 # terms of what is taken apart further than into factors
@@ -291,7 +291,7 @@ class Signs:
             found = Sign(found.value or one.value, found.strict or one.strict)
             if found.value and found.strict:
                 break
-        # what was given up for lack of time may be found when it is asked first
+        # what was abandoned for lack of time may be found when it is asked first
         self._known[key] = found, self._depth if self._left > 0 else _DEPTH
         return found
 

@@ -48,7 +48,7 @@ from heavytop.top.vectors import Vector, cross, dot
 
 # Attitude of the Bobylev-Steklov motions: axis 3 in space is a function of the second kind.
 #
-# p, h, x, B, C as in :mod:`heavytop.exact.cases.bobylev_steklov`, s = |γ|.  For Z = ξ + iη, ξ ⟂ γ fixed in space, η = γ
+# p, h, x, B, C as above, s = |γ|.  For Z = ξ + iη, ξ ⟂ γ fixed in space, η = γ
 # × ξ/s,
 #
 #     Z3' = −p Z2,    s Z1 = i (γ2 Z3 − γ3 Z2)    (from γ × Z = −i s Z),    |Z3|² = |ξ|² (1 − γ3²/s²)

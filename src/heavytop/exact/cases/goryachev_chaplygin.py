@@ -1,9 +1,8 @@
 """Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals; Sretensky's gyrostat too.
 
 Sretensky's gyrostat is that top with a rotor along axis 3, on M·γ = 0 with M = IΩ + k.  The centre of mass may lie
-anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated variables
-(:mod:`heavytop.exact.cases.goryachev_chaplygin`) move along a straight line in Abel's integrals, at a cost that does
-not depend on the time; the attitude is beside them (:mod:`heavytop.exact.cases.goryachev_chaplygin`).
+anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated variables move along a straight
+line in Abel's integrals, at a cost that does not depend on the time; the attitude is beside them.
 
 Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
 Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.separable.oscillation`), and one may rest
@@ -59,7 +58,7 @@ from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, sretensky
 
 # The exact level of a Goryachev-Chaplygin or Sretensky start, the roots of its curve, and u1, u2 there.
 #
-# Notation as in :mod:`heavytop.exact.cases.goryachev_chaplygin`.
+# Notation as above.
 
 
 class Level(Reduced):
@@ -340,7 +339,7 @@ def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
 # Attitude of Goryachev and Chaplygin's top and of Sretensky's gyrostat: the azimuth of M, by Fourier series.
 #
 # On M·γ = 0 the angular momentum is level, and M' = γ × n in space turns it about γ at the rate |γ| n·M/M².  In the
-# notation of :mod:`heavytop.exact.cases.goryachev_chaplygin`, M = (4p, 4q, ρ), M² = 16 s + ρ² = (u1 − u2)², its azimuth
+# notation above, M = (4p, 4q, ρ), M² = 16 s + ρ² = (u1 − u2)², its azimuth
 # has
 #
 #     Λ' = 4ap/(u1 − u2)² = σ (α1β2 + α2β1)/(u1 − u2)².

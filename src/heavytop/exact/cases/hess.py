@@ -17,7 +17,7 @@ general moments (Nekrasov; it is a Floquet problem), but its period is that of s
 once, and (u, v) at any time is a power of it applied to the start, so that the cost does not grow with the time.  The
 matrix comes from Taylor polynomials with a proven tail (:mod:`heavytop.exact.cases.hess_transfer`).
 
-M·γ = 0 is elementary in the angle of a pendulum: :mod:`heavytop.exact.cases.hess`.
+M·γ = 0 is elementary in the angle of a pendulum, below.
 Where the two lower roots coincide, s rests: refused.
 Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892) 508; derived here from the equations.
 """
@@ -55,7 +55,7 @@ from heavytop.top.vectors import cross, dot
 
 # The exact data of a motion of Hess' top: the conditions of the class, and the cubic of the height.
 #
-# Notation and formulas: :mod:`heavytop.exact.cases.hess`.
+# Notation and formulas are those above.
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +297,7 @@ def _exponent(value: arb) -> int:
 
 # Hess' tops, M·γ = 0: elementary in the angle of a pendulum.
 #
-# In the notation of :mod:`heavytop.exact.cases.hess`, with α = 1/I2 and a unit vector e = cos φ e_x + sin φ e_y,
+# In the notation above, with α = 1/I2 and a unit vector e = cos φ e_x + sin φ e_y,
 # J e = cos φ e_y − sin φ e_x,
 #
 #     M = ρ e,   γ = |γ| (cos ϑ e_z + sin ϑ J e),   ϑ' = αρ,   ½ ϑ'²/α + N|γ| cos ϑ = E,   φ' = −βρ cos φ

@@ -2,7 +2,7 @@
 
 The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The two separated
 variables (:mod:`heavytop.exact.cases.kovalevskaya_theta`) move along a straight line in Abel's integrals, which are
-inverted in balls (:mod:`heavytop.exact.cases.kovalevskaya`): the cost does not depend on the time.  Near levels where
+inverted in balls: the cost does not depend on the time.  Near levels where
 the curve has a multiple root the Fourier series there grow like the root of the distance; where they need more than
 2^14 terms, theta functions of two variables take over (:mod:`heavytop.exact.cases.kovalevskaya_theta`), down to a
 distance of two roots of 2^-27 of the largest.  Nearer than that the motion is refused, with the distance, and left to

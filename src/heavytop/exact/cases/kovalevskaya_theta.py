@@ -1,6 +1,6 @@
 """Kovalevskaya's top by theta functions of two variables: a second closed form, which shares no series with the first.
 
-The curve y² = −2 φ(w) (:mod:`heavytop.exact.cases.kovalevskaya_theta`) with five distinct roots e_1, ..., e_5, sorted
+The curve y² = −2 φ(w) with five distinct roots e_1, ..., e_5, sorted
 by real and imaginary part so that the broken line through them does not cross itself.  A_k = 2 ∫ (dw/y, w dw/y) from
 e_k to e_(k+1), each with one unknown sign, make the periods a1 = A1, b1 = A2, a2 = A1 + A3, b2 = A4.  Of the eight
 choices of signs one gives a τ = a^−1 b that is symmetric with a positive imaginary part, the seven others are excluded

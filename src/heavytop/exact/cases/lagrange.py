@@ -19,7 +19,7 @@ All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη
 and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
 spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
 
-*The axis of symmetry* need not be axis 3, nor its direction rational (:mod:`heavytop.exact.cases.lagrange`).  Let a be
+*The axis of symmetry* need not be axis 3, nor its direction rational.  Let a be
 an exact vector along it, u and v = a × u exact vectors across it, A = |a|, and n = νa.  With x = a·γ in place of γ3 and
 g = γ·u + i γ·v/A, w likewise, L = a·M/A and Ω3 = a·Ω/A, all of the above but √(A²) stays rational:
 
@@ -251,8 +251,8 @@ def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction
 # The spherical top, I1 = I2 = I3 with its centre of mass anywhere: Lagrange's top about r.
 #
 # Every axis of it is one of symmetry.  The direction of r is irrational in general, but the equalities that define the
-# class, the cubic of n·γ and both functions of the second kind are rational in the exact data
-# (:mod:`heavytop.exact.cases.lagrange`): the class is tested exactly, and any motion is known at any time.
+# class, the cubic of n·γ and both functions of the second kind are rational in the exact data:
+# the class is tested exactly, and any motion is known at any time.
 
 
 @dataclass(frozen=True, slots=True)

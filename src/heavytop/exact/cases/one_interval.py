@@ -12,7 +12,7 @@ This satisfies the equations for Ω.  Those for γ are three identities between 
 
 x swings between two simple roots of QR, x = m + d cos θ (:mod:`heavytop.exact.separable.oscillation`), θ' = √g > 0 and
 t is one Abel integral of θ.  √Q and √R are products of √(2d) cos(θ/2), √(2d) sin(θ/2) and roots that never vanish:
-turning points are points like any other. The four motions of this form: :mod:`heavytop.exact.cases.one_interval`,
+turning points are points like any other. The four motions of this form: Steklov's below,
 :mod:`heavytop.exact.cases.algebraic_starts`.
 """
 
@@ -295,7 +295,7 @@ def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
 #     Ω3² = c0 + c2 Ω1²,   c2 = −A (A − B)/((A − 2C)(B − C)),   c0 =  A E0 (A − 2B)/Δ
 #     Ω1' = ((B − C)/A) Ω2 Ω3,   Nγ2 = Ω2 T(Ω1),   Nγ3 = Ω3 U(Ω1),   Nγ1 = S(Ω1)
 #
-# with S, T, U of :mod:`heavytop.exact.cases.one_interval`, where Ω1 is evaluated; it is a quotient of Jacobi's
+# with S, T, U above, where Ω1 is evaluated; it is a quotient of Jacobi's
 # functions.  The roots of both quadratics are simple and different, so that there are no degenerate motions, equilibria
 # or asymptotic ones. b0 and c0 of a start are rational, so that membership is an exact test. Source: V. A. Steklov,
 # Trudy otd. fiz. nauk 10 (1899) 1; coefficients derived here from the equations.

@@ -3,7 +3,7 @@
 J(t) = ∂(Ω, γ)(t)/∂(Ω0, γ0) and S(t) = ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r: plain partial derivatives of the
 field as it stands.  γ0 counts as three independent variables, and the rotor (λ, or k) is held.
 
-Each step of the enclosure of the motion gives its own Φ and σ (:mod:`heavytop.exact.enclosure.derivatives`), and
+Each step of the enclosure of the motion gives its own Φ and σ, and
 
     J(t + h) = Φ J(t),     S(t + h) = Φ S(t) + σ.
 

@@ -149,7 +149,7 @@ class Pilot:
     def forecast(self, span: Fraction, most_steps: float) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
 
-        The pilot is given up after a hundred steps where, steps as long as these, ``most_steps`` would not do.
+        The pilot is abandoned after a hundred steps where, steps as long as these, ``most_steps`` would not do.
         """
         times, losses = self._ahead(span, most_steps)
         if not times:
@@ -331,7 +331,7 @@ _PILOT_ROOM = 72
 """The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
 _MOST_PILOT_BITS = 352
 _HOPELESS, _SURELY = 8, 1.25
-"""Times the effort, and times what a cost may be, beyond which a pilot is given up after its first hundred steps."""
+"""Times the effort, and times what a cost may be, beyond which a pilot is abandoned after its first hundred steps."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 

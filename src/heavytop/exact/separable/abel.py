@@ -197,8 +197,8 @@ class Inversion:
 
 # One of two variables rests at a double root of the polynomial: what is left of Abel's integrals for the other.
 #
-# Where v_o rests at a double root e the integrand v^j/√g of the other has a pole at e, and with G_j = ε F_j + (...) of
-# :mod:`heavytop.exact.separable.abel` only the combination without it moves,
+# Where v_o rests at a double root e the integrand v^j/√g of the other has a pole at e, and with G_j = ε F_j + (...)
+# above only the combination without it moves,
 #
 #     H(θ) = F_1(θ) − e F_0(θ),   dH/dθ = (v − e)/√g,
 #
@@ -277,9 +277,9 @@ class Beside:
 
 # What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
 #
-# Both have I1 = I2, their centre of mass in that plane and two variables whose integrals G_0, G_1 of
-# :mod:`heavytop.exact.separable.abel` grow linearly with time.  One of the two may rest
-# (:mod:`heavytop.exact.separable.abel`); then one integral of the other is left, and grows linearly too.
+# Both have I1 = I2, their centre of mass in that plane and two variables whose integrals G_0, G_1
+# above grow linearly with time.  One of the two may rest; then one integral of the other is left, and grows linearly
+# too.
 
 
 REMEDY = "The validated enclosure holds for every motion."

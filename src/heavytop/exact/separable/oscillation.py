@@ -185,7 +185,7 @@ class Gap:
 class FourierBound:
     """The error of the Fourier series of v^j/√g; see the head of this file.
 
-    divided: of (v^j/√g − its value at an end)/(1 − y²) (:mod:`heavytop.exact.separable.oscillation`).
+    divided: of (v^j/√g − its value at an end)/(1 − y²).
     """
 
     def __init__(self, middle: arb, reach: arb, rest: Roots, divided: bool = False) -> None:
@@ -307,7 +307,7 @@ def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 #     F_j(X) = ∫_0^X v^j h dX = φ_j X + ∫_0^y (v^j h − φ_j)/(1 − y²) dy,   φ_j = v^j h at v = e,
 #
 # where the last integrand is q_j = −L times the divided difference of v^j h at v and e: regular, and a function of
-# y² alone.  In y = sin χ, v = m − (L/2) cos 2χ is the map of :mod:`heavytop.exact.separable.oscillation`, so with q_j =
+# y² alone.  In y = sin χ, v = m − (L/2) cos 2χ is the map above, so with q_j =
 # Σ b_n cos 2nχ
 #
 #     ∫ q_j dy = Σ ½ b_n (sin (2n + 1)χ/(2n + 1) + sin (2n − 1)χ/(2n − 1)),   χ = 2 atan tanh(X/2)
@@ -418,7 +418,7 @@ def _divided(polynomial: arb_poly, place: arb) -> arb_poly:
 #
 # Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
 # rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
-# which counts as roots of multiplicity two (:mod:`heavytop.exact.separable.oscillation`).  It grows by a fixed angle
+# which counts as roots of multiplicity two.  It grows by a fixed angle
 # with every turn. The vector that is along h at t = 0 and fixed in space then stands at the angle Λ(0) − Λ from h
 # (:class:`WithBearing`).
 

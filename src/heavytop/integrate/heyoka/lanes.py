@@ -35,7 +35,7 @@ _FAILED = heyoka.taylor_outcome.err_nf_state
 
 
 class StoppedError(Exception):
-    """The ensemble was given up: another thread failed, or the user interrupted."""
+    """The ensemble was abandoned: another thread failed, or the user interrupted."""
 
 
 @dataclass(slots=True)
@@ -75,7 +75,7 @@ class Work:
         self.send((index, run))
 
     def check(self) -> None:
-        """Raise StoppedError if the ensemble was given up."""
+        """Raise StoppedError if the ensemble was abandoned."""
         if self.stop.is_set():
             raise StoppedError
 
@@ -135,7 +135,7 @@ class Lanes:
         self.unverified = 0
 
     def run(self) -> None:
-        """Run problems until none is left; raises StoppedError when the ensemble is given up."""
+        """Run problems until none is left; raises StoppedError when the ensemble is abandoned."""
         for lane in range(self.lanes):
             self._load(lane)
         while any(self.runs):

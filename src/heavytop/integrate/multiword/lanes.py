@@ -395,7 +395,7 @@ def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
 
 # Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
 #
-# What :mod:`heavytop.integrate.multiword.lanes` does motion by motion, for usual ones: doubles of moderate size,
+# What the code above does motion by motion, for usual ones: doubles of moderate size,
 # forwards.
 
 

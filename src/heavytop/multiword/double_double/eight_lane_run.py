@@ -1,6 +1,4 @@
-"""Eight motions in double-double: what the machine code of :mod:`heavytop.multiword.double_double.eight_lane_run` works
-on.
-"""
+"""Eight motions in double-double: the machine code, and the numbers that it works on."""
 
 from __future__ import annotations
 

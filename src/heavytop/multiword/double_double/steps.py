@@ -1,9 +1,9 @@
 """Taylor steps in double-double arithmetic (106 bits), with fewer bits from some order on.
 
-The coefficients y_n of a motion fall with n.  From some order on split coefficients are exact enough
-(:mod:`heavytop.multiword.double_double.steps`), and the low words of all above some n0 < N are too small to matter:
-there the recurrence goes on in plain doubles.  n0 follows the motion: a step is done again with a larger one where
-2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls where a smaller one would do.
+The coefficients y_n of a motion fall with n.  From some order on split coefficients are exact enough, and the low words
+of all above some n0 < N are too small to matter: there the recurrence goes on in plain doubles.  n0 follows the motion:
+a step is done again with a larger one where 2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls
+where a smaller one would do.
 
 The step is h = ρ exp(reach), with the radius ρ from the last two coefficients as Jorba and Zou have it (Exp. Math. 14
 (2005) 99); its significand is cut to ten bits, so that h^4 is a double and h adds to the time exactly.

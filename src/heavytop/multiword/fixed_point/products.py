@@ -275,7 +275,7 @@ def _call(code: Code, tiles: list[Value], levels: Value, arguments: list[Value])
 # Coefficients in digits of 24 bits, whose products are summed exactly.
 #
 # L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and digits d_j, j < J, as
-# :mod:`heavytop.multiword.fixed_point.products` takes them.  What is left out of a sum of n products of numbers,
+# the code above takes them.  What is left out of a sum of n products of numbers,
 # products of digits with i + j ≥ J and what J digits lack, is at most n (J + 1)/4 units of the last word.
 #
 # From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and

@@ -65,7 +65,7 @@ def size_of(grid: Grid, vectors: int) -> Size:
 
 
 def most_orders(grid: Grid) -> int:
-    """Orders after which a step is given up."""
+    """Orders after which a step is abandoned."""
     return int(0.64 * grid.total) + 14
 
 

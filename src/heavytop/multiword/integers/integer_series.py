@@ -51,7 +51,7 @@ class Field(Protocol):
 def coefficients(motion: Field, centre: Sequence[int], precision: int, halvings: int) -> list[list[mpz]] | None:
     """b_0, b_1, ... of each component, up to two in a row that are within 2 units; None where they do not come to that.
 
-    They should within 0.45 orders a bit; a step twice too long is given up at half an order a bit.
+    They should within 0.45 orders a bit; a step twice too long is abandoned at half an order a bit.
     """
     longest = max(abs(value) for value in centre).bit_length() // 2 + 32
     series = _Series(motion, precision, precision + halvings, longest, [[mpz(value)] for value in centre])
@@ -131,7 +131,7 @@ class _Series:
 # One motion in integers of any length: what goes on where the words of a double end.
 #
 # A number of p bits is an integral multiple of 2^-p, the ulp; coefficients are made by
-# :mod:`heavytop.multiword.integers.integer_series`, and h is a power of two, halved and doubled by the number of orders
+# the code above, and h is a power of two, halved and doubled by the number of orders
 # that a step takes.
 
 
