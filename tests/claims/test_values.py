@@ -310,7 +310,7 @@ def test_scales_times_and_digits_far_from_one() -> None:
         ({"value": [one("omega", 1, "1", tolerance="-1")]}, "negative"),
         ({"value": [one("omega", 1, "1", tolerance="nan")]}, "tolerance"),
         ({"value": [one("omega", 1, "1", "inf")]}, "time"),
-        ({"value": [one("omega", 1, 0.5)]}, "Expected `str`"),  # type: ignore[arg-type]
+        ({"value": [one("omega", 1, 0.5)]}, "has to be text, and is a number"),  # type: ignore[arg-type]
         ({"value": [one("omega", 1, "1") | {"unit": "m"}]}, "unit"),
         ({"body": TENSOR_BODY}, "one of"),
         ({"top": None}, "one of"),
