@@ -29,6 +29,9 @@ def invalid(error: Exception) -> str:
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
         wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | "))
         return f"{place} has to be {wanted}, and is {_TYPES.get(match[2], match[2])}"
+    if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
+        what = "of length " if match[1] in ("array", "str") else ""
+        return f"{place} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
     if match := re.fullmatch(r"Object missing required field `(.*)`", text):
         return f"{place} lacks the key {match[1]}"
     if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):
