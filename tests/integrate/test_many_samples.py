@@ -75,6 +75,13 @@ def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, 
     )
 
 
+@pytest.mark.parametrize("precision", [QUAD, parse("real:150"), parse("real:200")], ids=lambda each: each.name)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
+    times = [sign * float(time) / 20 for time in irregular(200, 60, 3)]
+    require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
+
+
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("case", ["lagrange", "ershkov-partial-6", "hess-pendulum"])
 def test_other_tops_and_systems_too(name: str, case: str) -> None:

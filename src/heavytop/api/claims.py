@@ -21,7 +21,7 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
 
     Arguments:
         claim: "ershkov-general", "ershkov-partial", the id of an entry of :func:`claim_library`, or the path of a claim
-            in TOML (docs/claims-in-toml.md).
+            in TOML (`heavytop docs claims-in-toml`).
         system: "heavy_top", "gyrostat" or "heavy_gyrostat": the system whose motion it is claimed to be; None for the
             file's, else "heavy_gyrostat" where its rotor is a list of three, else "heavy_top".
         branch: "smooth" or "printed": the rows of that branch alone.

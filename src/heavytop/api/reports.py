@@ -96,7 +96,7 @@ def run(
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (docs/plans.md).
+        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
@@ -107,7 +107,7 @@ def run(
         seed: measure the same motions with other roundings: 0 to 1000.
         parquet: write rows.parquet too.
         row_timeout: seconds that a row of a third-party integrator may take; None for the plan's, or limits by its
-            other rows (docs/commands.md).
+            other rows (`heavytop docs programs`).
 
     Returns:
         A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.
@@ -171,7 +171,7 @@ def compare(
 
     Arguments:
         baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
-        policy: a TOML file of what counts as the same (docs/compare.md).
+        policy: a TOML file of what counts as the same (`heavytop docs compare`).
         floor: errors below ``floor`` eps are all the same.
         loss: bits that an error may grow by.
 

@@ -36,7 +36,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 BITS = math.log10(2)
 """Decades in one bit."""
-_REMEDY = "docs/compare.md shows every key of a policy."
+_REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
 class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -79,7 +79,7 @@ def attitude_of(run: Trajectory) -> Any:
     if run.problem.xi is None:
         raise InputError(
             "The attitude was not computed: gamma alone does not fix it.",
-            "Give attitude=True for a rotation about the vertical that starts where docs/outputs.md says, or xi.",
+            "Give attitude=True (`heavytop docs outputs` says where the rotation about the vertical starts), or xi.",
         )
     return run.attitude if run.attitude is not None else run.states[:, 6:9]
 

@@ -399,7 +399,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
                 raise InputError(
                     "The attitude was not computed: gamma alone does not fix it.",
-                    "Give attitude=True: xi then starts where docs/outputs.md says.",
+                    "Give attitude=True: xi then starts where `heavytop docs outputs` says.",
                 )
             start = self.centre, self.gamma, self.xi
             found = as_written(self.states, self.attitude, self.times, self.digits, *start)

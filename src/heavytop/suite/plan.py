@@ -43,10 +43,18 @@ from heavytop.top.heavy_top import HeavyTop
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
+QUANTITIES = frozenset(
+    (
+        *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
+        *("omega", "omega_space", "gamma", "quaternion", "matrix"),
+        *("horizon", "times", "rate_times", "tolerance", "tolerances", "steps", "limit"),
+    )
+)
+"""Keys whose values are exact numbers: an integer, a decimal, or text with a decimal or a fraction."""
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A top of the plan's own, or a body in any axes; numbers as exact text.
+    """A top of the plan's own, or a body in any axes; numbers as exact text, or as they are written in TOML.
 
     With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
     numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
@@ -135,21 +143,36 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     else:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
-        table = tomllib.loads(text)
-        plan = of_document(table, kinds)
+        plan = of_document(document_of(text), kinds)
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
         raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def document_of(text: str) -> dict[str, Any]:
+    """The TOML document, with the numbers of :data:`QUANTITIES`, and all that are no integers, as they are written.
+
+    Raises ValueError for what is no TOML.
+    """
+    return {key: _as_written(key, value) for key, value in tomllib.loads(text, parse_float=str).items()}
+
+
+def _as_written(key: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _as_written(name, each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_as_written(key, each) for each in value]
+    return str(value) if key in QUANTITIES and type(value) is int else value
 
 
 def former(name: str) -> set[str]:
     """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
     try:
-        return records.in_document(tomllib.loads(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+        return records.in_document(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
     except (OSError, ValueError, RecursionError):
         return set()
 

@@ -16,7 +16,7 @@ from heavytop.precision import exact
 from heavytop.top.vectors import Vector, vector
 from heavytop.trajectories.observed import RawStart
 
-REMEDY = "docs/score.md lists the columns that are understood."
+REMEDY = "`heavytop docs score` lists the columns that are understood."
 _DEGREES = re.compile(r"[\[(/]?\s*(deg|degrees?|°)\s*[\])]?$", re.IGNORECASE)
 _POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
 _MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
@@ -183,7 +183,7 @@ _ARRAYS = {
 }
 """Keys of JSON documents whose values are a list for each time."""
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
-_REMEDY = "docs/score.md shows what a file may hold."
+_REMEDY = "`heavytop docs score` shows what a file may hold."
 _ORDERS = {
     "wxyz": "wxyz",
     "scalar first": "wxyz",

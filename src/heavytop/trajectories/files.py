@@ -43,7 +43,7 @@ from heavytop.trajectories.observed import (
 # Tables of states that other programs write as text: separators, spellings of the header, comments.
 
 
-REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
+REMEDY = "`heavytop docs score` shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
 VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")

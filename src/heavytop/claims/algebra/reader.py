@@ -141,7 +141,7 @@ class _Parser:
             raise self._error(f"{token!r} expected before {self._next()[:20]!r}")
 
     def _error(self, what: str) -> InputError:
-        return InputError(f"{self._where}: {what}.", "See docs/claims-in-toml.md for what a formula may hold.")
+        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
 
     def end(self) -> None:
         """Raises InputError if anything is left."""

@@ -33,7 +33,7 @@ from heavytop.top.equations import System, system
 
 
 _MAX_BYTES = 100_000
-_REMEDY = "See docs/claims-in-toml.md; worked examples are in src/heavytop/claims/examples."
+_REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
 
 
 def read_claim(path: Path) -> Auditable | ValueClaim:

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 from flint import arb, fmpz
-from gmpy2 import mpz
+from gmpy2 import mpq, mpz
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.enclosure.run import ScaledMotion, Validated, own_parameters, seconds_a_step
@@ -339,7 +339,7 @@ def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Frac
 
 def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction, factor: Fraction) -> Quadratic:
     """``factor`` ∂f/∂θ − (f(θ + by) − f(θ))/over: what a quotient lacks."""
-    varied, slope = moved(p, datum, by), moved(p, datum, Dual(Fraction(0), factor))
+    varied, slope = moved(p, datum, by), moved(p, datum, Dual(mpq(0), factor))
 
     def field(y: tuple[Any, ...]) -> list[Any]:
         rates = zip(system.field(varied, y), system.field(p, y), system.field(slope, y), strict=True)
@@ -354,9 +354,12 @@ _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
+_OF_DATA = 8
+"""Bits that S has fewer than J: a second run costs more than they do."""
 _COARSER = 4
 """δ is 2^4 times the root of an ulp: the ends of a step are known less well than its second derivative is small."""
 _FEW = 4
+_SMALLER = 4
 _SHORTENED = 4
 
 Balls = list[list[arb]]
@@ -416,7 +419,7 @@ def _one_way(
     motion = known.motion(direction)
     time = direction * spans[-1]
     forecast, steps = known.forecast(time, bits)
-    loss, wanted = forecast, bits + _GUARD + int(min(forecast, _FEW * bits) / 4)
+    loss, wanted = forecast, bits + _GUARD + _OF_DATA * data + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
         columns = 7 + 6 * data
         planned = motion.precision(max(2 * wanted, wanted + loss), steps * columns)
@@ -453,11 +456,11 @@ def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: b
 def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int) -> Datum:
     """The field with one of the data larger by δ times :func:`unit_of`."""
     given, size = known.parameters, unit_of(known, datum)
-    own = own_parameters(motion.scaled, given)
-    delta = Fraction(1, 2**tangent.shift)
+    own = own_parameters(motion.scaled, given).mapped(mpq)
+    delta = mpq(1, 2**tangent.shift)
     # the same change, in the units of the motion
     unit = size if datum < 3 else size * motion.scaled.sizes[3] / motion.scaled.rate**2
-    varied = motion.with_parameters(moved(given, datum, delta * size))
+    varied = motion.with_parameters(moved(given, datum, size / 2**tangent.shift))
     system = motion.scaled.system
     direct = quotient(system, own, datum, delta * unit, delta)
     off = difference(system, own, datum, delta * unit, delta, unit)
@@ -472,13 +475,16 @@ def _bounds(field: Quadratic, bits: int) -> tuple[float, float]:
 
 
 def unit_of(known: Validated, datum: int) -> Fraction:
-    """A power of two about as large as what is varied: I_i itself, or the largest |n_i|."""
+    """A power of two, about a sixteenth of what is varied: of I_i itself, or of the largest |n_i|.
+
+    By that much more the ends of a step are in error than its second derivative with respect to a datum is bounded.
+    """
     given = known.parameters
     size = given.inertia[datum] if datum < 3 else max(map(abs, given.moment))
     if size == 0:  # no weight: that which would turn the body as fast as it turns
         size = max(*(i * max(1, w * w) for i, w in zip(given.inertia, known.start.omega, strict=True)))
     value = Fraction(size)
-    return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length())
+    return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length() - _SMALLER)
 
 
 def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Any]]:

@@ -244,6 +244,10 @@ class ScaledMotion:
         system, size = scaled.system, len(scaled.state)
         own = own_parameters(scaled, p).mapped(mpq)
         sign = 1 if forwards else -1
+        lanes = dataclasses.replace(  # quicker than Fractions, and as exact
+            scaled.coefficients,
+            vectors=tuple(tuple(tuple(map(mpq, row)) for row in rows) for rows in scaled.coefficients.vectors),
+        )
 
         def given(state: tuple[Any, ...]) -> list[Any]:
             found = [*system.field(own, state[:6])]
@@ -252,7 +256,7 @@ class ScaledMotion:
             return [sign * rate for rate in found]
 
         def by_lanes(state: tuple[Any, ...]) -> list[Any]:
-            return [sign * rate for rate in rates(system, scaled.coefficients, state)]
+            return [sign * rate for rate in rates(system, lanes, state)]
 
         motion = quadratic(given, size)
         in_words = not scaled.rest and fixed_point_run.excess(scaled) <= _LARGEST_EXCESS

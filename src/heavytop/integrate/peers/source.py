@@ -31,7 +31,7 @@ from heavytop.top.equations import system
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
 _PYTHON = re.compile(r"(?s)(.+\.py):([A-Za-z_][\w.]*)")
 _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
-_SHOWN = "docs/commands.md shows every key."
+_SHOWN = "`heavytop docs programs` shows every key."
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
 _MOST_SECONDS = 10**7
 

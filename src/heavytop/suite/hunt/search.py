@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -44,7 +43,7 @@ from heavytop.suite.hunt.measured import (
     is_plain,
     possible,
 )
-from heavytop.suite.plan import Top
+from heavytop.suite.plan import Top, document_of
 from heavytop.top.amplification import rate
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
@@ -582,13 +581,13 @@ def _document(asked: Asked, m: MeasuredMotion, proven: Proof, integrator: str, n
 def kept(path: Path) -> tuple[Motion, ...]:
     """The motions that a file keeps, none where there is no file yet; raises InputError for any other file."""
     try:
-        document = tomllib.loads(path.read_text("utf-8"))
+        document = document_of(path.read_text("utf-8"))
         if document.keys() - {"top"}:
             raise msgspec.ValidationError(f"unknown key {min(document.keys() - {'top'})}")
         cases = [each.case() for each in msgspec.convert(document.get("top", []), list[Top])]
     except FileNotFoundError:
         return ()
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read: {error}.", _PASTE) from None
     if any(case.system is not HEAVY_TOP for case in cases):
         raise InputError(f"{path} holds a top of another system than heavy_top.", "Take it out: heavy tops are hunted.")
