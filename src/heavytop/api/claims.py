@@ -12,7 +12,7 @@ from heavytop.claims.audit.audit import PAPER, Judged, judged, only_branch, requ
 from heavytop.claims.audit.audit import audit as audit_named
 from heavytop.claims.audit.judge import Audit
 from heavytop.claims.library.entry import Entry, library, require_tag
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.top.equations import System
 
 
@@ -91,11 +91,11 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
         }
         return document | ({"reason": found.reason} if found.reason else {})
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         counts = [sum(each.verdict == name for each in self.verdicts.values()) for name in _VERDICTS]
         said = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
         rows = [(each.id, str(each.source.year), self.verdicts[each.id].verdict) for each in self.entries]
-        return Table(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
+        return TitledTable(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
 
 
 _OPEN = "undecided"
