@@ -9,7 +9,6 @@ _TYPES = {
     "int": "an integer",
     "float": "a number",
     "bool": "true or false",
-    "null": "nothing",
 }
 
 
@@ -27,8 +26,10 @@ def invalid(error: Exception) -> str:
     text, _, place = str(error).partition(" - at `$")
     place = place.strip("`.") or "the file"
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
-        wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | "))
-        return f"{place} has to be {wanted}, and is {_TYPES.get(match[2], match[2])}"
+        wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
+        # a plan has its decimals as text
+        is_number = match[2] == "str" and match[1].startswith(("int", "float"))
+        return f"{place} has to be {wanted}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
     if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
         what = "of length " if match[1] in ("array", "str") else ""
         return f"{place} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"

@@ -25,7 +25,7 @@ from heavytop.render.plots import digits, growth
 from heavytop.render.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, uniform
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
 
 NAME = "drift"
 
@@ -37,7 +37,7 @@ class Extent(NamedTuple):
     noise: bool = True
 
 
-class Run(msgspec.Struct, forbid_unknown_fields=True):
+class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
     """One format with its horizon; ``samples`` uniform samples."""
 
     precision: str
@@ -45,7 +45,7 @@ class Run(msgspec.Struct, forbid_unknown_fields=True):
     samples: int = 1000
 
 
-class DriftTable(Table, tag=NAME):
+class DriftTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows.
 
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
@@ -54,7 +54,7 @@ class DriftTable(Table, tag=NAME):
     """
 
     cases: list[str]
-    runs: list[Run]
+    runs: list[DriftRun]
     integrator: str = HEYOKA
     attitude: bool = False
     noise: bool = True
@@ -80,7 +80,7 @@ class DriftTable(Table, tag=NAME):
         ]
 
 
-class Drift(Kind):
+class DriftKind(Kind):
     """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
 
     name = NAME
