@@ -146,29 +146,29 @@ def step(
 ) -> list[np.ndarray]:
     """One step by the Taylor series of Ω and of the three rows of R."""
     order = 22
-    series = [[part] for part in state]
-    momenta = [tensor @ state[0]]
+    omega, rows, momenta = (np.zeros((order + 1, *shape), REAL) for shape in ((3,), (3, 3), (3,)))
+    omega[0], rows[0], momenta[0] = state[0], state[1:], tensor @ state[0]
     for n in range(order):
-        omega, rows = series[0], series[1:]
-        change = sum((np.cross(momenta[k], omega[n - k]) for k in range(n + 1)), np.cross(rows[2][n], moment))
-        omega_next = solve @ change / REAL(n + 1)
-        after = [
-            sum((np.cross(row[k], omega[n - k]) for k in range(n + 1)), np.zeros(3, REAL)) / REAL(n + 1) for row in rows
-        ]
-        series[0].append(omega_next)
-        momenta.append(tensor @ omega_next)
-        for row, each in zip(rows, after, strict=True):
-            row.append(each)
-    found = []
-    for part in series:
-        total = part[-1]
-        for coefficient in part[-2::-1]:
-            total = total * h + coefficient
-        found.append(total)
-    return found
+        turned = omega[n::-1]
+        change = np.cross(momenta[: n + 1], turned).sum(axis=0) + np.cross(rows[n, 2], moment)
+        omega[n + 1] = solve @ change / REAL(n + 1)
+        momenta[n + 1] = tensor @ omega[n + 1]
+        rows[n + 1] = np.cross(rows[: n + 1], turned[:, None]).sum(axis=0) / REAL(n + 1)
+    powers = h ** np.arange(order + 1)[::-1]
+    return [powers @ part[::-1] for part in (omega, *rows.transpose(1, 0, 2))]
 
 
-def random_motion(source: random.Random, samples: int = 20) -> tuple[Motion, np.ndarray, np.ndarray]:
+def random_motion(source: random.Random) -> tuple[Motion, np.ndarray, np.ndarray]:
+    """A random body's motion with its start: quaternion and Ω."""
+    return followed(*random_body(source))
+
+
+def followed(body: Motion, q: np.ndarray, omega: np.ndarray) -> tuple[Motion, np.ndarray, np.ndarray]:
+    """The motion of a body that has its start alone."""
+    return integrate(body, body.rotation, omega, body.times), q, omega
+
+
+def random_body(source: random.Random, samples: int = 20) -> tuple[Motion, np.ndarray, np.ndarray]:
     """A body of random tensor, half of them about the centre of mass, a third of them diagonal, with its start."""
     rng = np.random.default_rng(source.getrandbits(40))
     moments = np.sort(rng.uniform(0.5, 2, 3))
@@ -184,9 +184,8 @@ def random_motion(source: random.Random, samples: int = 20) -> tuple[Motion, np.
     q = np.round(unit(rng.normal(size=4)), 17).astype(float)
     rotation = of_quaternion(unit(q.astype(REAL)))
     omega = np.round(rng.normal(size=3) * 1.5, 3)
-    body = Motion(mass, gravity, centre, inertia, about, rotation, omega, [])
-    times = [k * source.choice((0.125, 0.25)) for k in range(1, samples + 1)]
-    return integrate(body, rotation, omega, sorted(set(times))), q, omega
+    times = sorted({k * source.choice((0.125, 0.25)) for k in range(1, samples + 1)})
+    return Motion(mass, gravity, centre, inertia, about, rotation, omega, times), q, omega
 
 
 def unit(q: np.ndarray) -> np.ndarray:
@@ -477,10 +476,10 @@ def planted(name: str, motion: Motion, q: np.ndarray, omega: np.ndarray) -> str:
 def general(source: random.Random) -> tuple[Motion, np.ndarray, np.ndarray]:
     """A body in which every mistake shows: full tensor about its centre of mass, centre off all axes, g = 9.81."""
     while True:
-        motion, q, omega = random_motion(source)
-        full = np.abs(motion.inertia[np.triu_indices(3, 1)]).min() > 0.02 and np.abs(motion.centre).min() > 0.05
-        if full and motion.about == "centre of mass" and motion.gravity != 1.0:
-            return motion, q, omega
+        body, q, omega = random_body(source)
+        full = np.abs(body.inertia[np.triu_indices(3, 1)]).min() > 0.02 and np.abs(body.centre).min() > 0.05
+        if full and body.about == "centre of mass" and body.gravity != 1.0:
+            return followed(body, q, omega)
 
 
 def named(name: str, drawn: tuple[Motion, np.ndarray, np.ndarray], folder: Path) -> list[str]:

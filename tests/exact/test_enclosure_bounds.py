@@ -105,7 +105,7 @@ def theorem(found, field):
     """(D, W, the bound of |v|) of the module's theorem, exactly but for e^Λ from below; as numbers."""
     h, q, slope, beta = found.length, field.q, field.l, betas(found)
     order = found.order
-    # half an ulp an order in integers; in words what tests/words/test_proven.py attacks
+    # half an ulp an order in integers; in words what tests/multiword/test_proven.py attacks
     defect = Fraction(found.series.rounding) * ulp(found)
     for n in range(order, 2 * order + 1):
         pairs = sum(beta[j] * beta[n - j] for j in range(max(0, n - order), min(n, order) + 1))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.display import Lines, Table
+from heavytop.display import LazyLines, TitledTable
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import first_steps, propagate
@@ -73,6 +73,13 @@ def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, 
     require_same(
         INTEGRATORS[name](CASE.top, CASE.start, asked, precision), one_by_one(INTEGRATORS[name], asked, precision)
     )
+
+
+@pytest.mark.parametrize("precision", [QUAD, parse("real:150"), parse("real:200")], ids=lambda each: each.name)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
+    times = [sign * float(time) / 20 for time in irregular(200, 60, 3)]
+    require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
@@ -154,7 +161,7 @@ def test_the_first_and_last_rows_alone_are_formatted() -> None:
         asked.append(place)
         return [str(place)]
 
-    text = Table("many", ["n"], Lines(10**6, line)).text()
+    text = TitledTable("many", ["n"], LazyLines(10**6, line)).text()
     assert asked == [*range(5), *range(10**6 - 5, 10**6)]
     assert "999990 more" in text
     calls = []

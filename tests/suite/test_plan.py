@@ -140,6 +140,28 @@ def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
         plan_of(tmp_path, f"name = 'x'\n{TOP.replace('mine', 'euler')}{MEASURE}")
 
 
+def test_numbers_of_a_plan_are_those_that_it_writes_down(tmp_path: Path) -> None:
+    body = """[[top]]
+name = "mine"
+mass = 15
+gravity = 9.80665000000000000000001
+centre = [0, 1, 0.5]
+inertia = [1, 2, "5/2"]
+about = "pivot"
+omega = [0, -1, 2e-1]
+quaternion = [1, 0, 0, 0]
+"""
+    (task,) = plan_of(tmp_path, f"name = 'x'\n{body}{MEASURE.replace('euler', 'mine')}".replace('"10"', "10"))
+    assert task.key.horizon == "10"
+    assert task.case.body.mass == 15
+    assert task.case.body.gravity == Fraction("9.80665000000000000000001")
+    assert task.case.body.centre == (0, 1, Fraction(1, 2))
+    assert task.case.given_start.omega == (0, -1, Fraction(1, 5))
+    for wrong, said in (("nan", "not a finite number"), ("true", "Expected"), ("[1]", "Expected"), ("1" * 5000, "not")):
+        with pytest.raises(InputError, match=said):
+            plan_of(tmp_path, f"name = 'x'\n{body.replace('= 15', f'= {wrong}')}{MEASURE.replace('euler', 'mine')}")
+
+
 def test_unknown_plans_are_refused() -> None:
     with pytest.raises(InputError, match="Unknown plan 'huge'"):
         load("huge")

@@ -11,7 +11,7 @@ import numpy
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.exact.catalogue import find
 from heavytop.integrate import registry
@@ -353,14 +353,14 @@ class Propagated(Tabular):
         """The states rounded to double, in the same shape."""
         return numpy.array(self.states, dtype=float)
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         flat = self.to_numpy().reshape(-1, 6)
         several = isinstance(self.outcome, tuple)
         said = "all reached every time" if self.succeeded else "not all times were reached"
         times = numpy.atleast_1d(self.times)
         lines = [(str(float(times[i % len(times)])), *map(str, row)) for i, row in enumerate(flat[:_SHOWN])]
         title = f"{len(self.steps) if isinstance(self.steps, tuple) else 1} motion{'s' if several else ''}: {said}"
-        return Table(title, ("t", *NAMES), lines)
+        return TitledTable(title, ("t", *NAMES), lines)
 
 
 _SHOWN = 20

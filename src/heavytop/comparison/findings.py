@@ -124,7 +124,7 @@ class Change(NamedTuple):
         return None
 
 
-class Point(NamedTuple):
+class SettingPoint(NamedTuple):
     """One setting of an integrator on one case: log10 of its steps and of its error, in the two reports."""
 
     steps: tuple[float, float]
@@ -136,7 +136,7 @@ class Changes:
     """Gathers what a comparison finds, pair by pair."""
 
     rows: list[Change] = field(default_factory=list)
-    points: dict[tuple[str, str, str], list[Point]] = field(default_factory=dict)
+    points: dict[tuple[str, str, str], list[SettingPoint]] = field(default_factory=dict)
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
@@ -155,7 +155,7 @@ class Changes:
         if len(logs) == 2 and old.steps and new.steps:
             steps = math.log10(old.steps), math.log10(new.steps)
             key = _curve(old.identity)
-            self.points.setdefault(key, []).append(Point(steps, (logs[0], logs[1])))
+            self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
 
     def at_finest_alone(self, change: Change) -> bool:
         """Whether of all settings of an integrator on a case the finest alone has changed, in as many steps.

@@ -26,7 +26,7 @@ from heavytop.render.plots import digits, growth
 from heavytop.render.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, uniform
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
 
 NAME = "drift"
 
@@ -38,7 +38,7 @@ class Extent(NamedTuple):
     noise: bool = True
 
 
-class Run(msgspec.Struct, forbid_unknown_fields=True):
+class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
     """One format with its horizon; ``samples`` uniform samples."""
 
     precision: str
@@ -46,7 +46,7 @@ class Run(msgspec.Struct, forbid_unknown_fields=True):
     samples: int = 1000
 
 
-class DriftTable(Table, tag=NAME):
+class DriftTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows.
 
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
@@ -55,7 +55,7 @@ class DriftTable(Table, tag=NAME):
     """
 
     cases: list[str]
-    runs: list[Run]
+    runs: list[DriftRun]
     integrator: str = HEYOKA
     attitude: bool = False
     noise: bool = True
@@ -81,7 +81,7 @@ class DriftTable(Table, tag=NAME):
         ]
 
 
-class Drift(Kind):
+class DriftKind(Kind):
     """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
 
     name = NAME

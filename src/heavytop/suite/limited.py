@@ -23,7 +23,7 @@ from heavytop.integrate.peers.contract import said
 from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.rows import Kind, Kinds, Task, begin_worker, died, ended_its_process, failed, measure
+from heavytop.suite.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
 
 _BASE = 30.0
 """Seconds that every row may take."""
@@ -143,7 +143,7 @@ class _Worker:
         self._guest = ""
 
 
-def _begin(*kinds: Kind) -> None:
+def _begin(*kinds: MeasuredKind) -> None:
     lead_group()
     begin_worker(*kinds)
 
@@ -220,7 +220,7 @@ def _kept_worker() -> _Worker:
     return _Worker({})
 
 
-def in_limited_process(kind: Kind, task: Task, limit: float) -> tuple[Row, float]:
+def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Row, float]:
     """The row of a third-party integrator, measured in a child of this process within a limit, and its seconds.
 
     The child is kept for the next row; it ends with this process.  For one thread at a time.

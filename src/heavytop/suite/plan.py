@@ -24,7 +24,7 @@ from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.files import read_whole
-from heavytop.integrate.integrator import Source
+from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers import require as require_integrator
@@ -34,7 +34,7 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, physical, require
 from heavytop.records import FINEST, RowKey
-from heavytop.suite.rows import Kinds, Table, Task
+from heavytop.suite.rows import Kinds, PlanTable, Task
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
@@ -43,10 +43,18 @@ from heavytop.top.heavy_top import HeavyTop
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
+QUANTITIES = frozenset(
+    (
+        *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
+        *("omega", "omega_space", "gamma", "quaternion", "matrix"),
+        *("horizon", "times", "rate_times", "tolerance", "tolerances", "steps", "limit"),
+    )
+)
+"""Keys whose values are exact numbers: an integer, a decimal, or text with a decimal or a fraction."""
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A top of the plan's own, or a body in any axes; numbers as exact text.
+    """A top of the plan's own, or a body in any axes; numbers as exact text, or as they are written in TOML.
 
     With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
     numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
@@ -89,7 +97,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """
 
     name: str
-    measure: list[Table]
+    measure: list[PlanTable]
     top: list[Top] = []
     sweep: list[Sweep] = []
     integrator: list[dict[str, Any]] = []
@@ -97,7 +105,9 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     row_timeout: str | int | float = ""
 
 
-def read(name: str, kinds: Kinds, seed: int = 0, integrator: str | Source = "") -> tuple[Plan, str, Sequence[Task]]:
+def read(
+    name: str, kinds: Kinds, seed: int = 0, integrator: str | IntegratorSource = ""
+) -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
     integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
@@ -133,30 +143,45 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     else:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
-        table = tomllib.loads(text)
-        plan = of_document(table, kinds)
+        plan = of_document(document_of(text), kinds)
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
         raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def document_of(text: str) -> dict[str, Any]:
+    """The TOML document, with the numbers of :data:`QUANTITIES`, and all that are no integers, as they are written.
+
+    Raises ValueError for what is no TOML.
+    """
+    return {key: _as_written(key, value) for key, value in tomllib.loads(text, parse_float=str).items()}
+
+
+def _as_written(key: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _as_written(name, each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_as_written(key, each) for each in value]
+    return str(value) if key in QUANTITIES and type(value) is int else value
 
 
 def former(name: str) -> set[str]:
     """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
     try:
-        return records.in_document(tomllib.loads(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+        return records.in_document(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
     except (OSError, ValueError, RecursionError):
         return set()
 
 
-def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
+def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
     """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
     one name.
     """
-    found: list[Source] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
+    found: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
     for text in plan.integrators:
         if text.endswith(".toml"):
             found += commands_in(folder / text)
@@ -174,7 +199,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
     return defined
 
 
-def beside(plan: Plan, integrator: str | Source) -> Plan:
+def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     """The plan with the same measurements of another integrator after heyoka's.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
@@ -215,7 +240,7 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
             )
 
 
-def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = None) -> Sequence[Task]:
+def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | None = None) -> Sequence[Task]:
     """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
 
     defined: integrators of the plan's own, by name.
@@ -237,7 +262,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = Non
         for whole in plan.measure
         for table, cases in _parts(whole, _chunked(plan, swept) if whole.chunked else swept)
     ]
-    sources: dict[str, Source | None] = {}
+    sources: dict[str, IntegratorSource | None] = {}
     seen: dict[RowKey, str] = {}
     for templates, _ in parts:
         for place, task in enumerate(templates):
@@ -337,7 +362,7 @@ def _require_fit(task: Task) -> None:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
-def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, Sequence[Case] | None]]:
+def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
     """The table itself, or one for each of its cases where one is a sweep: then the table is of the sweep's first."""
     names: list[str] = getattr(table, "cases", [])
     if not swept.keys() & set(names):

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 from flint import arb, fmpz
-from gmpy2 import mpz
+from gmpy2 import mpq, mpz
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.enclosure.run import ScaledMotion, Validated, own_parameters, seconds_a_step
@@ -339,7 +339,7 @@ def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Frac
 
 def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction, factor: Fraction) -> Quadratic:
     """``factor`` ∂f/∂θ − (f(θ + by) − f(θ))/over: what a quotient lacks."""
-    varied, slope = moved(p, datum, by), moved(p, datum, Dual(Fraction(0), factor))
+    varied, slope = moved(p, datum, by), moved(p, datum, Dual(mpq(0), factor))
 
     def field(y: tuple[Any, ...]) -> list[Any]:
         rates = zip(system.field(varied, y), system.field(p, y), system.field(slope, y), strict=True)
@@ -354,16 +354,19 @@ _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
+_OF_DATA = 8
+"""Bits that S has fewer than J: a second run costs more than they do."""
 _COARSER = 4
 """δ is 2^4 times the root of an ulp: the ends of a step are known less well than its second derivative is small."""
 _FEW = 4
+_SMALLER = 4
 _SHORTENED = 4
 
 Balls = list[list[arb]]
 
 
 @dataclass(frozen=True, slots=True)
-class Derivatives:
+class EnclosedDerivatives:
     """start: J, 6 × 6, [i][j] = ∂y_i(t)/∂y_j(0).  data: S, 6 × 6, by :data:`DATA`; None where not asked for."""
 
     start: Balls
@@ -387,12 +390,12 @@ class _Columns:
         )
 
 
-def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[Derivatives]:
+def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[EnclosedDerivatives]:
     """J, and S where asked for, at each of ``times`` in their order: ``bits`` right, relative above 1, absolute below.
 
     Raises OutOfReach where the digits cannot be proven, or would take longer than ``known.effort``.
     """
-    found: dict[Fraction, Derivatives] = {}
+    found: dict[Fraction, EnclosedDerivatives] = {}
     for direction in (1, -1):
         spans = sorted({abs(time) for time in times if time * direction > 0})
         if spans:
@@ -403,20 +406,20 @@ def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bo
 
 
 @whole_evaluation
-def _at_rest(bits: int, data: bool) -> Derivatives:
+def _at_rest(bits: int, data: bool) -> EnclosedDerivatives:
     with working_precision(bits + 8):
         start = [[arb(int(i == j)) for j in range(6)] for i in range(6)]
-        return Derivatives(start, [[arb(0)] * 6 for _ in range(6)] if data else None)
+        return EnclosedDerivatives(start, [[arb(0)] * 6 for _ in range(6)] if data else None)
 
 
 def _one_way(
     known: Validated, direction: int, spans: list[Fraction], bits: int, data: bool
-) -> dict[Fraction, Derivatives]:
+) -> dict[Fraction, EnclosedDerivatives]:
     """Those at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
     forecast, steps = known.forecast(time, bits)
-    loss, wanted = forecast, bits + _GUARD + int(min(forecast, _FEW * bits) / 4)
+    loss, wanted = forecast, bits + _GUARD + _OF_DATA * data + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
         columns = 7 + 6 * data
         planned = motion.precision(max(2 * wanted, wanted + loss), steps * columns)
@@ -453,11 +456,11 @@ def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: b
 def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int) -> Datum:
     """The field with one of the data larger by δ times :func:`unit_of`."""
     given, size = known.parameters, unit_of(known, datum)
-    own = own_parameters(motion.scaled, given)
-    delta = Fraction(1, 2**tangent.shift)
+    own = own_parameters(motion.scaled, given).mapped(mpq)
+    delta = mpq(1, 2**tangent.shift)
     # the same change, in the units of the motion
     unit = size if datum < 3 else size * motion.scaled.sizes[3] / motion.scaled.rate**2
-    varied = motion.with_parameters(moved(given, datum, delta * size))
+    varied = motion.with_parameters(moved(given, datum, size / 2**tangent.shift))
     system = motion.scaled.system
     direct = quotient(system, own, datum, delta * unit, delta)
     off = difference(system, own, datum, delta * unit, delta, unit)
@@ -472,13 +475,16 @@ def _bounds(field: Quadratic, bits: int) -> tuple[float, float]:
 
 
 def unit_of(known: Validated, datum: int) -> Fraction:
-    """A power of two about as large as what is varied: I_i itself, or the largest |n_i|."""
+    """A power of two, about a sixteenth of what is varied: of I_i itself, or of the largest |n_i|.
+
+    By that much more the ends of a step are in error than its second derivative with respect to a datum is bounded.
+    """
     given = known.parameters
     size = given.inertia[datum] if datum < 3 else max(map(abs, given.moment))
     if size == 0:  # no weight: that which would turn the body as fast as it turns
         size = max(*(i * max(1, w * w) for i, w in zip(given.inertia, known.start.omega, strict=True)))
     value = Fraction(size)
-    return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length())
+    return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length() - _SMALLER)
 
 
 def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Any]]:
@@ -578,7 +584,9 @@ def _at(
 
 
 @whole_evaluation
-def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]) -> Derivatives:
+def _in_units(
+    known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]
+) -> EnclosedDerivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes
@@ -595,4 +603,4 @@ def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: 
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]
     start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
-    return Derivatives(start, data if tangent.data else None)
+    return EnclosedDerivatives(start, data if tangent.data else None)

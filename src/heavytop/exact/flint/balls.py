@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from fractions import Fraction
 from functools import wraps
@@ -153,46 +153,62 @@ def require_undisturbed() -> None:
         raise ContextChanged
 
 
+def _alone(thread: int) -> Generator[None, None, None]:
+    """Holds the lock from the first ``next`` until it is closed or forgotten, wherever Ctrl-C comes meanwhile."""
+    with _lock:
+        _held.own = ctx.prec, ctx.cap
+        _held.context, _held.disturbed = _DEFAULTS, False
+        _held.thread = thread
+        try:
+            yield
+        finally:
+            _held.thread = 0
+            ctx.prec, ctx.cap = _held.own
+
+
 class _Block:
     """What the two blocks share.  precision, length: None for the one that stays."""
 
-    __slots__ = ("before", "length", "outermost", "precision")
+    __slots__ = ("before", "holding", "length", "precision")
     precision: int | None
     length: int | None
 
     def __enter__(self) -> None:
         me = get_ident()
-        self.outermost = _held.thread != me
-        if self.outermost:
-            _lock.acquire()
-            _held.own = ctx.prec, ctx.cap
-            _held.thread, _held.context, _held.disturbed = me, _DEFAULTS, False
-        elif (ctx.prec, ctx.cap) != _held.context:
-            _note()
-        self.before = precision, length = _held.context
-        _held.context = (
-            precision if self.precision is None else self.precision,
-            length if self.length is None else self.length,
-        )
+        self.holding = None if _held.thread == me else _alone(me)
+        self.before = _DEFAULTS if self.holding else _held.context
+        precision, length = self.before
         try:
+            if self.holding:
+                next(self.holding)
+            elif (ctx.prec, ctx.cap) != _held.context:
+                _note()
+            _held.context = (
+                precision if self.precision is None else self.precision,
+                length if self.length is None else self.length,
+            )
             _set(_held.context)
-        except BaseException:  # no precision: FLINT says what is wrong with it
-            ctx.prec, ctx.cap = _held.context = self.before
-            self.__exit__(BaseException)
+        except BaseException:  # Ctrl-C, or no precision: FLINT says what is wrong with it
+            if self.holding:
+                self.holding.close()
+            else:
+                ctx.prec, ctx.cap = _held.context = self.before
             raise
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if (ctx.prec, ctx.cap) != _held.context:
             _note()
-        disturbed = _held.disturbed
-        if self.outermost:
-            _set(_held.own)
-            _held.thread = 0
-            _lock.release()
-        else:
+        disturbed, outermost = _held.disturbed, self.holding is not None
+        if self.holding:
+            self.holding.close()
+        else:  # no call, after which Ctrl-C might come, between the context and what it is meant to be
+            precision, length = self.before
+            if ctx.prec != precision:
+                ctx.prec = precision
+            if ctx.cap != length:
+                ctx.cap = length
             _held.context = self.before
-            _set(self.before)
-        if disturbed and (kind is None or (self.outermost and issubclass(kind, Exception))):
+        if disturbed and (kind is None or (outermost and issubclass(kind, Exception))):
             raise ContextChanged
 
 

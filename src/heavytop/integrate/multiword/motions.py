@@ -14,8 +14,9 @@ from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
+from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -31,6 +32,8 @@ _MANY = 64
 _LARGE = 2.0**_LARGE_EXPONENT
 _EVERY_BIT = 1200
 """Bits in which sums of doubles below 2^100 are exact."""
+_SLACK = 8
+"""Bits that words are wider than those of their grid, and sums of them than they, at most."""
 _LEAST_LOW = 2.0**-960
 """A low word that is larger has all its bits."""
 OUTCOMES = {
@@ -156,7 +159,7 @@ def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
     return far and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
 
 
-def _holds(run: Run, precision: Precision) -> bool:
+def _holds(run: ResumableRun, precision: Precision) -> bool:
     """Whether arrays hold the states of this run: two words in a format that has no more, K of a grid in any other."""
     if isinstance(run, Floating):
         return DOUBLE.bits <= precision.bits <= BITS and precision.family != "quad"
@@ -210,7 +213,25 @@ def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: P
     return _widening(precision)(0.0) + highs * sizes + lows, odd.any(axis=1)
 
 
-def _sums_of_words(words: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+def _reals(words: list[Doubles], grid: Grid, bits: int) -> Any:
+    """The sums of words, rounded once.
+
+    Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
+    """
+    import heyoka
+    import numpy
+
+    zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
+    # a double has 53 bits: of a larger one none is lost behind what the others begin with
+    least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
+    if first > 0 and all(((abs(word) >= least) | (word == 0)).all() for word in words[first:]):
+        return sum(words[:first], zero) + sum(words[first:], zero)
+    total = sum(words, heyoka.real(0, _EVERY_BIT))
+    rounded = [heyoka.real(value, bits) for value in total.ravel()]
+    return numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
+
+
+def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
     """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows in which
     only exact numbers tell.
     """
@@ -219,10 +240,8 @@ def _sums_of_words(words: Doubles, sizes: Doubles, precision: Precision) -> tupl
 
     each = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
-        zero = heyoka.real(0, _EVERY_BIT)
-        total = sum(each, zero) * numpy.array([zero + size for size in sizes])
-        states = numpy.array([heyoka.real(value, precision.bits) for value in total.ravel()], dtype=heyoka.real)
-        return states.reshape(total.shape), numpy.zeros(len(words), bool)
+        scale = numpy.array([heyoka.real(float(size)) for size in sizes])
+        return _reals(each, grid, precision.bits) * scale, numpy.zeros(len(words), bool)
     # two words fill a quad, and what the others add to is added to them at once
     first, second, rest, *smaller = (word.astype(heyoka.real128) for word in each)
     odd = numpy.zeros(words.shape[::2], bool)
@@ -249,7 +268,7 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
 class _Pace:
     """A run advanced in chunks, in the units of the problem."""
 
-    run: Run
+    run: ResumableRun
     scaled: Scaled
     step_limit: int | None
     between: Callable[[], None] | None
@@ -314,9 +333,13 @@ class _Pace:
         import numpy
 
         assert isinstance(self.run, Fixed)
-        times, rate = [abs(exact(target)) for target in targets], self.scaled.rate
-        status, words, others = self.run.sampled(times if rate == 1 else [time * rate for time in times])
-        states, odd = _sums_of_words(words, sizes, precision)
+        given, rate = numpy.array(targets), self.scaled.rate
+        times: Doubles = given.astype(float)
+        if (given == times).all():  # the rate is a power of two
+            status, words, others = self.run.sampled(abs(times) * float(rate))
+        else:
+            status, words, others = self.run.sampled([abs(exact(target)) * rate for target in targets])
+        states, odd = _sums_of_words(words, self.run.grid, sizes, precision)
         for row in map(int, numpy.flatnonzero(odd)):
             if row not in others:
                 others[row] = tuple(sum(map(Fraction, column), Fraction(0)) for column in words[row].T.tolist())

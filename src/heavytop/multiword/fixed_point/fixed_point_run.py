@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -13,7 +13,7 @@ from heavytop.multiword.codegen.recurrence import series_rates
 from heavytop.multiword.fixed_point import steps
 from heavytop.multiword.fixed_point.arithmetic import Grid, digits, exact, words_of
 from heavytop.multiword.fixed_point.steps import most_of, most_orders, rows_of, sample_row, size_of
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 
 _FIRST_HALVINGS = 3
 _FEWEST_HALVINGS = -4
@@ -90,7 +90,7 @@ def _from_nothing(problem: Scaled) -> list[Fraction]:
     return [value for value in born.values() if value]
 
 
-class Fixed(Run):
+class Fixed(ResumableRun):
     """A motion that advances on a grid of K words; the problem is scaled so that |ω| <= 4."""
 
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
@@ -159,61 +159,73 @@ class Fixed(Run):
         at = doubles(self.grid.words)
         at[:] = digits((time - self._began) / length, self.grid)
         found = doubles(sample_row(self.grid, self.vectors))
-        self._samples(at, found, 0, 1)
+        self._samples((pointer(self.rows), pointer(at), pointer(found)), 0, 1)
         return self.exact_state(found, time)
 
     @property
     def _began(self) -> Fraction:
         return Fraction(float(self.clock[steps.BEGAN]))
 
-    def _samples(self, at: Doubles, found: Doubles, first: int, last: int) -> None:
-        order = int(self.counts[steps.ORDERS])
-        self.machine.functions["samples"](pointer(self.rows), order, pointer(at), first, last, pointer(found))
-
-    def sampled(self, times: Sequence[Fraction]) -> tuple[Status, Doubles, dict[int, tuple[Fraction, ...] | None]]:
+    def sampled(
+        self, times: Sequence[Fraction] | Doubles
+    ) -> tuple[Status, Doubles, dict[int, tuple[Fraction, ...] | None]]:
         """Steps until the last of the times |τ| > 0, in order: the bits of :meth:`advance` and :meth:`sample`.
 
+        times: exact numbers, or an array of doubles, which takes less time.
         The states that were reached, in K + 1 words, shape (samples, K + 1, 6 or 9); and by their places those states
         that these words cannot hold, None where nothing can.
         """
-        ceilings, done, status = numpy.array([_not_before(time) for time in times]), 0, Status.FINE
-        bits = max(_FINEST_TIME, *(time.denominator.bit_length() for time in times))
-        wholes = [time.numerator << bits - time.denominator.bit_length() + 1 for time in times]
-        found = doubles(sample_row(self.grid, self.vectors) * len(times)).reshape(len(times), -1)
-        others = dict[int, tuple[Fraction, ...] | None]()
+        if isinstance(times, numpy.ndarray):
+            ceilings, inside = times, self._doubles_inside(times)
+        else:
+            ceilings, inside = numpy.array([_not_before(time) for time in times]), self._inside(times)
+        done, status, limit, words = 0, Status.FINE, most_of(self.grid), self.grid.words
+        at, found = doubles(words * len(times)), doubles(sample_row(self.grid, self.vectors) * len(times))
+        pointers = pointer(self.rows), pointer(at), pointer(found)
+        table, others = found.reshape(len(times), -1), dict[int, tuple[Fraction, ...] | None]()
         while done < len(times) and status is Status.FINE:
             covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
             if covered <= done:
                 status = self._advance(ceilings[done], _STEPS_AT_ONCE)
                 continue
-            rows = found[done:covered]
-            self._put_rows(wholes[done:covered], bits, rows)
-            if not rows[:, -8:].max() <= most_of(self.grid):
+            at[words * done : words * covered] = inside(done, covered)
+            self._samples(pointers, done, covered)
+            if not table[done:covered, -8:].max() <= limit:
                 for row in range(done, covered):
-                    if not found[row, -8:].max() <= most_of(self.grid):
-                        others[row] = self.exact_state(found[row], times[row])
+                    if not table[row, -8:].max() <= limit:
+                        others[row] = self.exact_state(table[row], Fraction(times[row]))
             done = covered
-        return status, self._components(found[:done]), others
+        return status, self._components(table[:done]), others
 
-    def _put_rows(self, wholes: Sequence[int], bits: int, rows: Doubles) -> None:
-        """Rows of samples at times in units of 2^-bits, inside the last step."""
-        began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
-        shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
-        x = [(whole - began) << shift if shift >= 0 else _nearest(whole - began, -shift) for whole in wholes]
-        at = doubles(self.grid.words * len(wholes))
-        at[:] = [word for value in x for word in words_of(value, self.grid)]
-        self._samples(at, rows, 0, len(wholes))
+    def _samples(self, pointers: tuple[Any, Any, Any], first: int, last: int) -> None:
+        """Those of the last step from one to before another; pointers: to its rows, their words of x, the result."""
+        order, (rows, at, found) = int(self.counts[steps.ORDERS]), pointers
+        self.machine.functions["samples"](rows, order, at, first, last, found)
 
-    def _rows_at(self, wholes: Sequence[int], bits: int) -> Doubles:
-        """Rows of samples at times in units of 2^-bits, inside the last step."""
-        began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
-        room, at = sample_row(self.grid, self.vectors), doubles(self.grid.words * len(wholes))
-        shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
-        x = [(whole - began) << shift if shift >= 0 else _nearest(whole - began, -shift) for whole in wholes]
-        at[:] = [word for value in x for word in words_of(value, self.grid)]
-        found = doubles(room * len(wholes))
-        self._samples(at, found, 0, len(wholes))
-        return found.reshape(-1, room)
+    def _inside(self, times: Sequence[Fraction]) -> Callable[[int, int], Any]:
+        """The words of (time − began)/h in the last step, from one of the times to before another."""
+        bits = max(_FINEST_TIME, *(time.denominator.bit_length() for time in times))
+        wholes = [time.numerator << bits - time.denominator.bit_length() + 1 for time in times]
+
+        def words(first: int, last: int) -> list[float]:
+            began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
+            shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
+            away = [whole - began for whole in wholes[first:last]]
+            x = [value << shift if shift >= 0 else _nearest(value, -shift) for value in away]
+            return [word for value in x for word in words_of(value, self.grid)]
+
+        return words
+
+    def _doubles_inside(self, times: Doubles) -> Callable[[int, int], Any]:
+        """The same of doubles.  time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz)."""
+
+        def words(first: int, last: int) -> Any:
+            part, began = times[first:last], self.clock[steps.BEGAN]
+            x = (part - began) / (self.clock[steps.TIME] - began)
+            found = _split(x, self.grid) if began == 0 or part[-1] <= 2 * began else None
+            return self._inside([*map(Fraction, part.tolist())])(0, last - first) if found is None else found.ravel()
+
+        return words
 
     def _components(self, rows: Doubles) -> Doubles:
         """The words of (Ω, γ, ξ) out of rows of samples; the last is what the one before it had to round."""
@@ -282,6 +294,23 @@ def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
         middle = left[5] / 2
         found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
     return tuple(found)
+
+
+def _split(x: Doubles, grid: Grid) -> Doubles | None:
+    """The words of :func:`heavytop.multiword.fixed_point.arithmetic.words_of`, a row each; None where they do not hold
+    all of x.
+    """
+    found, rest = numpy.zeros((len(x), grid.words)), x
+    for k in range(grid.words):
+        size = 2.0 ** (grid.bits * (k + 1))
+        digits = rest * size
+        low = numpy.floor(digits)
+        word = (low + (digits - low >= 0.5)) / size
+        found[:, k] = word
+        rest = rest - word
+        if not rest.any():
+            return found
+    return None
 
 
 def _nearest(value: int, shift: int) -> int:
