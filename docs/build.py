@@ -1,8 +1,9 @@
 """Build the site into docs/_build/html: ``python docs/build.py``.
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
-from `results/claims/library.json`, or by new audits where that is not of the entries as they stand.  Then every link
-inside the site is followed, and the words of pages, docstrings and messages are looked up among common misspellings.
+from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
+line from the program (command_reference.py).  Then every link inside the site is followed, and the words of pages,
+docstrings and messages are looked up among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
@@ -17,9 +18,12 @@ from pathlib import Path
 from time import perf_counter
 from urllib.parse import unquote, urlsplit
 
+import command_reference
+
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
 CLAIMS = DOCS / "_build" / "claims.md"
+COMMANDS = DOCS / "_build" / "commands.md"
 ROOT = DOCS.parent
 SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
 
@@ -92,6 +96,7 @@ def main() -> int:
         shutil.rmtree(DOCS / "_build", ignore_errors=True)
     began = perf_counter()
     write_claims()
+    COMMANDS.write_text(command_reference.markdown(), "utf-8")
     sphinx = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-n", "-b", "html", str(DOCS), str(OUT)]
     built = subprocess.run(sphinx, stderr=subprocess.PIPE, text=True, check=False)
     # the kernels of notebooks talk over the loopback device, and say so each time

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
+import tomllib
+from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +14,34 @@ from pygments.lexers.special import TextLexer
 import heavytop
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+# MathJax with its fonts in one file; the extension that the package is would copy 20 MB
+_MATHJAX = distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
+URLS = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["urls"]
 
 project = "heavytop"
 author = copyright = "The heavytop authors"
 version = release = heavytop.__version__
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "myst_nb",
+    "sphinx_copybutton",
+    "thumbnails",
+]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 toc_object_entries = False
 html_theme = "furo"
 html_title = "heavytop"
 html_theme_options = {"navigation_with_keys": True}
-html_static_path = ["_static"]
+if "Source" in URLS:
+    html_theme_options |= {"source_repository": URLS["Source"], "source_branch": "main", "source_directory": "docs/"}
+html_static_path = ["_static", str(_MATHJAX)]
+mathjax_path = "tex-svg.js"
+# what a page prints is not for pasting
+copybutton_selector = "div.highlight:not(.highlight-text .highlight, .output .highlight) pre"
 html_css_files = ["site.css"]
 html_show_copyright = False
 html_copy_source = False
@@ -30,7 +49,7 @@ default_role = "code"
 smartquotes = False
 pygments_style = "default"
 
-myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
+myst_enable_extensions = ["deflist", "dollarmath", "colon_fence", "attrs_block"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "notebooks")
