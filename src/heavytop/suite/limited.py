@@ -105,7 +105,7 @@ class _Worker:
             return None
         return self.began + self.limit - monotonic()
 
-    def submit(self, index: int, limit: float | None, kind: Kind, task: Task, saved: Saved) -> None:
+    def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
         """Begins a task: its time runs from when the process is there."""
         guest = task.key.subject.name if task.is_third_party else ""
         if self._guest not in ("", guest):
