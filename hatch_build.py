@@ -1,7 +1,8 @@
-"""Records the commit that a distribution is built from: in a file of the sdist, and in the metadata of the wheel.
+"""Puts the pages of docs/ into the wheel, and records the commit that a distribution is built from.
 
-Without git, and outside of a checkout of this project, a wheel takes what the sdist says; where neither is there it
-records nothing.  An editable installation asks git at run time instead (:mod:`heavytop.version`).
+`heavytop docs` prints the pages.  The commit is in a file of the sdist, and in the metadata of the wheel.  Without git,
+and outside of a checkout of this project, a wheel takes what the sdist says; where neither is there it records nothing.
+An editable installation asks git at run time instead (:mod:`heavytop.version`).
 """
 
 from __future__ import annotations
@@ -17,10 +18,14 @@ NAME = "commit.txt"
 
 
 class CommitHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling names no configuration of its builders
-    """Adds ``commit.txt`` to what is built."""
+    """Adds the pages and ``commit.txt`` to what is built."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Write the file and tell hatchling where it goes; ``version`` is "standard" or "editable"."""
+        """Write the file and tell hatchling what goes where; ``version`` is "standard" or "editable"."""
+        if self.target_name == "wheel" and version != "editable":
+            docs = Path(self.root) / "docs"
+            for page in (*docs.glob("*.md"), *docs.glob("tutorials/*.md")):
+                build_data["force_include"][str(page)] = f"heavytop/docs/{page.relative_to(docs).as_posix()}"
         commit = of_checkout(self.root) or of_sdist(self.root)
         if commit is None or version == "editable":
             return

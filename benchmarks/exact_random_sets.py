@@ -27,7 +27,7 @@ from heavytop.exact.cases.dokshevich import AlgebraicDokshevich, dokshevich_moti
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya
-from heavytop.exact.cases.kovalevskaya_theta import Level, ThetaMotion
+from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, ThetaMotion
 from heavytop.exact.cases.one_interval import gaps, steklov_motion
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, working_precision
@@ -241,7 +241,7 @@ def attitudes(name: str, family: FAMILY, count: int, seed: int) -> None:
 def meeting(seed: int) -> None:
     farthest, count = 0.0, 0
     for motion in drawn(kovalevskaya, 9, seed):
-        level = Level.of(motion.top, motion.start)
+        level = KovalevskayaLevel.of(motion.top, motion.start)
         with working_precision(256):
             forms = AbelMotion.of(level, 1 << 17), ThetaMotion.of(level)
             for time in (F(0), F(100), LATE, F(10**9)):

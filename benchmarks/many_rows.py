@@ -17,7 +17,7 @@ def child(count: int) -> None:
     from msgspec.structs import replace
 
     import heavytop.suite.run
-    from heavytop.api.run_folder import Run
+    from heavytop.api.run_folder import PlannedRun
     from heavytop.cases import CASES
     from heavytop.kinds import KINDS
     from heavytop.records import RowKey
@@ -36,7 +36,7 @@ def child(count: int) -> None:
     heavytop.suite.run.rows = rows
     with tempfile.TemporaryDirectory() as folder:
         began = perf_counter()
-        asked = Run({"name": "many"}, tasks, [], Path(folder) / "out", False, 1, None, 10.0, False)
+        asked = PlannedRun({"name": "many"}, tasks, [], Path(folder) / "out", False, 1, None, 10.0, False)
         code = 0 if asked.measure(lambda task: None).good else 3
         size = (Path(folder) / "out" / "report.json").stat().st_size
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -26,7 +26,7 @@ from heavytop.render.score import guessed, requirement, score_report, score_text
 from heavytop.suite.plan import read
 from heavytop.suite.score import assess
 from heavytop.trajectories.files import read as read_file
-from heavytop.trajectories.observed import Given, of_arrays
+from heavytop.trajectories.observed import GivenTrajectory, of_arrays
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
@@ -37,7 +37,7 @@ def command(*arguments: str) -> tuple[int, str, str]:
     return done.exit_code, done.stdout, done.stderr
 
 
-def given(case=CASE, times=TIMES, spoilt=lambda i, state: state, precision=DOUBLE) -> Given:
+def given(case=CASE, times=TIMES, spoilt=lambda i, state: state, precision=DOUBLE) -> GivenTrajectory:
     run = ht.propagate(case.top, case.start, times, precision, system=case.system)
     rows = [spoilt(i, list(state)) for i, state in enumerate(run.states)]
     return of_arrays(case.top, case.start, case.system, times, rows, precision, "mine", "rk4")

@@ -117,6 +117,9 @@ def test_a_table_of_another_program_has_a_verdict_and_a_gate(wheel: Path, tmp_pa
     # it is the wheel that runs, not the sources
     where = done(tmp_path, programs / "python", "-c", "import heavytop; print(heavytop.__file__)")
     assert str(tmp_path) in where
+    # with its documentation, which messages refer to
+    assert done(tmp_path, heavytop, "docs", "score") == (ROOT / "docs" / "score.md").read_text("utf-8")
+    assert done(tmp_path, heavytop, "docs") == done(tmp_path, sys.executable, "-m", "heavytop", "docs")
     # the third command
     said = done(tmp_path, heavytop, "score", "mine.csv", "--case", "lagrange", "--html", "page.html")
     assert re.match(

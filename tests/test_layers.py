@@ -1,6 +1,7 @@
 """The plan of rooms, enforced by reading the imports."""
 
 import ast
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -131,3 +132,17 @@ def test_no_file_is_longer_than_anyone_reads() -> None:
 
 def test_no_room_hides_a_public_name() -> None:
     assert not {path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py")} & set(heavytop.__all__)
+
+
+TWO_MEANINGS = {"Integrator", "Report", "Section"}
+"""Of the Python interface, each with its namesake behind it."""
+
+
+def test_a_public_class_name_has_one_meaning() -> None:
+    places = Counter(
+        node.name
+        for path in SOURCE.rglob("*.py")
+        for node in ast.parse(path.read_text("utf-8")).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert {name for name, count in places.items() if count > 1} == TWO_MEANINGS

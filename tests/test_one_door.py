@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.api.integrators import check_integrator, new_integrator
+from heavytop.api.pages import page
 from heavytop.cases import case
 from heavytop.cli import app
 from heavytop.errors import HeavyTopError
@@ -244,6 +245,7 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: new_integrator(Path("new"), "latin"),
     ),
     "list of no case": (["list", "--case", "nobody"], lambda: case("nobody")),
+    "docs of nothing": (["docs", "nothing"], lambda: page("nothing")),
     "score to no digits": (["score", "nowhere.csv", "--require", "-1"], lambda: required("-1")),
     "score of no file": (["score", "nowhere.csv"], lambda: read(Path("nowhere.csv"), None, False)),
 }

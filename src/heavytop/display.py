@@ -17,7 +17,7 @@ class Tabular:
 
     __slots__ = ()
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -27,7 +27,7 @@ class Tabular:
         return self._table().html()
 
 
-class Lines(Sequence[Sequence[str]]):
+class LazyLines(Sequence[Sequence[str]]):
     """The lines of a long table, each made when it is shown.
 
     count: how many.  line: the texts of one of them.
@@ -48,7 +48,7 @@ class Lines(Sequence[Sequence[str]]):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TitledTable:
     """A title, a table below it and notes below that; long tables show their first and last rows.
 
     header: one text a column.  rows: as many texts each.  whole: every row is shown.

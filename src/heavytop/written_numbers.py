@@ -19,7 +19,7 @@ _PLAIN = re.compile(r"[+-]?\d{1,40}(\.\d{0,40})?([eE][+-]?\d{1,3})?")
 """Most numbers; none of them is beyond what is read."""
 _WIDEST = 20_000
 """Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
-_REMEDY = "docs/score.md shows both forms of the file."
+_REMEDY = "`heavytop docs score` shows both forms of the file."
 _ASKED = 600
 """Numbers that are looked at for what format they were written from."""
 

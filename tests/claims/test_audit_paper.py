@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 from heavytop.claims.audit.audit import audit, only_branch
-from heavytop.claims.audit.judge import Audit, Row, judge
+from heavytop.claims.audit.judge import Audit, StatementVerdict, judge
 from heavytop.claims.library import ershkov, ershkov_general
 from heavytop.claims.library.ershkov_audit import GeneralClaim, PartialClaim
 from heavytop.errors import InputError
@@ -22,7 +22,7 @@ def report(name: str, system: str = "heavy_top") -> Audit:
     return audit(name, system)
 
 
-def rows(found: Audit, equation: str, branch: str = "smooth", domain: str = "all") -> dict[int, Row]:
+def rows(found: Audit, equation: str, branch: str = "smooth", domain: str = "all") -> dict[int, StatementVerdict]:
     chosen = [r for r in found.rows if (r.equation, r.branch, r.domain) == (equation, branch, domain)]
     assert chosen, f"no row for {equation} {branch} {domain}"
     return {row.component: row for row in chosen}

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 from heavytop.claims.algebra.arcs import Arcs
-from heavytop.claims.algebra.conditions import Kind, Need
+from heavytop.claims.algebra.conditions import ConditionKind, Need
 from heavytop.claims.algebra.fields import Assumptions, Field
 from heavytop.claims.algebra.prover import Prover, Region
 from heavytop.claims.algebra.reader import assume
@@ -65,14 +65,16 @@ def test_what_an_assumption_needs_to_be_real_may_be_0(x, divisor, assumed, relat
 
 
 def test_each_kind_of_need_is_kept_apart():
-    needs = [Need(Kind.NONNEGATIVE, A), Need(Kind.POSITIVE, B), Need(Kind.NONZERO, C)]
+    needs = [Need(ConditionKind.NONNEGATIVE, A), Need(ConditionKind.POSITIVE, B), Need(ConditionKind.NONZERO, C)]
     found = assume([], needs, [], SYMBOLS)
     assert (found.weak, found.facts) == ((A,), (B, C**2))
     known = Setting(T, (), (), facts=found.facts, weak=found.weak).assumptions(0, facts=(B + 1,), weak=(A + 1,))
     assert (known.weak, known.facts) == ((A, A + 1), (B, C**2, B + 1))
 
 
-@pytest.mark.parametrize(("kind", "expected"), [(Kind.NONNEGATIVE, Sign(1, False)), (Kind.POSITIVE, Sign(1, True))])
+@pytest.mark.parametrize(
+    ("kind", "expected"), [(ConditionKind.NONNEGATIVE, Sign(1, False)), (ConditionKind.POSITIVE, Sign(1, True))]
+)
 def test_what_the_flow_keeps_is_as_strict_as_the_need(kind, expected):
     kept = OMEGA1 - OMEGA2
     said = statement(sympy.sqrt(kept), RESTING, frozenset({Need(kind, kept)}))

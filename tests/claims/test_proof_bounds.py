@@ -9,7 +9,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.algebra.conditions import (
-    Kind,
+    ConditionKind,
     Need,
     condition,
     conditions_for_zero,
@@ -38,12 +38,12 @@ def words(needs) -> set[str]:
 @pytest.mark.parametrize(
     ("kind", "met"),
     [
-        (Kind.NONZERO, {-1: True, -TINY: True, 0: False, TINY: True, 1: True}),
-        (Kind.POSITIVE, {-1: False, -TINY: False, 0: False, TINY: True, 1: True}),
-        (Kind.NONNEGATIVE, {-1: False, -TINY: False, 0: True, TINY: True, 1: True}),
+        (ConditionKind.NONZERO, {-1: True, -TINY: True, 0: False, TINY: True, 1: True}),
+        (ConditionKind.POSITIVE, {-1: False, -TINY: False, 0: False, TINY: True, 1: True}),
+        (ConditionKind.NONNEGATIVE, {-1: False, -TINY: False, 0: True, TINY: True, 1: True}),
     ],
 )
-def test_a_need_is_met_up_to_its_edge_and_not_beyond(kind: Kind, met: dict) -> None:
+def test_a_need_is_met_up_to_its_edge_and_not_beyond(kind: ConditionKind, met: dict) -> None:
     for value, expected in met.items():
         assert Need(kind, T).is_met({T: Fraction(value)}) is expected
     # what is 0 but only to a ball: nobody knows
@@ -64,7 +64,9 @@ def test_a_need_is_met_up_to_its_edge_and_not_beyond(kind: Kind, met: dict) -> N
     ],
 )
 def test_a_sign_meets_what_follows_from_it(sign: Sign, nonzero: bool, positive: bool, nonnegative: bool) -> None:
-    found = [kind.is_met_by(sign) for kind in (Kind.NONZERO, Kind.POSITIVE, Kind.NONNEGATIVE)]
+    found = [
+        kind.is_met_by(sign) for kind in (ConditionKind.NONZERO, ConditionKind.POSITIVE, ConditionKind.NONNEGATIVE)
+    ]
     assert found == [nonzero, positive, nonnegative]
 
 
@@ -316,7 +318,7 @@ def test_what_fails_on_the_relations_is_not_removable() -> None:
         setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1)},), relations=relations)
         field = Field(setting.assumptions(0), [A - 1])
         region = Region(field, setting, statement, list(setting.places(statement)))
-        assert region.is_removable(Need(Kind.NONZERO, A - 1)) is expected
+        assert region.is_removable(Need(ConditionKind.NONZERO, A - 1)) is expected
 
 
 def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -> None:
@@ -324,7 +326,8 @@ def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -
 
 
 @pytest.mark.parametrize(
-    "need", [Need(Kind.NONNEGATIVE, -1 - T**2), Need(Kind.NONZERO, T - T), Need(Kind.POSITIVE, -P)]
+    "need",
+    [Need(ConditionKind.NONNEGATIVE, -1 - T**2), Need(ConditionKind.NONZERO, T - T), Need(ConditionKind.POSITIVE, -P)],
 )
 def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
     setting = Setting(T, (P,), ({P: Fraction(2)},))

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from heavytop.claims.audit import audit as auditing
 from heavytop.claims.audit.audit import audit_claim, claim_from_table, read_claim
-from heavytop.claims.audit.judge import Audit, Row
+from heavytop.claims.audit.judge import Audit, StatementVerdict
 from heavytop.claims.audit.values import PrintedNumber, ValueClaim
 from heavytop.claims.library import entry as entries
 from heavytop.errors import InputError
@@ -44,7 +44,7 @@ def one(quantity: str, component: int, number: str, time: str = "0", **more: str
     return {"quantity": quantity, "component": component, "number": number, "time": time} | more
 
 
-def figures(row: Row) -> dict[str, Any]:
+def figures(row: StatementVerdict) -> dict[str, Any]:
     assert row.figures is not None
     return dict(row.figures)
 

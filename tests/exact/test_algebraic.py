@@ -16,7 +16,7 @@ from heavytop.exact.cases.algebraic_starts import (
     kowalewski_motion,
 )
 from heavytop.exact.cases.lagrange import polynomial
-from heavytop.exact.cases.one_interval import Curve, gaps, quadratics
+from heavytop.exact.cases.one_interval import IntervalCurve, gaps, quadratics
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
@@ -85,7 +85,7 @@ def test_the_identities_hold_exactly_for_all_moments(second):
         assert norm.degree() == 0
         assert curve.gamma_square() == F(str(norm[0]))
     b2, b0, c2, c0 = quadratics(F(1), second, F(13, 10))
-    assert Curve.of((F(1), second, F(13, 10)), polynomial(b0, F(0), b2), polynomial(c0, F(0), c2)).power == 1
+    assert IntervalCurve.of((F(1), second, F(13, 10)), polynomial(b0, F(0), b2), polynomial(c0, F(0), c2)).power == 1
 
 
 @pytest.mark.parametrize("term", range(3))
@@ -95,7 +95,7 @@ def test_a_planted_fault_breaks_an_identity(term):
         parts = [right.second, right.third]
         parts[which] = parts[which] + polynomial(*[F(0)] * term, F(1, 10**30))
         with pytest.raises(NotInClass, match="is not 0"):
-            Curve.of(right.inertia, *parts)
+            IntervalCurve.of(right.inertia, *parts)
 
 
 def test_chaplygins_motion_starts_from_rest():

@@ -12,7 +12,7 @@ import pytest
 from flint import arb
 
 from heavytop.exact.enclosure import derivatives as module
-from heavytop.exact.enclosure.derivatives import Derivatives, derivatives, moved, step_derivatives
+from heavytop.exact.enclosure.derivatives import EnclosedDerivatives, derivatives, moved, step_derivatives
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Errors, Node, start_node, step
 from heavytop.exact.flint.balls import largest_singular_value, midpoint, radius, working_precision
@@ -119,7 +119,7 @@ def test_a_sign_in_one_entry_fails_the_laws(entry):
     right = of(motion, time)
     rows = [list(row) for row in right.start]
     rows[entry[0]][entry[1]] = -rows[entry[0]][entry[1]]
-    failed = [law for law, values in laws(motion, time, Derivatives(rows, None)).items() if not holds(values)]
+    failed = [law for law, values in laws(motion, time, EnclosedDerivatives(rows, None)).items() if not holds(values)]
     assert {"determinant", "flow", "scale"} <= set(failed)
     assert sum("gradient" in law for law in failed) >= 1
     values = difference(motion, time, entry[1])

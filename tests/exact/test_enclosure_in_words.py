@@ -12,7 +12,7 @@ from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits
 from heavytop.multiword.fixed_point import fixed_point_run
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Series
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -152,7 +152,7 @@ def test_a_step_that_words_cannot_hold_is_shortened():
     found = step(motion.field, type(node)(node.time, node.centre, node.errors, -3), 138, certified)
     assert found is not None
     assert found.node.halvings > -3
-    assert isinstance(found.series, Series)
+    assert isinstance(found.series, WordSeries)
     assert isinstance(certified, CertifiedSeries)
 
 

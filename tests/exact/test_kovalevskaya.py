@@ -8,7 +8,7 @@ from flint import acb, acb_series, arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya, _fourth_root
-from heavytop.exact.cases.kovalevskaya_theta import ORDERS, Level, ThetaMotion, start_of
+from heavytop.exact.cases.kovalevskaya_theta import ORDERS, KovalevskayaLevel, ThetaMotion, start_of
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import Undecided, ball, midpoint, series_length, working_precision
 from heavytop.exact.separable.abel import Rest
@@ -27,7 +27,7 @@ def motion_from(moment, omega, gamma, i3=F(1)):
 
 
 def motion_level(motion):
-    return Level.of(motion.top, motion.start)
+    return KovalevskayaLevel.of(motion.top, motion.start)
 
 
 def scale(motion, level):
@@ -146,7 +146,7 @@ def test_a_double_root_outside_the_gaps_does_no_harm_however_near():
 @pytest.mark.parametrize("seed", range(9))
 def test_theta_functions_and_abel_inversion_meet(seed):
     motion = random_motion(seed)
-    level = Level.of(motion.top, motion.start)
+    level = KovalevskayaLevel.of(motion.top, motion.start)
     with working_precision(256):
         forms = AbelMotion.of(level, 1 << 17), ThetaMotion.of(level)
         for time in (F(0), F(1), F(-1000), F(10**9)):
@@ -159,7 +159,7 @@ def test_theta_functions_and_abel_inversion_meet(seed):
 def test_theta_functions_and_abel_inversion_meet_where_q_vanishes(omega):
     motion = motion_from((F(1), F(0)), omega, TILTED)
     with working_precision(320):
-        theta = ThetaMotion.of(Level.of(motion.top, motion.start))
+        theta = ThetaMotion.of(KovalevskayaLevel.of(motion.top, motion.start))
         for time in (F(0), F(7, 3)):
             assert all(a.overlaps(b) for a, b in zip(theta.at(time, 1), motion.state(time, 200), strict=True))
         rows = theta.at(F(7, 3), 3)
@@ -187,7 +187,7 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
     logarithms = []
     for time in (F(8), F(24)):
         state = [midpoint(value) for value in enclosure.state(time, 100)]
-        level = Level.of(motion.top, State(state[:3], state[3:]))
+        level = KovalevskayaLevel.of(motion.top, State(state[:3], state[3:]))
         with working_precision(200):
             start = start_of(level)
             # w - e is as the square of the distance, one of the two variables takes part

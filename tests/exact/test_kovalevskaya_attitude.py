@@ -8,7 +8,7 @@ from flint import arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya, along_gamma, level_vector
-from heavytop.exact.cases.kovalevskaya_theta import Level, start_of
+from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, start_of
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
@@ -37,7 +37,7 @@ def motion_from(omega, gamma, moment=(F(1), F(0)), i3=F(1)):
 def test_the_vector_is_level_and_its_azimuth_turns_as_the_integrals_say(seed):
     rng = random.Random(seed)
     top = HeavyTop((2, 2, 1), 1, (positive(rng), rational(rng), 0))
-    level = Level.of(top, State(triple(rng), triple(rng)))
+    level = KovalevskayaLevel.of(top, State(triple(rng), triple(rng)))
     with working_precision(300, 3):
         motion = [x * 1 for x in start_of(level).motion]
         vector = level_vector(level, motion)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.display import Lines, Table
+from heavytop.display import LazyLines, TitledTable
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import first_steps, propagate
@@ -161,7 +161,7 @@ def test_the_first_and_last_rows_alone_are_formatted() -> None:
         asked.append(place)
         return [str(place)]
 
-    text = Table("many", ["n"], Lines(10**6, line)).text()
+    text = TitledTable("many", ["n"], LazyLines(10**6, line)).text()
     assert asked == [*range(5), *range(10**6 - 5, 10**6)]
     assert "999990 more" in text
     calls = []

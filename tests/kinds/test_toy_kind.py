@@ -19,7 +19,7 @@ from heavytop.render.page import report_page
 from heavytop.render.terminal import summary
 from heavytop.suite.checkpoint import Checkpoint, Saved
 from heavytop.suite.plan import expand, load
-from heavytop.suite.rows import Find, Table, Task, exact_row
+from heavytop.suite.rows import Find, PlanTable, Task, exact_row
 from heavytop.suite.run import run
 
 WEIGHT = Quantity("toy_weight")
@@ -31,7 +31,7 @@ factors = ["2", "3"]
 """
 
 
-class ToyTable(Table, tag="toy"):
+class ToyTable(PlanTable, tag="toy"):
     """factors: what the weight is multiplied by."""
 
     cases: list[str]

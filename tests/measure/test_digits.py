@@ -16,7 +16,7 @@ from heavytop.records import SCHEMA, Metric, Report
 from heavytop.render import plots
 from heavytop.render.text import worst
 from heavytop.suite.score import score
-from heavytop.trajectories.observed import Given
+from heavytop.trajectories.observed import GivenTrajectory
 from support import in_process
 from support.report_helpers import error, row
 from support.reports import html, replace, summary
@@ -26,7 +26,7 @@ TIMES = [Fraction(i) for i in range(1, 5)]
 CASE = CASES["lagrange"]
 
 
-def given(errors: dict[tuple[int, int], Fraction], precision=DOUBLE, omega_scale: int = 1) -> Given:
+def given(errors: dict[tuple[int, int], Fraction], precision=DOUBLE, omega_scale: int = 1) -> GivenTrajectory:
     """The known motion of a Lagrange top, spoilt at (sample, component); ``omega_scale``: how much faster it turns."""
     from heavytop.exact.catalogue import find
 
@@ -39,10 +39,12 @@ def given(errors: dict[tuple[int, int], Fraction], precision=DOUBLE, omega_scale
         balls = solution.state(time, 300)
         middle = [int(m) * Fraction(2) ** int(e) for m, e in (value.mid().man_exp() for value in balls)]
         states.append(tuple(value + errors.get((index, i), Fraction(0)) for i, value in enumerate(middle)))
-    return Given("mine", "rk4", top, start, problem.system, precision, TIMES, states, Outcome.SUCCESS, 4, {}, "0" * 64)
+    return GivenTrajectory(
+        "mine", "rk4", top, start, problem.system, precision, TIMES, states, Outcome.SUCCESS, 4, {}, "0" * 64
+    )
 
 
-def recomputed(given: Given) -> float:
+def recomputed(given: GivenTrajectory) -> float:
     """−log10 of the largest |error|/max(1, |true value|), exactly, from the states and 300-bit truth."""
     problem = Problem.of(given.top, given.start, given.precision)
     solution = known_motion(problem, given.times[-1]).solution

@@ -27,7 +27,7 @@ from heavytop.multiword.fixed_point.arithmetic import Grid, exact, grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.fixed_point.products import DigitRows, digits_of
 from heavytop.multiword.fixed_point.steps import rows_of, size_of
-from heavytop.multiword.integers.integer_series import Whole
+from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from support.words_helpers import LEVELS, problem
@@ -195,7 +195,7 @@ MOTIONS = {
 def test_steps_are_those_of_whole_numbers(words: int, name: str, forwards: bool) -> None:
     given, grid, span = MOTIONS[name], grid_of(words), Fraction(2)
     assert rows_of(grid) is DigitRows
-    run, known = Fixed(given, grid, forwards), Whole(given, 64 * (grid.total // 64 + 2), forwards)
+    run, known = Fixed(given, grid, forwards), IntegerMotion(given, 64 * (grid.total // 64 + 2), forwards)
     for each in (run, known):
         assert each.advance(span, 10**4) is Status.FINE
     assert run.redone == 0 or name == "an entire function"  # which allows any step

@@ -10,7 +10,7 @@ from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome
 from heavytop.multiword.codegen.recurrence import rates
-from heavytop.multiword.integers.integer_series import Whole, field_of
+from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.precision import exact, real
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
@@ -59,11 +59,11 @@ def test_more_bits_than_words_have_are_met_to_the_last() -> None:
 
 
 def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
-    whole = Whole(problem(1, attitude=True), 200, True)
+    whole = IntegerMotion(problem(1, attitude=True), 200, True)
     assert whole.advance(Fraction(3), 100) is Status.FINE
     before, place = whole.steps, whole.place()
     whole.sample(whole.time - Fraction(1, 1000))
-    again = Whole(problem(1, attitude=True), 200, True)
+    again = IntegerMotion(problem(1, attitude=True), 200, True)
     again.restore(place, before - 1)
     for run in (whole, again):
         assert run.advance(Fraction(6), 100) is Status.FINE

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from heavytop.comparison.compare import Comparison
+from heavytop.comparison.compare import Differences
 from heavytop.comparison.noise import Policy
 from heavytop.document.document import logarithm
 from heavytop.measure.scalar import of_fraction
@@ -59,7 +59,7 @@ def candidate() -> Report:
     return made
 
 
-def compared() -> Comparison:
+def compared() -> Differences:
     return compare(baseline(), candidate(), Policy())
 
 
@@ -109,7 +109,7 @@ def test_the_text_is_the_golden_one(name: str) -> None:
     assert MADE[name]() == (GOLDEN / name).read_text("utf-8")
 
 
-def hostile() -> Comparison:
+def hostile() -> Differences:
     bad = row(case=HOSTILE, metrics={HOSTILE: error("1e-5")})
     return compare(report(row(case=HOSTILE, metrics={HOSTILE: error("1e-12")})), report(bad), Policy())
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from heavytop.comparison.work_precision import Line, Point, beside_ours, leads, panels
+from heavytop.comparison.work_precision import WorkPrecisionLine, WorkPrecisionPoint, beside_ours, leads, panels
 from heavytop.document.document import Headline
 from heavytop.document.svg import quiet_style
 from heavytop.errors import InputError
@@ -60,7 +60,7 @@ ALL = OURS + CYRK + SPLITTING + FAILED + LANES
 
 
 def test_between_rungs_a_straight_line_on_logarithmic_axes() -> None:
-    line = Line("x", "double", [Point(-8, 1.0, ""), Point(-12, 100.0, "")])
+    line = WorkPrecisionLine("x", "double", [WorkPrecisionPoint(-8, 1.0, ""), WorkPrecisionPoint(-12, 100.0, "")])
     assert line.seconds_at(-10) == pytest.approx(10)
     assert line.seconds_at(-6) == 1
     assert line.seconds_at(-12) == pytest.approx(100)
@@ -68,9 +68,13 @@ def test_between_rungs_a_straight_line_on_logarithmic_axes() -> None:
 
 
 def test_a_line_that_turns_back_takes_the_least_time() -> None:
-    line = Line("x", "double", [Point(-8, 1.0, ""), Point(-12, 4.0, ""), Point(-9, 50.0, "")])
+    line = WorkPrecisionLine(
+        "x",
+        "double",
+        [WorkPrecisionPoint(-8, 1.0, ""), WorkPrecisionPoint(-12, 4.0, ""), WorkPrecisionPoint(-9, 50.0, "")],
+    )
     assert line.seconds_at(-10) == pytest.approx(2)
-    assert line.best == Point(-12, 4.0, "")
+    assert line.best == WorkPrecisionPoint(-12, 4.0, "")
 
 
 def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:

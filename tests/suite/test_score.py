@@ -203,7 +203,7 @@ def test_a_file_that_is_none_is_refused_in_words(name: str, content, message: st
 
 def test_a_misspelt_key_is_named_with_the_nearest_and_comments_stay_free(tmp_path: Path) -> None:
     given = document()
-    for key, remedy in (("presicion", "Did you mean precision?"), ("colour", "docs/score.md")):
+    for key, remedy in (("presicion", "Did you mean precision?"), ("colour", "`heavytop docs score`")):
         with pytest.raises(InputError, match=f"Unknown key '{key}'") as caught:
             read(written(tmp_path, given | {key: "1"}))
         assert remedy in caught.value.remedy

@@ -31,7 +31,7 @@ from heavytop.suite.rows import failed
 from heavytop.suite.survey import measured as records
 from heavytop.suite.survey.gathered import gathered, read_chunk
 from heavytop.suite.survey.measured import chunks, drawn
-from heavytop.suite.sweeps import Grid, Random
+from heavytop.suite.sweeps import Random, SweepGrid
 from support.in_process import heavytop
 from support.reports import compare
 
@@ -103,7 +103,7 @@ def test_pairs_are_a_ring_to_a_hundred_bits() -> None:
 def test_a_grid_is_drawn_as_its_cases() -> None:
     omega = [["0.1", "0", "1e-3"], ["1/3", "1", "0"]]
     axis = ["0", "0", "1"]
-    sweep = Grid(name="g", inertia=["3", "2", "1"], weight="1", centre=axis, omega=omega, gamma=axis)  # type: ignore[arg-type]
+    sweep = SweepGrid(name="g", inertia=["3", "2", "1"], weight="1", centre=axis, omega=omega, gamma=axis)  # type: ignore[arg-type]
     cases = sweep.cases()
     motions = drawn(chunks(sweep, cases, 0), DOUBLE)
     assert list(motions.problems) == [Problem.of(case.top, case.start, DOUBLE) for case in cases]

@@ -11,7 +11,7 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
-from heavytop.trajectories.files import Table, read, unread
+from heavytop.trajectories.files import TextTable, read, unread
 from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]
@@ -145,5 +145,7 @@ def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
     states = ["t", "omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"]
     own = ["xi1", "xi2", "xi3", "omega1_radius", "gamma3_radius", "xi2_radius"]
     names = [*states, *own]
-    assert Table("\n".join([",".join(names), ",".join("0" * len(names)), ",".join("1" * len(names))]), []).notes == []
+    assert (
+        TextTable("\n".join([",".join(names), ",".join("0" * len(names)), ",".join("1" * len(names))]), []).notes == []
+    )
     assert unread([*own, "energy", "energies_radius"], names) == ["columns that are not read: energy, energies_radius"]

@@ -57,7 +57,7 @@ def run(out: Path, killed_at: int) -> int:
     sys.addaudithook(count)
     code = 99
     try:
-        asked = run_folder.Run({"name": "x"}, TASKS, [], out, True, 1, None, 10.0, False)
+        asked = run_folder.PlannedRun({"name": "x"}, TASKS, [], out, True, 1, None, 10.0, False)
         code = 0 if asked.measure(lambda task: None).good else 3
     finally:
         os._exit(code)

@@ -12,7 +12,7 @@ from heavytop.claims.audit.audit import PAPER, Judged, judged, only_branch, requ
 from heavytop.claims.audit.audit import audit as audit_named
 from heavytop.claims.audit.judge import Audit
 from heavytop.claims.library.entry import Entry, library, require_tag
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.top.equations import System
 
 
@@ -21,7 +21,7 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
 
     Arguments:
         claim: "ershkov-general", "ershkov-partial", the id of an entry of :func:`claim_library`, or the path of a claim
-            in TOML (docs/claims-in-toml.md).
+            in TOML (`heavytop docs claims-in-toml`).
         system: "heavy_top", "gyrostat" or "heavy_gyrostat": the system whose motion it is claimed to be; None for the
             file's, else "heavy_gyrostat" where its rotor is a list of three, else "heavy_top".
         branch: "smooth" or "printed": the rows of that branch alone.
@@ -91,11 +91,11 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
         }
         return document | ({"reason": found.reason} if found.reason else {})
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         counts = [sum(each.verdict == name for each in self.verdicts.values()) for name in _VERDICTS]
         said = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
         rows = [(each.id, str(each.source.year), self.verdicts[each.id].verdict) for each in self.entries]
-        return Table(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
+        return TitledTable(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
 
 
 _OPEN = "undecided"

@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.derivatives import PARAMETERS, STARTS, Derivatives, known_derivatives
@@ -56,7 +56,7 @@ class DerivativeScore(Tabular):
     diagnosis: tuple[str, ...]
     passed: bool | None
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         kept = "no Jacobian to score"
         if self.digits_right is not None:
             kept = f"{digits_text(self.digits_right)} of {self.of_digits} digits right"
@@ -65,7 +65,9 @@ class DerivativeScore(Tabular):
             for time, digits, name, error in zip(self.times, self.digits, self.worst, self.errors, strict=True)
         ]
         title = f"derivatives: {self.outcome}, {kept}"
-        return Table(title, ("t", "digits", "worst", "error"), rows, [f"compared with {self.against}", *self.diagnosis])
+        return TitledTable(
+            title, ("t", "digits", "worst", "error"), rows, [f"compared with {self.against}", *self.diagnosis]
+        )
 
 
 def score_derivatives(

@@ -12,7 +12,7 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, quoted
 from heavytop.integrate import peers
-from heavytop.integrate.integrator import Source
+from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.peers.source import named
 from heavytop.measure.integrator import ChosenIntegrator
@@ -95,7 +95,7 @@ def hunt(
 
 
 def asked_for(
-    which: str | Source,
+    which: str | IntegratorSource,
     form: Precision,
     horizon: Number,
     budget: int | str,
@@ -127,7 +127,7 @@ def asked_for(
     return Asked(one, form, time, families[family], two, beyond, number, seconds, _seed(seed))
 
 
-def _integrator(which: str | Source) -> ChosenIntegrator:
+def _integrator(which: str | IntegratorSource) -> ChosenIntegrator:
     return ChosenIntegrator(which) if isinstance(which, str) else ChosenIntegrator(which.name, source=which)
 
 

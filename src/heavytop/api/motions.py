@@ -11,7 +11,7 @@ import numpy
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.exact.catalogue import find
 from heavytop.integrate import registry
@@ -71,7 +71,7 @@ def propagate(
             "heavy_top".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
         attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
-            :func:`heavytop.top.attitude.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
+            γ by the rule of `heavytop docs outputs`, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
             nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
         angles: True for ``angles()`` of the run too, the Euler angles φ, θ, ψ with all turns, followed from t = 0 on
@@ -93,7 +93,7 @@ def propagate(
         OutOfReach: where the run would take more than 1e12 steps, unless ``step_limit`` ends it before.
 
     Source:
-        (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).
+        (1.1) and (1.2) of the paper; the Taylor method is heyoka's (Biscani and Izzo, 2021).
     """
     if arguments.flag(angles, "angles"):
         if xi is not None or observer is not None or attitude is False:
@@ -353,14 +353,14 @@ class Propagated(Tabular):
         """The states rounded to double, in the same shape."""
         return numpy.array(self.states, dtype=float)
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         flat = self.to_numpy().reshape(-1, 6)
         several = isinstance(self.outcome, tuple)
         said = "all reached every time" if self.succeeded else "not all times were reached"
         times = numpy.atleast_1d(self.times)
         lines = [(str(float(times[i % len(times)])), *map(str, row)) for i, row in enumerate(flat[:_SHOWN])]
         title = f"{len(self.steps) if isinstance(self.steps, tuple) else 1} motion{'s' if several else ''}: {said}"
-        return Table(title, ("t", *NAMES), lines)
+        return TitledTable(title, ("t", *NAMES), lines)
 
 
 _SHOWN = 20

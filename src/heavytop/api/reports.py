@@ -15,7 +15,7 @@ from heavytop.api.run_folder import prepare
 from heavytop.comparison import compare as comparing
 from heavytop.comparison import noise as policies
 from heavytop.comparison.motions import beside
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.document.names import printable, row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
@@ -51,7 +51,7 @@ class Report(Tabular, records.Report):
             raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         count = sum(failed(row, KINDS) for row in self.rows)
         title = f"Report of plan {self.plan.get('name', '')}: {len(self.rows)} rows, {self.verdict}"
         if count:
@@ -63,22 +63,22 @@ class Report(Tabular, records.Report):
             worst = max(found, key=lambda m: m.log10 or -1e9).value if found else ""
             cells = (row_name(row.identity), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
             body.append(list(map(printable, cells)))
-        return Table(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
+        return TitledTable(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
 
 
-class Comparison(Tabular, comparing.Comparison):
+class Comparison(Tabular, comparing.Differences):
     """Two reports compared: ``verdict`` (same, better, worse, incomparable), ``changed``, ``tally``, ``to_json()``."""
 
     __slots__ = ()
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         body = [
             list(map(printable, (row_name(f.row), metric_name(f), f.verdict.value, *values(f), f.reason)))
             for f in self.changed
         ]
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
         notes += [printable(each.sentence) for each in self.motions if each.sentence]
-        return Table(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
+        return TitledTable(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
 
 
 def run(
@@ -96,7 +96,7 @@ def run(
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (docs/plans.md).
+        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
@@ -107,7 +107,7 @@ def run(
         seed: measure the same motions with other roundings: 0 to 1000.
         parquet: write rows.parquet too.
         row_timeout: seconds that a row of a third-party integrator may take; None for the plan's, or limits by its
-            other rows (docs/commands.md).
+            other rows (`heavytop docs programs`).
 
     Returns:
         A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.
@@ -171,7 +171,7 @@ def compare(
 
     Arguments:
         baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
-        policy: a TOML file of what counts as the same (docs/compare.md).
+        policy: a TOML file of what counts as the same (`heavytop docs compare`).
         floor: errors below ``floor`` eps are all the same.
         loss: bits that an error may grow by.
 

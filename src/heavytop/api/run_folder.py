@@ -43,7 +43,7 @@ MOST_ON_A_PAGE = 5000
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class FinishedRun:
     """A run that is over: its summary for people, and whether no row failed."""
 
     summary: str
@@ -51,7 +51,7 @@ class Ended:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class PlannedRun:
     """A run of a plan that may begin.
 
     identity: name, hash and seed of the plan.  warnings: what is odd about the plan's own tops.
@@ -76,15 +76,15 @@ class Run:
         report, rows = self.directory / store.FILE, self.directory / checkpoint.FILE
         return self.resume and report.exists() and not rows.exists()
 
-    def finished(self) -> Ended:
+    def finished(self) -> FinishedRun:
         """The end of a run that was finished already; raises InputError where it was of another plan."""
         report = store.read(self.directory, KINDS)
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return Ended(brief(report, report.rows, KINDS), text.all_good(report.rows, KINDS))
+        return FinishedRun(brief(report, report.rows, KINDS), text.all_good(report.rows, KINDS))
 
-    def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> Ended:
+    def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> FinishedRun:
         """Measure what is not there yet, write the report and sum it up.
 
         progress, begun: hear of each task that is finished, and that begins.
@@ -130,14 +130,14 @@ class Run:
         held = [*rows.rows(others), *found, *laws]
         return lambda: held
 
-    def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> Ended:
+    def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:
         """Write all that a finished run leaves.  rows: all rows at each call."""
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, rows(), report.plan)
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
             page.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
-        return Ended(brief(report, rows(), KINDS), text.all_good(rows(), KINDS))
+        return FinishedRun(brief(report, rows(), KINDS), text.all_good(rows(), KINDS))
 
 
 def prepare(
@@ -152,7 +152,7 @@ def prepare(
     with_parquet: bool = False,
     integrator: Any = "",
     row_timeout: Any = None,
-) -> Run:
+) -> PlannedRun:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
 
     Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
@@ -168,7 +168,7 @@ def prepare(
         raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
-    run = Run(
+    run = PlannedRun(
         {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": name_of(which)} if which else {}),
         tasks,
         warnings(loaded),

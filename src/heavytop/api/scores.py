@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.document.names import short
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
@@ -26,7 +26,7 @@ from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
 from heavytop.top.vectors import ordered, vector
-from heavytop.trajectories.observed import Given, of_arrays, of_observed_arrays, raw_start, require_system
+from heavytop.trajectories.observed import GivenTrajectory, of_arrays, of_observed_arrays, raw_start, require_system
 
 # Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.
 
@@ -102,7 +102,7 @@ def observed_arrays(
     form: Precision | None,
     names: tuple[str, str],
     normalize: bool,
-) -> Given:
+) -> GivenTrajectory:
     """The trajectory of these arrays.  Raises InputError for what is no body and no start, and as the reading does."""
     if not isinstance(top, HeavyTop | Body):
         raise InputError(f"top = {quoted(top)} is no body.", _BODY)
@@ -175,7 +175,7 @@ class Score(Tabular):
         """How many digits are right at every sample."""
         return self.digits_kept
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         row = self.row
         kept = "no reference" if self.row.samples else "no state to score"
         if self.digits_kept is not None:
@@ -186,7 +186,7 @@ class Score(Tabular):
         sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
-        return Table(
+        return TitledTable(
             title,
             _HEADER,
             _lines(sizes),
@@ -299,8 +299,8 @@ def _scored(found: Assessment, needed: Fraction | None) -> Score:
 class Drifts(Tabular, dict[str, Summary]):
     """The drift of each first integral by its name."""
 
-    def _table(self) -> Table:
-        return Table("Drift of the first integrals", _HEADER, _lines(self))
+    def _table(self) -> TitledTable:
+        return TitledTable("Drift of the first integrals", _HEADER, _lines(self))
 
 
 def _lines(sizes: Mapping[str, Summary]) -> list[list[str]]:
@@ -321,7 +321,7 @@ def drift(run: Trajectory) -> Drifts:
         InputError: for what is no trajectory, and for one whose states went to an observer.
 
     Source:
-        (1.3), and the classical cases of :mod:`heavytop.top.equations`.
+        (1.3) of the paper, and the integrals of the classical cases.
     """
     if not isinstance(run, Trajectory):
         raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")

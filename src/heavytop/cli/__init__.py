@@ -10,7 +10,7 @@ import os
 import sys
 
 # each adds its commands
-from heavytop.cli import claims, integrators, motions, output, reports  # noqa: F401
+from heavytop.cli import claims, integrators, motions, output, pages, reports  # noqa: F401
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
@@ -18,7 +18,7 @@ from heavytop.errors import HeavyTopError
 _ORDER = (
     *("run", "compare", "history", "show", "export"),
     *("propagate", "reference", "score", "audit", "claims", "figures"),
-    *("selftest", "check-integrator", "new", "hunt", "list"),
+    *("selftest", "check-integrator", "new", "hunt", "list", "docs"),
 )
 """The commands in the order of ``heavytop --help``."""
 app.registered_commands.sort(key=lambda command: _ORDER.index(str(command.name)))

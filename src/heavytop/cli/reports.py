@@ -23,7 +23,9 @@ _REPORT_SECONDS = 0.1
 def compare(
     baseline: Annotated[Path, typer.Argument(help="Report or its folder.")],
     candidate: Annotated[Path, typer.Argument(help="Report or its folder.")],
-    policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as the same, docs/compare.md.")] = None,
+    policy: Annotated[
+        Path | None, typer.Option(help="TOML file of what counts as the same: `heavytop docs compare`.")
+    ] = None,
     floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps are all the same: 4.")] = None,
     loss: Annotated[str | None, typer.Option(help="Bits that an error may grow by: 2.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
@@ -338,7 +340,7 @@ def score(
 
     Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
     first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
-    Euler angles, positions, Ω in axes of space: docs/score.md.  Takes a few seconds.
+    Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
     """
     from heavytop.cases import case as case_named
     from heavytop.suite.score import assess, passed, required

@@ -19,14 +19,14 @@ from heavytop.precision import exact, log10
 from heavytop.records import Identity, Row, Spread
 from heavytop.store.store import AnyReport, Brief
 
-__all__ = ["Comparison", "Finding", "compare"]
+__all__ = ["Differences", "Finding", "compare"]
 
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 _VERSIONS = ("python", "implementation", "flint", "llvm", "cpu_target")
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Differences:
     """All findings, and the differences of the plans and environments.
 
     same: how many metrics are the same, where these are not among the findings.  sentences: what changed, at most
@@ -88,7 +88,7 @@ def compare(
     *,
     list_same: bool = True,
     surveys: tuple[Path, Path] | None = None,
-) -> Comparison:
+) -> Differences:
     """Every row of either report, in the baseline's order, new ones last.
 
     list_same: False to count what plainly stayed the same in place of listing it.
@@ -126,7 +126,7 @@ def compare(
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     joined = [each for each in motions if each is not None]
-    return Comparison(
+    return Differences(
         findings,
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
@@ -256,7 +256,7 @@ class Trial:
         }
 
 
-def trial(name: str, comparison: Comparison) -> Trial:
+def trial(name: str, comparison: Differences) -> Trial:
     """What came of the control, or of the fault of that name."""
     alarms: dict[str, list[tuple[float, str]]] = {}
     quiet: list[tuple[bool, float, str]] = []

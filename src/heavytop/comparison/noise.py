@@ -22,7 +22,7 @@ from typing import Literal
 
 import msgspec
 
-from heavytop.document.kind import Kind
+from heavytop.document.kind import ReportedKind
 from heavytop.errors import InputError
 from heavytop.files import read_whole
 from heavytop.precision import exact, log10, physical
@@ -36,7 +36,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 BITS = math.log10(2)
 """Decades in one bit."""
-_REMEDY = "docs/compare.md shows every key of a policy."
+_REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
 class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -251,7 +251,7 @@ class RoundingBound:
     amplification as what the row itself says.
     """
 
-    def __init__(self, row: Row, kind: Kind) -> None:
+    def __init__(self, row: Row, kind: ReportedKind) -> None:
         self.row = row
         self.kind = kind
 
@@ -414,7 +414,7 @@ def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: 
     return after + (new.band or 0.0) > before + (old.band or 0.0) + spared
 
 
-def noisier(kind: Kind, old: Metric, new: Metric, lost: bool = False) -> bool:
+def noisier(kind: ReportedKind, old: Metric, new: Metric, lost: bool = False) -> bool:
     """Whether the candidate's band is wider than the baseline's by more than chance.
 
     lost: whether the motion has lost all significant digits before the end.

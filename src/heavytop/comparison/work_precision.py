@@ -19,7 +19,7 @@ ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final"
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
     seconds: of its fastest run.  Other work on the machine only ever adds, and adds more to longer runs: medians on a
@@ -32,7 +32,7 @@ class Point:
 
 
 @dataclass(slots=True)
-class Line:
+class WorkPrecisionLine:
     """One integrator in one format, from coarse to fine as the plan has it.
 
     failures: the seconds that points took which did not reach the end; they have no error.
@@ -41,7 +41,7 @@ class Line:
 
     integrator: str
     precision: str
-    points: list[Point] = field(default_factory=list)
+    points: list[WorkPrecisionPoint] = field(default_factory=list)
     failures: list[float] = field(default_factory=list)
     compile: float = 0.0
 
@@ -52,7 +52,7 @@ class Line:
         return self.integrator if plain else f"{self.integrator} {self.precision}"
 
     @property
-    def best(self) -> Point | None:
+    def best(self) -> WorkPrecisionPoint | None:
         """The point with the smallest error."""
         return min(self.points, key=lambda point: point.log10, default=None)
 
@@ -141,20 +141,20 @@ class Lead:
         return f"takes {seconds_text(seconds)}" if ratio is None else f"is {_speed(ratio)} ({seconds_text(seconds)})"
 
 
-def panels(rows: Sequence[Row]) -> dict[str, list[Line]]:
+def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
     """The lines of each case, by the largest error over the samples."""
-    found: dict[str, dict[tuple[str, str], Line]] = {}
+    found: dict[str, dict[tuple[str, str], WorkPrecisionLine]] = {}
     for row in rows:
         if row.outcome in UNMEASURED:
             continue
         name = row.key.subject.name
-        line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))
+        line = found.setdefault(row.case, {}).setdefault((name, row.precision), WorkPrecisionLine(name, row.precision))
         seconds = row.seconds.get("least", math.nan)
         error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
-            line.points.append(Point(error.log10, seconds, row.key.subject.asked))
+            line.points.append(WorkPrecisionPoint(error.log10, seconds, row.key.subject.asked))
             line.compile = max(line.compile, row.seconds.get("compile", 0.0))
     return {case: list(lines.values()) for case, lines in found.items()}
 
@@ -182,11 +182,11 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
     return tables
 
 
-def _rung(line: Line, point: Point) -> str:
+def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
     return point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
 
 
-def _cell(point: Point, ours: Sequence[Line]) -> str:
+def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
     seconds, _ = _quickest(ours, point.log10)
     theirs = "not reached" if seconds is None else seconds_text(seconds, 2)
     return f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)} ({theirs})"
@@ -204,7 +204,7 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
     ]
 
 
-def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
+def _lead(case: str, log10: float, lines: Sequence[WorkPrecisionLine]) -> Lead | None:
     ours = [line for line in lines if line.integrator in (OURS, CONSTANTS)]
     lanes = [line for line in lines if line.integrator == LANES]
     others = [line for line in lines if line.integrator not in (OURS, CONSTANTS, LANES)]
@@ -229,7 +229,7 @@ def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
     )
 
 
-def _quickest(lines: Sequence[Line], log10: float) -> tuple[float | None, str]:
+def _quickest(lines: Sequence[WorkPrecisionLine], log10: float) -> tuple[float | None, str]:
     times = [(seconds, line.label) for line in lines if (seconds := line.seconds_at(log10)) is not None]
     return min(times, default=(None, ""))
 

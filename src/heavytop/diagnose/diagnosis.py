@@ -230,7 +230,7 @@ def _suppositions(given: Examined, truth: Array | None) -> Iterator[Supposition]
             yield data.kind, dict(data.numbers), left, max(FITTED_DROP, data.required)
 
 
-def _of_reading(reading: hypotheses.Reading, left: float) -> Supposition:
+def _of_reading(reading: hypotheses.ColumnsHypothesis, left: float) -> Supposition:
     numbers: dict[str, str] = {}
     if reading.meaning:
         numbers["meaning"] = reading.meaning
@@ -245,9 +245,11 @@ def _of_reading(reading: hypotheses.Reading, left: float) -> Supposition:
     return ("axes_permuted" if "meaning" not in numbers and not reading.swapped else "columns"), numbers, left, DROP
 
 
-def _of_clock(clock: hypotheses.Clock, left: float, units: Units) -> Supposition:
+def _of_clock(clock: hypotheses.TimesHypothesis, left: float, units: Units) -> Supposition:
     numbers = {"shift": _text(clock.shift, units.time)} if clock.kind == "times_shifted" else {}
-    numbers |= {"factor": f"{clock.factor:.6g}"} if clock.kind == "time_unit" else {}
+    if clock.kind == "time_unit":
+        steps = hypotheses.steps_of_interval(clock.factor)
+        numbers = {"factor": f"{clock.factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
     return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
 
 

@@ -10,13 +10,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from itertools import permutations, product
 from math import isfinite
 from typing import Any, TypeVar
 
 import numpy
 
-from heavytop.diagnose.samples import ALIKE, FARTHEST, FLOOR, SHORT, SMALL, Array, Examined, motion, named, notable
+from heavytop.diagnose.samples import (
+    ALIKE,
+    FARTHEST,
+    FITTED_DROP,
+    FLOOR,
+    SHORT,
+    SMALL,
+    Array,
+    Examined,
+    motion,
+    named,
+    notable,
+)
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
@@ -50,7 +63,7 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ColumnsHypothesis:
     """What the six columns may be.
 
     meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
@@ -81,7 +94,7 @@ class Reading:
         return numpy.hstack([gamma, omega] if self.swapped else [omega, gamma])
 
 
-def _readings() -> Iterator[Reading]:
+def _readings() -> Iterator[ColumnsHypothesis]:
     renamed = [(a, b, c) for a, b, c in permutations((1, 2, 3))]
     signed = [
         (a * s, b * t, c * u) for a, b, c in renamed for s, t, u in product((1, -1), repeat=3) if (s, t, u) != (-1,) * 3
@@ -89,14 +102,14 @@ def _readings() -> Iterator[Reading]:
     kinds = [("both", axes) for axes in signed]
     kinds += [(of, axes) for of in ("omega", "gamma") for axes in renamed[1:]]
     for meaning, swapped, (of, axes) in product(_MEANINGS, (False, True), kinds):
-        yield Reading(meaning, axes, of, swapped)
+        yield ColumnsHypothesis(meaning, axes, of, swapped)
 
 
 READINGS = sorted((reading for reading in _readings() if reading.changes), key=lambda reading: reading.changes)
 """Every reading that is tried, the simplest first."""
 
 
-def reading(given: Examined, truth: Array) -> tuple[Reading, float] | None:
+def reading(given: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
     """The simplest reading of the columns that fits about as well as the best, and its error."""
     inertia = numpy.array([float(value) for value in given.top.inertia])
     errors = [given.error(each.columns(truth, inertia)) for each in READINGS]
@@ -156,7 +169,7 @@ _LATER = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Data:
+class DataHypothesis:
     """What the data may be: the kind of mistake, and the numbers that fit by the name of what they replace.
 
     fitted: whether they were fitted.  required: how far the error must fall, where more than usual.
@@ -168,7 +181,7 @@ class Data:
     required: float = 0.0
 
 
-Found = tuple[Data, float]
+Found = tuple[DataHypothesis, float]
 
 
 def without_numbers(given: Examined) -> Iterator[Found]:
@@ -182,7 +195,7 @@ def without_numbers(given: Examined) -> Iterator[Found]:
     yield _tried(given, "start_momentum", start=momentum)
     yield _as_momentum(given, momentum)
     for unit, factor in UNITS_OF_OMEGA.items():
-        yield Data(f"all_in_{unit}"), _all_times(given, factor)
+        yield DataHypothesis(f"all_in_{unit}"), _all_times(given, factor)
     other = GYROSTAT if given.system is HEAVY_TOP else HEAVY_TOP
     yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
     if top.rotor is not None:
@@ -211,8 +224,8 @@ def _tried(
     tops = (top or given.top, given.top)
     same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "inertia", "rotor"))
     if same and (start is None or start == given.start) and kind != "system":
-        return Data(kind), float("inf")
-    return Data(kind, numbers), given.error(given.supposed(given.times, top, start))
+        return DataHypothesis(kind), float("inf")
+    return DataHypothesis(kind, numbers), given.error(given.supposed(given.times, top, start))
 
 
 def _as_momentum(given: Examined, start: State) -> Found:
@@ -221,7 +234,7 @@ def _as_momentum(given: Examined, start: State) -> Found:
     if truth is not None:
         rotor = numpy.array([*map(float, given.top.rotor or (0, 0, 0)), 0, 0, 0])
         truth = truth * numpy.array([*map(float, given.top.inertia), 1, 1, 1]) + rotor
-    return Data("all_momentum"), given.error(truth)
+    return DataHypothesis("all_momentum"), given.error(truth)
 
 
 def _all_times(given: Examined, factor: float) -> float:
@@ -241,7 +254,9 @@ def all_scaled(given: Examined) -> Found | None:
     factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
     if not factor or not notable(factor, Fraction(1)):
         return None
-    return Data("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(given, float(factor))
+    return DataHypothesis("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(
+        given, float(factor)
+    )
 
 
 def _weight_ratio(given: Examined) -> float | None:
@@ -266,7 +281,7 @@ def another_weight(given: Examined) -> Found | None:
     weight, error = _roundest(tried)
     if not notable(weight, old):
         return None
-    return Data("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
+    return DataHypothesis("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
 
 
 def another_start(given: Examined) -> Found | None:
@@ -296,7 +311,9 @@ def another_start(given: Examined) -> Found | None:
         for name, value, change, size, unit in zip(names, back[0], off, sizes, units, strict=True)
         if change > noise * size
     )
-    return (Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
+    return (
+        (DataHypothesis("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
+    )
 
 
 def _shows_at_once(given: Examined, first: Array) -> bool:
@@ -322,7 +339,7 @@ def another_top(given: Examined) -> Found | None:
     told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
     if not told or len(changed) > _MOST_CHANGED:
         return None
-    return Data("top", tuple(changed), fitted=True), error
+    return DataHypothesis("top", tuple(changed), fitted=True), error
 
 
 _NAMES = ("I1", "I2", "I3", "P a", "P b", "P c")
@@ -407,17 +424,35 @@ def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
 
 
 _TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_velocity)
+_ANOTHER_MOTION = 0.03
+"""Relative errors below it are not those of another field, each of which is compiled anew."""
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
 def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquations]:
-    """Each with the error that is left."""
+    """Each with the error that is left; one equation with the other sign only where nothing else fits."""
+    found: list[FoundEquations] = []
     if truth is not None:
-        yield _any_order(given, truth)
-        yield from _axes_of_space(given, truth)
-        yield from constant_column(given, truth)
+        found += [_any_order(given, truth), *_axes_of_space(given, truth), *constant_column(given, truth)]
     if given.system is HEAVY_TOP:
-        yield from _signs(given)
+        found += _signs(given)
+    yield from found
+    error = given.error(truth)
+    if error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
+        for place, name in enumerate(NAMES):
+            supposed = replace(given, system=_negated(given.system, place)).supposed(given.times)
+            yield "component_sign", {"column": name}, given.error(supposed)
+
+
+@lru_cache(maxsize=18)
+def _negated(system: System, place: int) -> System:
+    """The same equations with the derivative of one component negated."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        found = system.field(p, y)
+        return (*found[:place], -1 * found[place], *found[place + 1 :])
+
+    return replace(system, name=f"{system.name}_{NAMES[place]}_negated", field=field)
 
 
 def _signs(given: Examined) -> Iterator[FoundEquations]:
@@ -479,12 +514,14 @@ _NEAR_ONE = 0.05
 """A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
 _SHORT = 3
 _EXACTLY = 1e-9
+_MOST_STEPS = 300
+"""In an interval between samples, of which one too many or too few is recognised: further ones are too near to 1."""
 _UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class TimesHypothesis:
     """What the times may be.
 
     kind: time_reversed, start_row_missing, rows_off_by_one, rows_reversed, times_shifted (by ``shift``: the state said
@@ -498,7 +535,7 @@ class Clock:
     fitted: bool = False
 
 
-def clock(given: Examined) -> tuple[Clock, float] | None:
+def clock(given: Examined) -> tuple[TimesHypothesis, float] | None:
     """The simplest of the suppositions about the times that are about as good as the best, and its error."""
     found = [(each, given.error(given.supposed(times))) for each, times in _without_numbers(given) if len(times)]
     if len(given.rows) >= 3:
@@ -507,20 +544,20 @@ def clock(given: Examined) -> tuple[Clock, float] | None:
     return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
 
 
-def _without_numbers(given: Examined) -> Iterator[tuple[Clock, list[Fraction]]]:
+def _without_numbers(given: Examined) -> Iterator[tuple[TimesHypothesis, list[Fraction]]]:
     every = given.all_times
-    yield Clock("time_reversed"), [-time for time in given.times]
+    yield TimesHypothesis("time_reversed"), [-time for time in given.times]
     if len(every) > 1:
-        yield Clock("start_row_missing"), [every[row - 1] if row else Fraction(0) for row in given.rows]
-        yield Clock("rows_reversed"), [every[-1 - row] for row in given.rows]
+        yield TimesHypothesis("start_row_missing"), [every[row - 1] if row else Fraction(0) for row in given.rows]
+        yield TimesHypothesis("rows_reversed"), [every[-1 - row] for row in given.rows]
         later = [*every[1:], 2 * every[-1] - every[-2]]
-        yield Clock("rows_off_by_one"), [later[row] for row in given.rows]
+        yield TimesHypothesis("rows_off_by_one"), [later[row] for row in given.rows]
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * given.times[-1])) * given.rate <= FARTHEST:
-            yield Clock("time_unit", factor=float(factor)), [factor * time for time in given.times]
+            yield TimesHypothesis("time_unit", factor=float(factor)), [factor * time for time in given.times]
 
 
-def _fitted(given: Examined) -> Iterator[tuple[Clock, float]]:
+def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
     """Shifts and units that bring the first states onto the motion, refined over all samples."""
     times = numpy.array([float(time) for time in given.times])
     if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
@@ -550,8 +587,16 @@ def _fitted(given: Examined) -> Iterator[tuple[Clock, float]]:
                     yield found, error
 
 
+def steps_of_interval(factor: float) -> int | None:
+    """n where the factor is (n + 1)/n, as of intervals of n steps that are one too long; −n where it is (n − 1)/n."""
+    n = round(1 / (factor - 1)) if abs(factor - 1) > 1 / (2 * _MOST_STEPS) else 0
+    return n if 1 < abs(n) <= _MOST_STEPS and abs(factor - 1 - 1 / n) < _EXACTLY else None
+
+
 def _is_short(factor: float) -> bool:
-    """Whether the factor, or one over it, is a decimal of three digits, as no integrator's lag is; 1 is none."""
+    """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
+    if steps_of_interval(factor) is not None:
+        return True
     near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
     return any(
         one != 1 and abs(one / Fraction(each) - 1) < _EXACTLY
@@ -571,7 +616,9 @@ def _moved(kind: str, number: float, times: Array) -> Array:
     return times + number if kind == "times_shifted" else times * number
 
 
-def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[Clock, float]]:
+def _refined(
+    given: Examined, kind: str, number: float, times: Array, sizes: Array
+) -> Iterator[tuple[TimesHypothesis, float]]:
     """Gauss-Newton on the one number; the rate of the motion is a difference quotient of the motion itself."""
     small = 1e-6 / given.rate
     for _ in range(_REFINED):
@@ -589,4 +636,4 @@ def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Arr
             return
     error = given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))
     shift, factor = (number, 1.0) if kind == "times_shifted" else (0.0, number)
-    yield Clock(kind, shift, factor, fitted=True), error
+    yield TimesHypothesis(kind, shift, factor, fitted=True), error

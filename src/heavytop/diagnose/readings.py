@@ -278,7 +278,7 @@ def upright_vectors(vectors: Array, up: str) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class GivenStart:
     """The start as it was given.
 
     form: of ``values``: quaternion, matrix, euler; "rows", R in canonical axes of space; or "plain", R in those of the
@@ -319,7 +319,7 @@ class Seen:
     times: tuple[Fraction, ...]
     columns: Mapping[str, Array]
     body: BodyData
-    start: Start
+    start: GivenStart
     said: Reading
     point: Array
     pivot: Array

@@ -10,7 +10,7 @@ from heavytop.document.document import Block, Document, Headline, In
 from heavytop.records import UNMEASURED, Beside, Metric, Quantity, Report, Row, Subject
 
 
-class Kind(Protocol):
+class ReportedKind(Protocol):
     """One kind of measurement, as far as it is compared, summed up and drawn; what it does not say is the usual.
 
     needed: the metrics that its summary cannot do without.
@@ -68,17 +68,17 @@ class Kind(Protocol):
         return ()
 
 
-class Unknown(Kind):
+class Unknown(ReportedKind):
     """A kind that this program does not have: its rows are compared and listed."""
 
     name = ""
 
 
-Kinds = Mapping[str, Kind]
+Kinds = Mapping[str, ReportedKind]
 _UNKNOWN = Unknown()
 
 
-def kind_of(row: Row, kinds: Kinds) -> Kind:
+def kind_of(row: Row, kinds: Kinds) -> ReportedKind:
     """The kind of a row."""
     return kinds.get(row.key.kind, _UNKNOWN)
 

@@ -26,7 +26,7 @@ from heavytop.integrate.multiword.motions import OUTCOMES
 from heavytop.integrate.peers.contract import said
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.double_double.double_double_run import Floating
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, decimal_text, exact, number
 
 _SPARE_BITS = 64
@@ -233,7 +233,7 @@ class OfWords(Dense):
 
 
 def _of_run(
-    run: Run,
+    run: ResumableRun,
     began: Fraction,
     length: Fraction,
     bits: int,
@@ -257,7 +257,7 @@ def _reader_of(rows: Any) -> Callable[[int], Sequence[Dyadic]]:
     return lambda index: dyadics(rows[index])
 
 
-def _rows(run: Run) -> list[tuple[Fraction, ...]]:
+def _rows(run: ResumableRun) -> list[tuple[Fraction, ...]]:
     give = run.derivatives if isinstance(run, Floating) else run.coefficients
     return [give(n) for n in range(run.order + 1)]
 
@@ -317,7 +317,7 @@ _MOST_PARTS_BITS = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SignChange:
     """A change of sign between ``low`` and ``high``, equal where it is known exactly; rising: from − to +."""
 
     low: fmpq
@@ -339,7 +339,7 @@ def sign_before(polynomial: fmpz_poly, end: fmpq | None = None) -> int:
     return next(((1 if c > 0 else -1) * (-1) ** n for n, c in enumerate(moved.coeffs()) if c), 0)
 
 
-def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[Change]:
+def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[SignChange]:
     """Every change of sign of a polynomial in 0 < x < ``end`` ≤ 1, in order.
 
     resolution: intervals of length 2^-resolution ``end`` are not divided any more.
@@ -348,7 +348,7 @@ def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[
         yield from _isolated(_scaled(polynomial, end), 0, 0, end, min(resolution, _DEEPEST))
 
 
-def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: int) -> Iterator[Change]:
+def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
     """The changes in the part ``place`` of the 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
     part = _without_root_at_zero(part)
     variations = _variations(part)
@@ -357,14 +357,14 @@ def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: i
     if variations == 1 or depth >= resolution:
         before, after = sign_after(part), sign_before(part)
         if before != after:
-            yield Change(span * fmpq(place, 1 << depth), span * fmpq(place + 1, 1 << depth), after > 0)
+            yield SignChange(span * fmpq(place, 1 << depth), span * fmpq(place + 1, 1 << depth), after > 0)
         return
     left = _halved(part)
     right = left(_ONE_MORE)
     yield from _isolated(left, 2 * place, depth + 1, span, resolution)
     if right[0] == 0 and sign_before(left) != (after := sign_after(right)):
         middle = span * fmpq(2 * place + 1, 2 << depth)
-        yield Change(middle, middle, after > 0)
+        yield SignChange(middle, middle, after > 0)
     yield from _isolated(right, 2 * place + 1, depth + 1, span, resolution)
 
 
@@ -414,7 +414,7 @@ def _alternates(coefficients: Sequence[fmpz]) -> int:
     return sum(a != b for a, b in pairwise(signs))
 
 
-def refined(polynomial: fmpz_poly, change: Change, bits: int) -> fmpq:
+def refined(polynomial: fmpz_poly, change: SignChange, bits: int) -> fmpq:
     """A point within 2^-bits of the change, as a dyadic part of its interval or exactly."""
     low, high = change.low, change.high
     before = -1 if change.rising else 1

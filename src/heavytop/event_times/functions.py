@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpq_series
 
-from heavytop.display import Lines, Table, Tabular
+from heavytop.display import LazyLines, Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import radius_text
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -448,7 +448,7 @@ class Events(Tabular):
             "states": self.texts(),
         }
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         digits = min(_SHOWN, self.problem.precision.digits)
 
         def line(place: int) -> list[str]:
@@ -462,7 +462,7 @@ class Events(Tabular):
         notes = [_EXPLAINED[self.guarantee]]
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"{self.outcome.message}; looked up to t = {decimal_text(self.time_reached, 6)} only")
-        return Table(title, ("t", "sign", *NAMES), Lines(len(self), line), notes)
+        return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(self), line), notes)
 
 
 class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
@@ -515,7 +515,7 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
 
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states]).reshape(-1, 6)
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         digits = min(_SHOWN, self.digits)
 
         def line(place: int) -> list[str]:
@@ -525,7 +525,7 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
         title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
         notes = [_EXPLAINED[PROVEN], f"largest radius of a time {radius_text(worst)}; {self.method}"]
-        return Table(title, ("t", "sign", *NAMES), Lines(len(self), line), notes)
+        return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(self), line), notes)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -553,7 +553,7 @@ class Section(Tabular):
         """Whether all starts have one energy and one M·γ, to 1e-9."""
         return all(max(v) - min(v) <= 1e-9 * max(1.0, *map(abs, v)) for v in (self.energies, self.areas))
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         def line(place: int) -> list[str]:
             found = self.events[place]
             return [str(place), str(len(found)), f"{self.energies[place]:.9g}", f"{self.areas[place]:.9g}"]
@@ -561,7 +561,7 @@ class Section(Tabular):
         first = self.events[0]
         title = f"Poincaré section {first.function} of {len(self)} motions, {sum(map(len, self.events))} points"
         notes = [] if self.on_one_level else ["the starts are on different levels of energy or M·γ"]
-        return Table(title, ("start", "points", "energy", "M·γ"), Lines(len(self), line), notes)
+        return TitledTable(title, ("start", "points", "energy", "M·γ"), LazyLines(len(self), line), notes)
 
 
 def component(name: str) -> int:

@@ -73,7 +73,7 @@ def differ(values: Sequence[Fraction]) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class ExactRelation:
     """A relation between exact data of a top and a start.
 
     text: the relation as it is written, ``I1 = I2 = 2 I3``.  names: what is tested, separated by commas, ``I1 - I2,
@@ -97,15 +97,15 @@ class Condition:
         return ", ".join(f"{name} = {value}" for name, value in zip(names, values, strict=True))
 
 
-Conditions = tuple[Condition, ...]
+Conditions = tuple[ExactRelation, ...]
 
 
-def hold(conditions: Iterable[Condition], top: HeavyTop, start: State) -> bool:
+def hold(conditions: Iterable[ExactRelation], top: HeavyTop, start: State) -> bool:
     """Whether all hold; none is evaluated after the first that does not."""
     return all(condition.holds(top, start) for condition in conditions)
 
 
-def require(name: str, conditions: Iterable[Condition], top: HeavyTop, start: State) -> None:
+def require(name: str, conditions: Iterable[ExactRelation], top: HeavyTop, start: State) -> None:
     """Raises NotInClass for the first condition that does not hold."""
     for condition in conditions:
         if not condition.holds(top, start):
@@ -130,13 +130,13 @@ def _hess(top: HeavyTop, _start: State) -> tuple[Fraction]:
 def plane_top(ratio: int) -> Conditions:
     """The body of Kovalevskaya's class (2), or Goryachev and Chaplygin's (4)."""
     text, names = f"I1 = I2 = {ratio} I3", f"I1 - I2, I1 - {ratio} I3"
-    equal = Condition(text, names, lambda top, _: (_differ(top, 0, 1), top.inertia[0] - ratio * top.inertia[2]))
-    return equal, Condition("P c = 0", "P c", lambda top, _: top.moment[2:]), TORQUE
+    equal = ExactRelation(text, names, lambda top, _: (_differ(top, 0, 1), top.inertia[0] - ratio * top.inertia[2]))
+    return equal, ExactRelation("P c = 0", "P c", lambda top, _: top.moment[2:]), TORQUE
 
 
-def equilibrium(system: System) -> Condition:
+def equilibrium(system: System) -> ExactRelation:
     """All six rates of change are 0."""
-    return Condition(
+    return ExactRelation(
         "Omega' = gamma' = 0",
         "their components",
         lambda top, start: system.field(system.parameters(top, start), start.flat),
@@ -159,25 +159,25 @@ def _xi(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
     return kovalevskaya_xi(HEAVY_TOP.parameters(top, start), start.flat, (0, 1, 2))
 
 
-TORQUE = Condition("P r != 0", "P r", lambda top, _: top.moment, any)
-NO_TORQUE = Condition("P r = 0", "P r", lambda top, _: top.moment)
-ON_AXIS_1 = Condition("P b = P c = 0", "P b, P c", lambda top, _: top.moment[1:]), TORQUE
-IN_PLANE_13 = Condition("P b = 0", "P b", lambda top, _: top.moment[1:2])
-MOMENTS_1_3 = Condition("I1 != I3", "I1 - I3", lambda top, _: (_differ(top, 0, 2),), any)
-OFF_AXES_13 = Condition("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ)
-SPIN_UPWARDS = Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive)
-HESS = Condition("I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2", "P^2 times the difference", _hess)
+TORQUE = ExactRelation("P r != 0", "P r", lambda top, _: top.moment, any)
+NO_TORQUE = ExactRelation("P r = 0", "P r", lambda top, _: top.moment)
+ON_AXIS_1 = ExactRelation("P b = P c = 0", "P b, P c", lambda top, _: top.moment[1:]), TORQUE
+IN_PLANE_13 = ExactRelation("P b = 0", "P b", lambda top, _: top.moment[1:2])
+MOMENTS_1_3 = ExactRelation("I1 != I3", "I1 - I3", lambda top, _: (_differ(top, 0, 2),), any)
+OFF_AXES_13 = ExactRelation("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ)
+SPIN_UPWARDS = ExactRelation("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive)
+HESS = ExactRelation("I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2", "P^2 times the difference", _hess)
 HESS_TOP = IN_PLANE_13, TORQUE, HESS
 SYMMETRIC = (
-    Condition("I1 = I2", "I1 - I2", lambda top, _: (_differ(top, 0, 1),)),
-    Condition("P a = P b = 0", "P a, P b", lambda top, _: top.moment[:2]),
+    ExactRelation("I1 = I2", "I1 - I2", lambda top, _: (_differ(top, 0, 1),)),
+    ExactRelation("P a = P b = 0", "P a, P b", lambda top, _: top.moment[:2]),
 )
-AXIAL_ROTOR = Condition("k1 = k2 = 0", "k1, k2", lambda top, _: (top.rotor or (Fraction(0),) * 3)[:2])
-SPHERICAL = Condition("I1 = I2 = I3", "I1 - I2, I2 - I3", lambda top, _: (_differ(top, 0, 1), _differ(top, 1, 2)))
-GAMMA = Condition("gamma != 0", "gamma", lambda _, start: start.gamma, any)
-LEVEL_MOMENTUM = Condition("M·gamma = 0", "M·gamma", _area)
-INCLINED_MOMENTUM = Condition("M·gamma != 0", "M·gamma", _area, any)
-ACROSS_CENTRE = Condition("M·P r = 0", "M·P r", _along)
-NOT_ACROSS_CENTRE = Condition("M·P r != 0", "M·P r", _along, any)
-XI = Condition("xi = 0", "xi", _xi)
-NOT_XI = Condition("xi != 0", "xi", _xi, any)
+AXIAL_ROTOR = ExactRelation("k1 = k2 = 0", "k1, k2", lambda top, _: (top.rotor or (Fraction(0),) * 3)[:2])
+SPHERICAL = ExactRelation("I1 = I2 = I3", "I1 - I2, I2 - I3", lambda top, _: (_differ(top, 0, 1), _differ(top, 1, 2)))
+GAMMA = ExactRelation("gamma != 0", "gamma", lambda _, start: start.gamma, any)
+LEVEL_MOMENTUM = ExactRelation("M·gamma = 0", "M·gamma", _area)
+INCLINED_MOMENTUM = ExactRelation("M·gamma != 0", "M·gamma", _area, any)
+ACROSS_CENTRE = ExactRelation("M·P r = 0", "M·P r", _along)
+NOT_ACROSS_CENTRE = ExactRelation("M·P r != 0", "M·P r", _along, any)
+XI = ExactRelation("xi = 0", "xi", _xi)
+NOT_XI = ExactRelation("xi != 0", "xi", _xi, any)

@@ -26,7 +26,7 @@ _SYSTEMS = tuple(system.name for system in SYSTEMS)
 _HERE = "heavytop.integrate"
 
 
-class Source(Protocol):
+class IntegratorSource(Protocol):
     """An integrator that is defined outside this program and every package."""
 
     @property
@@ -95,12 +95,12 @@ def foreign(name: str, place: str | Callable[..., Any] = "") -> Integrator:
     return Integrator(name, place, None, None, "", own=False)
 
 
-def name_of(which: str | Source) -> str:
+def name_of(which: str | IntegratorSource) -> str:
     """The name in rows of an integrator that is named or defined by its source."""
     return which if isinstance(which, str) else which.name
 
 
-def described(which: str | Source) -> Integrator:
+def described(which: str | IntegratorSource) -> Integrator:
     """What is known of it, without looking for it: of one that is not this program's, nothing."""
     own = INTEGRATORS.get(which) if isinstance(which, str) else None
     return own or foreign(name_of(which))

@@ -15,7 +15,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.integrator import Source, described, loaded, name_of, require_reach
+from heavytop.integrate.integrator import IntegratorSource, described, loaded, name_of, require_reach
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, Precision, exact
@@ -23,7 +23,7 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 
-def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
+def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates one motion with that integrator; raises InputError for an unknown name or option.
 
     Its calls raise OutOfReach as :func:`heavytop.integrate.integrator.require_reach` does.
@@ -46,7 +46,7 @@ def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., An
     return call
 
 
-def _unguarded(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
+def _unguarded(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
     name = name_of(which)
     if isinstance(which, Command):
         return _with(CommandIntegrator(which), name, options)
@@ -58,7 +58,7 @@ def _unguarded(which: str | Source, options: dict[str, Any]) -> Callable[..., An
 
 
 def watched(
-    which: str | Source, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
+    which: str | IntegratorSource, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
 ) -> Callable[..., Any]:
     """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
     if described(which).streams:
@@ -74,7 +74,7 @@ def watched(
     return call
 
 
-def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
+def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates many motions; raises InputError also for an integrator that runs one at a time.
 
     Its calls raise OutOfReach as those of :func:`propagator`.

@@ -11,7 +11,7 @@ from math import inf
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, overload
 
-from heavytop.display import Lines, Table, Tabular, path_picture
+from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, last_call, native, native_text, number, rounded
 from heavytop.top.attitude import (
@@ -79,7 +79,7 @@ def attitude_of(run: Trajectory) -> Any:
     if run.problem.xi is None:
         raise InputError(
             "The attitude was not computed: gamma alone does not fix it.",
-            "Give attitude=True for a rotation about the vertical that starts where docs/outputs.md says, or xi.",
+            "Give attitude=True (`heavytop docs outputs` says where the rotation about the vertical starts), or xi.",
         )
     return run.attitude if run.attitude is not None else run.states[:, 6:9]
 
@@ -402,7 +402,7 @@ class Trajectory(Tabular):
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
 
-        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
         Raises InputError for a run without attitude.
         """
         return self._in_double(output("quaternion"))
@@ -468,7 +468,7 @@ class Trajectory(Tabular):
     def amplification(self) -> float:
         """The largest factor by which the motion itself has amplified a change of its start up to ``time_reached``.
 
-        An estimate, computed when it is asked for: :mod:`heavytop.top.amplification`.
+        An estimate from the variational equation, computed when it is asked for.
         """
         from heavytop.top.amplification import amplification
 
@@ -496,14 +496,14 @@ class Trajectory(Tabular):
         what = "axis 3 in space" if carried else "γ, the vertical in body axes"
         return self._table().html() + path_picture(len(states), point, f"{what}, on the unit sphere")
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         precision = self.problem.precision
         digits = min(_SHOWN, precision.digits)
 
         def line(place: int) -> list[str]:
             return [decimal_text(self.times[place], _SHOWN), *(_shown(value, digits) for value in self.states[place])]
 
-        rows = Lines(min(len(self.times), len(self.states)), line)
+        rows = LazyLines(min(len(self.times), len(self.states)), line)
         steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
         names = NAMES if self.problem.xi is None or self.attitude is not None else (*NAMES, "ξ1", "ξ2", "ξ3")
@@ -514,7 +514,7 @@ class Trajectory(Tabular):
             notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
         if lost := self.amplification_text():
             notes.append(lost)
-        return Table(title, ("t", *names), rows, notes)
+        return TitledTable(title, ("t", *names), rows, notes)
 
 
 def _shown(value: Any, digits: int) -> str:

@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from heavytop.kinds.audit import Audit
+from heavytop.kinds.audit import AuditKind
 from heavytop.kinds.base import Kind
 from heavytop.kinds.break_away_law import BreakAwayLaw
 from heavytop.kinds.claim_evaluation import ClaimEvaluation
 from heavytop.kinds.claim_model import ClaimModel
-from heavytop.kinds.drift import Drift
+from heavytop.kinds.drift import DriftKind
 from heavytop.kinds.growth import Growth
 from heavytop.kinds.homoclinic import Homoclinic
-from heavytop.kinds.hunt import Hunt
-from heavytop.kinds.local_error import LocalError
-from heavytop.kinds.score import Score
+from heavytop.kinds.hunt import HuntKind
+from heavytop.kinds.local_error import LocalErrorKind
+from heavytop.kinds.score import ScoreKind
 from heavytop.kinds.survey import Survey
 from heavytop.kinds.work_precision import WorkPrecision
 
 _ALL: tuple[Kind, ...] = (
-    Audit(),
+    AuditKind(),
     ClaimModel(),
     ClaimEvaluation(),
     Homoclinic(),
     BreakAwayLaw(),
-    LocalError(),
-    Drift(),
-    Score(),
+    LocalErrorKind(),
+    DriftKind(),
+    ScoreKind(),
     WorkPrecision(),
     Growth(),
-    Hunt(),
+    HuntKind(),
     Survey(),
 )
 KINDS: dict[str, Kind] = {kind.name: kind for kind in _ALL}

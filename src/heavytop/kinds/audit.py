@@ -15,7 +15,7 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.rows import Find, Table, Task, exact_row
+from heavytop.suite.rows import Find, PlanTable, Task, exact_row
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
 NAME, LIBRARY = "audit", "library"
@@ -26,7 +26,7 @@ _SYSTEMS = {HEAVY_TOP.name: "the heavy top", GYROSTAT.name: "the gyrostat"}
 _SECONDS = 1.5
 
 
-class AuditTable(Table, tag=NAME):
+class AuditTable(PlanTable, tag=NAME):
     """The claims, and the systems whose motions those of the paper are said to be.
 
     claims: "ershkov-general", "ershkov-partial", ids of the library, or "library" for every entry of it.
@@ -57,7 +57,7 @@ def _entries(claim: str) -> list[str]:
     return [claim]
 
 
-class Audit(Kind):
+class AuditKind(Kind):
     """1 for an equation that holds, 0 for one that is refuted, unresolved for one that is neither."""
 
     name = NAME

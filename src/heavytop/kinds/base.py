@@ -9,7 +9,7 @@ from heavytop.suite.checkpoint import Saved
 from heavytop.suite.rows import Task
 
 
-class Kind(run.Kind, reported.Kind):
+class Kind(run.MeasuredKind, reported.ReportedKind):
     """A kind of measurement: run and reported as the classes above it say.
 
     A subclass names itself, gives its ``table`` and ``measure``, and what of the rest is not the usual.

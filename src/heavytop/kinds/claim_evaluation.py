@@ -22,7 +22,7 @@ from heavytop.render.text import both, largest_over
 from heavytop.store.checks import CLOSE, sizes
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, signed
-from heavytop.suite.rows import Find, Table, Task, exact_row, time_metric
+from heavytop.suite.rows import Find, PlanTable, Task, exact_row, time_metric
 from heavytop.top.equations import GYROSTAT
 
 NAME = "claim_evaluation"
@@ -32,7 +32,7 @@ _SECONDS = 0.02
 _SUMMED_UP = ("omega", "theta", "psi")
 
 
-class ClaimEvaluationTable(Table, tag=NAME):
+class ClaimEvaluationTable(PlanTable, tag=NAME):
     """rate_times: the values of k |t| at which the formulas are evaluated."""
 
     cases: list[str]

@@ -51,7 +51,7 @@ from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, 
 from heavytop.render.text import both
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, samples, signed
-from heavytop.suite.rows import Find, Table, Task, exact_row, time_metric
+from heavytop.suite.rows import Find, PlanTable, Task, exact_row, time_metric
 from heavytop.top.attitude import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP
 
@@ -204,7 +204,7 @@ _SECONDS = 1.0
 _BRANCHES: dict[Direction, tuple[Branch, ...]] = {"forward": ("smooth", "printed"), "backward": ("smooth",)}
 
 
-class ClaimModelTable(Table, tag=NAME):
+class ClaimModelTable(PlanTable, tag=NAME):
     """times: where the series is taken, t > 0.  grid: the largest errors are also over a uniform grid of that many
     points up to the last time.
     """

@@ -13,6 +13,7 @@ from heavytop.document.document import Block, Chart
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
 from heavytop.kinds.base import Kind
+from heavytop.kinds.explained import with_explanation
 from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
@@ -25,7 +26,7 @@ from heavytop.render.plots import digits, growth
 from heavytop.render.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, uniform
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
 
 NAME = "drift"
 
@@ -37,7 +38,7 @@ class Extent(NamedTuple):
     noise: bool = True
 
 
-class Run(msgspec.Struct, forbid_unknown_fields=True):
+class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
     """One format with its horizon; ``samples`` uniform samples."""
 
     precision: str
@@ -45,7 +46,7 @@ class Run(msgspec.Struct, forbid_unknown_fields=True):
     samples: int = 1000
 
 
-class DriftTable(Table, tag=NAME):
+class DriftTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows.
 
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
@@ -54,7 +55,7 @@ class DriftTable(Table, tag=NAME):
     """
 
     cases: list[str]
-    runs: list[Run]
+    runs: list[DriftRun]
     integrator: str = HEYOKA
     attitude: bool = False
     noise: bool = True
@@ -80,7 +81,7 @@ class DriftTable(Table, tag=NAME):
         ]
 
 
-class Drift(Kind):
+class DriftKind(Kind):
     """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
 
     name = NAME
@@ -120,7 +121,7 @@ class Drift(Kind):
         if task.integrator.supports_ensemble:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
-        return _row(task, run, scorer)
+        return with_explanation(_row(task, run, scorer), task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""

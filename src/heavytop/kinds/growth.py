@@ -22,7 +22,7 @@ from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA, Ended, complete, growing
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
-from heavytop.measure.truth import Reference, reference
+from heavytop.measure.truth import EnsembleReference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import Beside, Law, Metric, Quantity, Row, RowKey, by_name
 from heavytop.render.page import laws_headline
@@ -31,7 +31,7 @@ from heavytop.render.plots import growth as over_time
 from heavytop.render.terminal import laws_in_short
 from heavytop.suite.case_text import ensemble_of, one_motion
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.rows import Find, Table, Task, computed, input_rounding
+from heavytop.suite.rows import Find, PlanTable, Task, computed, input_rounding
 from heavytop.top.attitude import perpendicular
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -45,7 +45,7 @@ _BAND_OF_ONE = 0.75
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
 
 
-class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class GrowthRun(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """One format with its horizon, and how its ensemble is made.
 
     samples: a decade, over ``decades`` decades before the horizon.  starts: random ones, the same for the same seed.
@@ -75,11 +75,11 @@ class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return tolerance | ({"high_accuracy": True} if self.high_accuracy else {})
 
 
-class GrowthTable(Table, tag=NAME):
+class GrowthTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows."""
 
     cases: list[str]
-    runs: list[Run]
+    runs: list[GrowthRun]
     integrator: str = HEYOKA
 
     def tasks(self, find: Find) -> list[Task]:
@@ -87,7 +87,7 @@ class GrowthTable(Table, tag=NAME):
         return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
 
 
-def _task(case: Case, run: Run, integrator: str) -> Task:
+def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     """One row; raises InputError for an impossible value."""
     precision = parse(run.precision)
     if precision.bits > _MOST_BITS:
@@ -219,7 +219,7 @@ def _row(
     starts: Sequence[Any],
     motions: Sequence[Ended],
     scorers: Sequence[Scorer],
-    compared: Reference,
+    compared: EnsembleReference,
     seconds: dict[str, float],
     rounding: Fraction,
 ) -> Row:

@@ -30,7 +30,7 @@ from heavytop.render.page import in_columns
 from heavytop.render.text import NOISE_BAND, both, drifts
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import samples, signed
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row, time_metric
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row, time_metric
 
 NAME = "homoclinic"
 ESCAPED = Fraction(1, 1000)
@@ -43,7 +43,7 @@ _CERTIFIED_AT = 4
 """The closed form of a homoclinic case is certified at this |t|."""
 
 
-class HomoclinicTable(Table, tag=NAME):
+class HomoclinicTable(PlanTable, tag=NAME):
     """samples: samples in one unit of 1/rate.  integrator: any that `heavytop list` shows."""
 
     cases: list[str]

@@ -18,7 +18,7 @@ from heavytop.suite.checkpoint import Saved
 from heavytop.suite.hunt.measured import Family
 from heavytop.suite.hunt.search import Asked, Hunted, command_of, hunt, keep, kept
 from heavytop.suite.plan import positive
-from heavytop.suite.rows import Find, Table, Task, computed, exact_row, failed
+from heavytop.suite.rows import Find, PlanTable, Task, computed, exact_row, failed
 
 NAME = "hunt"
 WORST = Quantity("hunt_error", "relative_to_law", "max")
@@ -26,7 +26,7 @@ MEDIAN = Quantity("hunt_error", "random_tops", "median")
 _MOST = 1_000_000
 
 
-class HuntTable(Table, tag=NAME):
+class HuntTable(PlanTable, tag=NAME):
     """As the options of `heavytop hunt`; budget: motions, as a plan measures the same on every machine.
 
     found: a file of [[top]] tables, in the working directory: its motions are measured first, and what is found is
@@ -58,7 +58,7 @@ class HuntTable(Table, tag=NAME):
         return [Task(key, "", self.integrator, options=options)]
 
 
-class Hunt(Kind):
+class HuntKind(Kind):
     """A row is what a search came to; one that found anything failed, and says on which motion."""
 
     name = NAME

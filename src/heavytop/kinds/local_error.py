@@ -20,7 +20,7 @@ from heavytop.precision import parse, time_text
 from heavytop.records import Against, Beside, Row, RowKey
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
 
 NAME = "local_error"
 _AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")
@@ -30,7 +30,7 @@ _LARGEST = local_error.LOCAL_ERROR.over("max").text
 _UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
 
 
-class LocalErrorTable(Table, tag=NAME):
+class LocalErrorTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows; its steps, or calls over its mean step where it keeps them."""
 
     cases: list[str]
@@ -55,7 +55,7 @@ class LocalErrorTable(Table, tag=NAME):
         ]
 
 
-class LocalError(Kind):
+class LocalErrorKind(Kind):
     """Errors of steps in units of eps times the largest component of the state."""
 
     name = NAME

@@ -15,7 +15,7 @@ from heavytop.render.score import one_motion
 from heavytop.render.text import DIGITS, largest_over
 
 
-class Score(Kind):
+class ScoreKind(Kind):
     """Rows of :mod:`heavytop.suite.score`."""
 
     name = "score"

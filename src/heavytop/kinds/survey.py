@@ -18,7 +18,7 @@ from heavytop.records import Against, Beside, Metric, Row, RowKey
 from heavytop.render.survey import survey_charts
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, uniform
-from heavytop.suite.rows import Find, Table, Task, computed, exact_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, exact_row
 from heavytop.suite.survey.gathered import DATA, chunk_bytes, of_motions
 from heavytop.suite.survey.measured import Chunk, Drawn, drawn, measured
 
@@ -27,7 +27,7 @@ _SWEEP = "sweep:"
 _METHOD = "two runs of multiword in double-double, of different orders"
 
 
-class SurveyTable(Table, tag=NAME):
+class SurveyTable(PlanTable, tag=NAME):
     """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended.
 
     map: two data by the names of their columns, over which digits lost are drawn; none for the first two that vary.

@@ -11,15 +11,25 @@ from typing import Any
 
 import msgspec
 
-from heavytop.comparison.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
+from heavytop.comparison.work_precision import (
+    CONSTANTS,
+    ERRORS,
+    LANES,
+    OURS,
+    WorkPrecisionLine,
+    beside_ours,
+    leads,
+    panels,
+)
 from heavytop.document.document import Block, Chart, In, Note
 from heavytop.document.document import Table as Cells
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate import peers
-from heavytop.integrate.integrator import Source, name_of
+from heavytop.integrate.integrator import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
+from heavytop.kinds.explained import with_explanation
 from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
@@ -31,7 +41,7 @@ from heavytop.render.work_precision import method_growth, work_precision
 from heavytop.store.checks import CLOSE, bound, ended, size_of, sizes
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive, uniform
-from heavytop.suite.rows import Find, Table, Task, computed, computed_row
+from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
@@ -72,7 +82,7 @@ class Curve(msgspec.Struct, forbid_unknown_fields=True):
         yield from (computed(self.integrator, step=text) for text in self.steps)
 
 
-class WorkPrecisionTable(Table, tag=NAME):
+class WorkPrecisionTable(PlanTable, tag=NAME):
     """Each point of each curve over the same horizon; ``samples`` uniform samples.
 
     timings: whether runs are repeated so often that two reports of one machine can be compared by their seconds.
@@ -102,7 +112,7 @@ class WorkPrecisionTable(Table, tag=NAME):
             for precision, subject in points
         ]
 
-    def beside(self, which: str | Source) -> Table | None:
+    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
         """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
@@ -164,7 +174,8 @@ class WorkPrecision(Kind):
         if not done and alone.outcome is Outcome.SUCCESS:
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
-        return msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        return with_explanation(row, task, run, scorer)
 
     def _timed(
         self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None
@@ -223,7 +234,7 @@ class WorkPrecision(Kind):
 _TITLE = "Work against precision: seconds that an error takes, whole horizon"
 
 
-def _table(title: str, case: str, lines: Sequence[Line]) -> Cells:
+def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
     """Seconds that an error takes, a line an integrator."""
     cells = []
     for line in lines:

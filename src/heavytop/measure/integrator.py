@@ -21,7 +21,7 @@ from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import Observer
-from heavytop.integrate.integrator import Integrator, Source, described, load
+from heavytop.integrate.integrator import Integrator, IntegratorSource, described, load
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
@@ -29,7 +29,7 @@ from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
-from heavytop.measure.truth import Reference
+from heavytop.measure.truth import EnsembleReference
 from heavytop.precision import Precision, decimal_text, exact
 from heavytop.records import Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
@@ -51,10 +51,10 @@ class ChosenIntegrator:
     name: str = HEYOKA
     fault: str = ""
     setting: tuple[str, Fraction] | None = None
-    source: Source | None = None
+    source: IntegratorSource | None = None
 
     @property
-    def which(self) -> str | Source:
+    def which(self) -> str | IntegratorSource:
         """What it is looked up by."""
         return self.source or self.name
 
@@ -481,7 +481,7 @@ def growing(
     times: Sequence[Fraction],
     motions: Sequence[Ended],
     scorers: Sequence[Scorer],
-    reference: Reference,
+    reference: EnsembleReference,
     time_text: TimeText,
     distance: float = 0.0,
 ) -> Growing:
@@ -514,7 +514,7 @@ def _drifts(scorers: Sequence[Scorer], samples: int, motions: Sequence[Ended]) -
 
 
 def _errors(
-    starts: Sequence[State], motions: Sequence[Ended], reference: Reference, distance: float
+    starts: Sequence[State], motions: Sequence[Ended], reference: EnsembleReference, distance: float
 ) -> dict[Quantity, _Measured]:
     """The error of Ω and γ, of its parts, and of attitude and position where every motion has them."""
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)

@@ -15,7 +15,7 @@ from heavytop.errors import InputError
 from heavytop.exact.bodies import resolve
 from heavytop.exact.flint.balls import FUNCTIONS, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.integrator import Source, described, expected_steps
+from heavytop.integrate.integrator import IntegratorSource, described, expected_steps
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
 from heavytop.measure.scorer import Drift
@@ -358,7 +358,7 @@ def compute(
     system: System,
     attitude: bool = False,
     options: dict[str, Any] | None = None,
-    integrator: str | Source = "heyoka",
+    integrator: str | IntegratorSource = "heyoka",
     reached: Reached | None = None,
     outputs: tuple[Output, ...] = (),
     written: Sequence[str] = (),

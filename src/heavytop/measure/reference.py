@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import msgspec
 from flint import arb
 
-from heavytop.display import Table, Tabular, path_picture
+from heavytop.display import Tabular, TitledTable, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.catalogue import find
@@ -274,7 +274,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
 
     written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
-    :func:`heavytop.top.attitude.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
+    the ξ(0) of `heavytop docs outputs`; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
     derivatives: on request, with respect to the start and the data.
     """
@@ -347,7 +347,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
 
-        The sign is continuous from one time to the next and w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
+        The sign is continuous from one time to the next and w ≥ 0 at t = 0.
         Raises InputError for a reference without attitude.
         """
         return self._in_double(output("quaternion"))
@@ -399,7 +399,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
                 raise InputError(
                     "The attitude was not computed: gamma alone does not fix it.",
-                    "Give attitude=True: xi then starts where docs/outputs.md says.",
+                    "Give attitude=True: xi then starts where `heavytop docs outputs` says.",
                 )
             start = self.centre, self.gamma, self.xi
             found = as_written(self.states, self.attitude, self.times, self.digits, *start)
@@ -448,19 +448,19 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             raise InputError("This reference has no derivatives.", 'Ask for derivatives="start", "data" or "all".')
         return self.derivatives
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
         title = f"{self.system}, known to {self.digits} digits: {self.method}"
         notes = [f"largest radius {radius_text(worst)}"]
         if self.xi is not None:
             notes.append(f"xi(0) = ({', '.join(self.xi)})")
         if self.digits > _SHOWN:
-            return Table(title, ("t", "", "value", "radius"), self._long_rows(), notes, whole=True)
+            return TitledTable(title, ("t", "", "value", "radius"), self._long_rows(), notes, whole=True)
         rows = [
             [time, *(decimal_text(Fraction(ball.value), self.digits) for ball in state)]
             for time, state in zip(self.times, self.states, strict=True)
         ]
-        return Table(title, ("t", *NAMES), rows, notes)
+        return TitledTable(title, ("t", *NAMES), rows, notes)
 
     def _long_rows(self) -> list[list[str]]:
         """All digits, a number a row, which goes on below where it is long; of many times the first and the last."""

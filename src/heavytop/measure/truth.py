@@ -490,7 +490,7 @@ _TOO_FEW = "the closed form is certified to too few digits"
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class EnsembleReference:
     """What an ensemble is compared with: the truth of each start, or why there is none.
 
     blur: how far each state may be off, absolute, for each start and time that is covered; shape (starts, samples).
@@ -507,7 +507,7 @@ class Reference:
 
 
 @lru_cache(maxsize=2)
-def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least: int = 0) -> Reference:
+def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least: int = 0) -> EnsembleReference:
     """The closed forms where there are any, else runs in 30 bits more, or in ``least`` bits where that is more.
 
     The rows of a plan that differ in flags share it, and every state that was worked out; so do problems that are one
@@ -529,7 +529,7 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
     covered = [time for time in times if motions[0].covers(time)]
     if not covered:
         return _none(len(problems), f"no closed form; all significant digits are lost at t = {against.until}")
-    return Reference(against, list(motions), [list(map(each.blur, covered)) for each in found])
+    return EnsembleReference(against, list(motions), [list(map(each.blur, covered)) for each in found])
 
 
 def _motion(problem: Problem) -> tuple[Any, ...]:
@@ -540,11 +540,11 @@ def _motion(problem: Problem) -> tuple[Any, ...]:
     return problem.system.name, *own.inertia, *own.moment, *rotor, problem.start
 
 
-def _none(starts: int, reason: str) -> Reference:
-    return Reference(Against("none", reason=reason), [reason] * starts, [])
+def _none(starts: int, reason: str) -> EnsembleReference:
+    return EnsembleReference(Against("none", reason=reason), [reason] * starts, [])
 
 
-def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: int) -> Reference:
+def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: int) -> EnsembleReference:
     """Every closed form certified early, and the first at the horizon too."""
     horizon = times[-1]
     early = min(_CERTIFIED_AT, abs(horizon)) * (1 if horizon > 0 else -1)
@@ -559,7 +559,7 @@ def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: 
     every = replace_struct(least, source=by.second_source, proven=by.kind, starts=starts, of_starts=len(forms))
     against = replace_struct(last.against, certificates=(last.certified, every))
     truths = {key: _TOO_FEW if proof is None else proof.truth.remembered() for key, proof in proofs.items()}
-    return Reference(against, [truths[id(form)] for form in forms], [[2.0**-bits] * len(times)] * len(forms))
+    return EnsembleReference(against, [truths[id(form)] for form in forms], [[2.0**-bits] * len(times)] * len(forms))
 
 
 def _proof(form: ExactSolution, time: Fraction, bits: int) -> Known | None:

@@ -80,7 +80,7 @@ class Steps(ABC):
         """y_n h^n of the last step, exactly as it was computed."""
 
 
-class Run(Steps):
+class ResumableRun(Steps):
     """One that can be taken up again where it was left."""
 
     @abstractmethod

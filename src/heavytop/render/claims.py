@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.claims.audit.audit import Judged
-from heavytop.claims.audit.judge import ABOUT, VERDICTS, Audit, Row
+from heavytop.claims.audit.judge import ABOUT, VERDICTS, Audit, StatementVerdict
 from heavytop.claims.audit.values import SIZES
 from heavytop.claims.library.entry import Entry
 
@@ -78,7 +78,7 @@ def unexpected_text(found: Listed) -> RenderableType:
 _VALUE_STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
-def values_text(rows: Sequence[Row]) -> list[RenderableType]:
+def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
     """A line for each number: what is printed, how many of its digits are right, and by how much it is off.
 
     Below it the proven values, with the radius of each, and how the motion is known.
@@ -103,7 +103,7 @@ def values_text(rows: Sequence[Row]) -> list[RenderableType]:
     return [table, Text(), *lines, *(Text(f"Known from {method}.") for method in methods)]
 
 
-def label(row: Row) -> str:
+def label(row: StatementVerdict) -> str:
     """The quantity, with its component where it has more than one."""
     return f"{row.equation} {row.component}" if row.equation in SIZES else row.equation
 
@@ -172,7 +172,7 @@ def _in_lines(expression: str) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _label(row: Row) -> str:
+def _label(row: StatementVerdict) -> str:
     number = row.equation if not row.equation[0].isdigit() else f"({row.equation})"
     return f"{number} {row.component}"
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.comparison.compare import Comparison
+from heavytop.comparison.compare import Differences
 from heavytop.comparison.findings import line
 from heavytop.comparison.motions import WorseMotions
 from heavytop.comparison.rows import Finding
@@ -20,7 +20,7 @@ _MOST = 200
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
 
 
-def comparison(result: Comparison, full: bool = False) -> RenderableType:
+def comparison(result: Differences, full: bool = False) -> RenderableType:
     """Verdict and findings first, then a line for each row that changed, the worst first, then what else differs.
 
     full: every metric that changed in place of a line for each row.
@@ -38,7 +38,7 @@ def comparison(result: Comparison, full: bool = False) -> RenderableType:
     return Group(*parts)
 
 
-def _rows(result: Comparison) -> Iterator[RenderableType]:
+def _rows(result: Differences) -> Iterator[RenderableType]:
     """A line for each row, the worst first; broken between words alone."""
     for change in result.rows[:_MOST]:
         verdict = change.verdict.value
@@ -67,7 +67,7 @@ def _motions(found: WorseMotions) -> Iterator[RenderableType]:
         yield Text(f"  and {found.worse - len(found.first)} more")
 
 
-def _metrics(result: Comparison) -> Iterator[RenderableType]:
+def _metrics(result: Differences) -> Iterator[RenderableType]:
     columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
     yield table(columns, map(_cells, result.changed[:_MOST]), words=6)
     if len(result.changed) > _MOST:
@@ -79,7 +79,7 @@ def _cells(finding: Finding) -> list[str | Text]:
     return [verdict, row_name(finding.row), metric_name(finding), *values(finding), finding.reason]
 
 
-def headline(result: Comparison) -> str:
+def headline(result: Differences) -> str:
     """The verdict and how many findings of each."""
     tally = ", ".join(f"{count} {verdict.value}" for verdict, count in result.tally.items())
     return f"Verdict: {result.verdict} ({tally})"

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from heavytop.comparison.compare import Comparison
+from heavytop.comparison.compare import Differences
 from heavytop.comparison.findings import folded, line, statistics
 from heavytop.comparison.verdicts import Verdict
 from heavytop.document.document import Block, Card, Cell, Headline, In, Note, Table, Value, Word, cell_text
@@ -199,7 +199,7 @@ _FAILURE = {Verdict.WORSE}
 _ERROR = {Verdict.MISSING, Verdict.INCOMPARABLE}
 
 
-def comparison_junit(result: Comparison) -> str:
+def comparison_junit(result: Differences) -> str:
     """Worse is a failure; missing and incomparable are errors; everything else passes."""
     count = result.tally
     suite = ElementTree.Element(
@@ -238,7 +238,7 @@ _COMMENT = 60_000
 _LONGEST = 120
 
 
-def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
+def comparison_markdown(result: Differences, page: Path | None = None) -> str:
     """Verdict and findings, a line for each row with the worst first, differences of the environments, the page.
 
     Where that is too long for a comment, quantities and then rows are left out; the findings never are.
@@ -257,7 +257,7 @@ def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
     return next((text for text in texts if len(text) <= _COMMENT), "\n".join(head))
 
 
-def _rows(result: Comparison) -> list[str]:
+def _rows(result: Differences) -> list[str]:
     cells = ((c.verdict.value, row_name(c.identity), line(c)) for c in result.rows[:_MOST])
     lines = [
         "| verdict | row | what changed |",
@@ -267,7 +267,7 @@ def _rows(result: Comparison) -> list[str]:
     return [*lines, *(["", f"and {len(result.rows) - _MOST} more."] if len(result.rows) > _MOST else []), ""]
 
 
-def _metrics(result: Comparison) -> list[str]:
+def _metrics(result: Differences) -> list[str]:
     """What changed in each row, largest, rms and last value of one quantity in one line; folded."""
     head = ["<details><summary>Every quantity that changed</summary>", ""]
     head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]

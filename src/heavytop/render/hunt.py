@@ -9,7 +9,7 @@ from typing import Any
 
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import time_text
-from heavytop.suite.hunt.measured import Measured, class_of, special
+from heavytop.suite.hunt.measured import MeasuredMotion, class_of, special
 from heavytop.suite.hunt.search import DECADES, Hunted, Proof, digits_lost, ratio
 
 _WIDTH = 80
@@ -72,7 +72,7 @@ def _nothing(hunted: Hunted) -> list[str]:
     return said
 
 
-def _found(hunted: Hunted, number: int, each: dict[str, Any], m: Measured, p: Proof) -> list[str]:
+def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion, p: Proof) -> list[str]:
     eps = float(hunted.asked.precision.eps)
     if math.isinf(m.error):
         head = f"{number}. The run ends as {m.outcome}" + (f": {m.said}" if m.said else "")

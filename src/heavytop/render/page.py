@@ -13,7 +13,7 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.comparison.compare import Comparison
+from heavytop.comparison.compare import Differences
 from heavytop.comparison.findings import Change, folded, line, statistics
 from heavytop.comparison.rows import Finding
 from heavytop.comparison.work_precision import ERRORS, leads, panels, seconds_text
@@ -101,7 +101,7 @@ def _gave_up(row: Row, kinds: Kinds) -> bool:
     return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
 
 
-def comparison_page(baseline: Report, candidate: Report, comparison: Comparison, kinds: Kinds) -> str:
+def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     sources = [("baseline", baseline), ("candidate", candidate)]
     return render(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.comparison.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
+from heavytop.comparison.work_precision import ERRORS, Lead, WorkPrecisionLine, leads, panels, seconds_text
 from heavytop.document.document import (
     DASHED,
     TIME,
@@ -103,7 +103,7 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
     ]
 
 
-def _picture(lines: Sequence[tuple[str, Line]], keys: Keys, title: str, name: str) -> Picture:
+def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], keys: Keys, title: str, name: str) -> Picture:
     names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
     height = max(3.4, 1 + 0.17 * len(lines))
     axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))

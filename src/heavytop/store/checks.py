@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy
 
-from heavytop.document.kind import Kind, Kinds, kind_of
+from heavytop.document.kind import Kinds, ReportedKind, kind_of
 from heavytop.document.names import printable, row_name
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
@@ -87,7 +87,7 @@ _HALF_WAY = 0.25 - NEAR
 """Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
 
 
-def contradictions(row: Row, kind: Kind) -> Iterator[str]:
+def contradictions(row: Row, kind: ReportedKind) -> Iterator[str]:
     """What in a row of that kind contradicts something else in it, as ``FIELD: REASON``."""
     for name, metric in row.metrics.items():
         if metric.band is not None and not kind.carries_band(metric):
@@ -133,7 +133,7 @@ def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
                     yield f"{quantity.over(part).text}: larger than the largest"
 
 
-def _series(row: Row, kind: Kind) -> Iterator[str]:
+def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
     for name, series in row.series.items():
         if 0 < row.samples < len(series.times):
             yield f"samples: {row.samples}, where {name} has {len(series.times)}"
@@ -316,7 +316,7 @@ def _where(file: Path, row: Row) -> str:
     return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
 
 
-def _check_row(file: Path, row: Row, kind: Kind) -> None:
+def _check_row(file: Path, row: Row, kind: ReportedKind) -> None:
     where = _where(file, row)
     horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
     if row.outcome not in _OUTCOMES:

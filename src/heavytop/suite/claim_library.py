@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from heavytop.claims.audit.audit import audited
-from heavytop.claims.audit.judge import Row
+from heavytop.claims.audit.judge import StatementVerdict
 from heavytop.claims.library.entry import FOLDER, Entry, Verdict, library
 
 VERSION = "1.0.0"
@@ -105,7 +105,7 @@ def _published(entry: Entry) -> Published:
     )
 
 
-def _equation(row: Row) -> Equation:
+def _equation(row: StatementVerdict) -> Equation:
     return msgspec.convert(row.to_json(), Equation)
 
 

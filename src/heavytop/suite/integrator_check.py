@@ -19,7 +19,7 @@ from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import peers
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.integrator import Source
+from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
@@ -51,7 +51,7 @@ class Checked:
     text: str
 
 
-def check(which: str | Source) -> list[Checked]:
+def check(which: str | IntegratorSource) -> list[Checked]:
     """Every part of the contract of a third-party integrator, or one that is named.
 
     A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
@@ -68,7 +68,7 @@ def check(which: str | Source) -> list[Checked]:
         return list(_in_child(pool, which))
 
 
-def _in_child(pool: ProcessPoolExecutor, which: str | Source) -> Iterator[Checked]:
+def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Iterator[Checked]:
     """Each part in the process of the pool; where one does not come back, what was found before it stands."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
         seconds = _PATIENCE_OF.get(name, _PATIENCE)
@@ -89,7 +89,7 @@ def _in_child(pool: ProcessPoolExecutor, which: str | Source) -> Iterator[Checke
             return
 
 
-def _part(which: str | Source, place: int) -> Checked:
+def _part(which: str | IntegratorSource, place: int) -> Checked:
     """That part of the contract."""
     begin_row()
     return _judged(*_Contract(which).parts()[place])
@@ -114,7 +114,7 @@ class _Note(Exception):
 class _Contract:
     """The checks of one integrator, each a method that returns what it found or raises what is wrong."""
 
-    def __init__(self, which: str | Source) -> None:
+    def __init__(self, which: str | IntegratorSource) -> None:
         self.which = which
         self.program = which if isinstance(which, Command) else None
         names = [each for each in self.program.precisions if each != "real:BITS"] if self.program else []

@@ -24,7 +24,7 @@ from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.files import read_whole
-from heavytop.integrate.integrator import Source
+from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers import require as require_integrator
@@ -34,7 +34,7 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, physical, require
 from heavytop.records import FINEST, RowKey
-from heavytop.suite.rows import Kinds, Table, Task
+from heavytop.suite.rows import Kinds, PlanTable, Task
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
@@ -97,7 +97,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """
 
     name: str
-    measure: list[Table]
+    measure: list[PlanTable]
     top: list[Top] = []
     sweep: list[Sweep] = []
     integrator: list[dict[str, Any]] = []
@@ -105,7 +105,9 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     row_timeout: str | int | float = ""
 
 
-def read(name: str, kinds: Kinds, seed: int = 0, integrator: str | Source = "") -> tuple[Plan, str, Sequence[Task]]:
+def read(
+    name: str, kinds: Kinds, seed: int = 0, integrator: str | IntegratorSource = ""
+) -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
     integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
@@ -175,11 +177,11 @@ def former(name: str) -> set[str]:
         return set()
 
 
-def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
+def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
     """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
     one name.
     """
-    found: list[Source] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
+    found: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
     for text in plan.integrators:
         if text.endswith(".toml"):
             found += commands_in(folder / text)
@@ -197,7 +199,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
     return defined
 
 
-def beside(plan: Plan, integrator: str | Source) -> Plan:
+def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     """The plan with the same measurements of another integrator after heyoka's.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
@@ -238,7 +240,7 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
             )
 
 
-def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = None) -> Sequence[Task]:
+def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | None = None) -> Sequence[Task]:
     """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
 
     defined: integrators of the plan's own, by name.
@@ -260,7 +262,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = Non
         for whole in plan.measure
         for table, cases in _parts(whole, _chunked(plan, swept) if whole.chunked else swept)
     ]
-    sources: dict[str, Source | None] = {}
+    sources: dict[str, IntegratorSource | None] = {}
     seen: dict[RowKey, str] = {}
     for templates, _ in parts:
         for place, task in enumerate(templates):
@@ -360,7 +362,7 @@ def _require_fit(task: Task) -> None:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
-def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, Sequence[Case] | None]]:
+def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
     """The table itself, or one for each of its cases where one is a sweep: then the table is of the sweep's first."""
     names: list[str] = getattr(table, "cases", [])
     if not swept.keys() & set(names):

@@ -17,7 +17,7 @@ import msgspec
 
 from heavytop.cases import Case
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
-from heavytop.integrate.integrator import Source, name_of, require_reach
+from heavytop.integrate.integrator import IntegratorSource, name_of, require_reach
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
@@ -73,7 +73,7 @@ class Task:
     options: Any = None
     seed: int = 0
     fault: str = ""
-    source: Source | None = None
+    source: IntegratorSource | None = None
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case of the same system."""
@@ -304,7 +304,7 @@ Find = Callable[[str], Case]
 """The case of a name; raises InputError for an unknown one."""
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
+class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
     """A table `[[measure]]` of a plan; unknown keys are errors.
 
     chunked: whether its tasks are chunks of a sweep, not single motions.
@@ -316,14 +316,14 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, which: str | Source) -> Table | None:
+    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
         return msgspec.structs.replace(self, integrator=name_of(which))
 
 
-class Kind(Protocol):
+class MeasuredKind(Protocol):
     """One kind of measurement, as far as it is run; what it does not say is the usual.
 
     name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
@@ -332,7 +332,7 @@ class Kind(Protocol):
     """
 
     name: str
-    table: type[Table] | None = None
+    table: type[PlanTable] | None = None
     concludes: bool = False
     gathers: bool = False
 
@@ -356,7 +356,7 @@ class Kind(Protocol):
         return []
 
 
-Kinds = Mapping[str, Kind]
+Kinds = Mapping[str, MeasuredKind]
 
 
 # One task measured, in whatever process: its row, and how a process begins that measures such.
@@ -365,7 +365,7 @@ Kinds = Mapping[str, Kind]
 RESUME = "Finished rows are kept: run again with --resume"
 
 
-def measure(kind: Kind, task: Task, saved: Saved) -> Row:
+def measure(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
     """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
     begin_row()
     try:
@@ -381,7 +381,7 @@ def measure(kind: Kind, task: Task, saved: Saved) -> Row:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
-def _taken_up(kind: Kind, task: Task, saved: Saved) -> Row:
+def _taken_up(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
     """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
     try:
         return kind.measure(task, saved)
@@ -399,7 +399,7 @@ def ended_its_process(task: Task, times: int) -> Row:
     return failed(task, f"{task.key.subject.name} ended its process {times} times")
 
 
-def begin_worker(*_kinds: Kind) -> None:
+def begin_worker(*_kinds: MeasuredKind) -> None:
     """In a new process, which leaves interrupts to its parent.
 
     With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.

@@ -19,7 +19,7 @@ from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Checkpoint, Saved
 from heavytop.suite.limited import RowLimits, in_limited_process, in_limited_processes, in_order
-from heavytop.suite.rows import RESUME, Kind, Kinds, Task, begin_worker, died, ended_its_process, measure
+from heavytop.suite.rows import RESUME, Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, measure
 
 # Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 #
@@ -212,7 +212,7 @@ def _windowed(
             del under_way[future]
 
 
-def _measure_as(expected: Versions, kind: Kind, task: Task, limit: float | None) -> Timed:
+def _measure_as(expected: Versions, kind: MeasuredKind, task: Task, limit: float | None) -> Timed:
     """The row of ``task`` and its seconds, within so many of them where there is a limit.
 
     Raises InputError unless the versions here are those expected.

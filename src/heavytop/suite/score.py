@@ -38,7 +38,7 @@ from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subje
 from heavytop.suite.plan import log_spaced
 from heavytop.suite.rows import Task, computed_row, data_of, seconds_a_step
 from heavytop.top.vectors import dot
-from heavytop.trajectories.observed import Given, Observed
+from heavytop.trajectories.observed import GivenTrajectory, Observed
 
 # Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.
 
@@ -59,7 +59,7 @@ _WORDS = {
 }
 
 
-def exact_problem(given: Given) -> Problem:
+def exact_problem(given: GivenTrajectory) -> Problem:
     """The problem in the format of the trajectory, whose principal data are exact: the body was rounded before."""
     found = observed_of(given)
     top, start = found.posed.top, found.posed.start
@@ -69,7 +69,7 @@ def exact_problem(given: Given) -> Problem:
     return Problem(given.system, given.precision, parameters, start, xi, (top, start))
 
 
-def observed_of(given: Given) -> Observed:
+def observed_of(given: GivenTrajectory) -> Observed:
     """What the trajectory gives."""
     assert given.observed is not None
     return given.observed
@@ -85,7 +85,11 @@ class Scored:
 
 
 def scored(
-    given: Given, times: Sequence[Fraction], keep: Sequence[Fraction], effort: float, progress: Callable[[], None]
+    given: GivenTrajectory,
+    times: Sequence[Fraction],
+    keep: Sequence[Fraction],
+    effort: float,
+    progress: Callable[[], None],
 ) -> Scored:
     """Every sample up to the first that is not finite, compared with the true motion.  times: rounded to the format."""
     found, problem = observed_of(given), exact_problem(given)
@@ -142,7 +146,7 @@ def peer_metrics(
     return by_name({RELATIVE: found[RELATIVE]}), run.steps
 
 
-def diagnoses(given: Given, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
+def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
     """What explains the error of the columns: their digits, lengths off 1, a convention, or another mistake."""
     found = observed_of(given)
     times = given.times[: _count(found)]
@@ -168,7 +172,7 @@ def diagnoses(given: Given, error: float | None, errors: Sequence[float]) -> lis
 
 
 def _of_states(
-    given: Given, times: Sequence[Fraction], error: float | None, errors: Sequence[float]
+    given: GivenTrajectory, times: Sequence[Fraction], error: float | None, errors: Sequence[float]
 ) -> list[Diagnosis]:
     """What the columns have wrong that a file of Ω and γ may have as well, where they give the whole state."""
     found, bits = observed_of(given), given.precision.bits + GUARD_BITS
@@ -209,7 +213,7 @@ def _disagreements(found: Observed, times: Sequence[Fraction]) -> list[Diagnosis
     return said
 
 
-def used(given: Given) -> str:
+def used(given: GivenTrajectory) -> str:
     """Which columns were scored, and how they were read."""
     found = observed_of(given)
     said, parts = found.said, []
@@ -292,7 +296,7 @@ def _is_number(metric: Metric) -> bool:
     return metric.log10 is not None or metric.value == "0"
 
 
-def score(given: Given) -> Row:
+def score(given: GivenTrajectory) -> Row:
     """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
 
     The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
@@ -301,7 +305,7 @@ def score(given: Given) -> Row:
     return _scored(given)[0] if given.observed is None else _observed_row(given)[0]
 
 
-def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
+def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
     """The row of :func:`score`, heyoka beside it, and what explains the error.
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
@@ -317,7 +321,7 @@ def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
     return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed, single)
 
 
-def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
+def _scored(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
     """The row, what made it, and the error of each state relative to the size of Ω and γ where the reference goes."""
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
@@ -337,7 +341,11 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
 
 
 def _row(
-    given: Given, problem: Problem, times: list[Fraction], keep: list[Fraction], scorer: Scorer | ObservedScorer
+    given: GivenTrajectory,
+    problem: Problem,
+    times: list[Fraction],
+    keep: list[Fraction],
+    scorer: Scorer | ObservedScorer,
 ) -> Row:
     """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
     precision, states = given.precision, _finite(given)
@@ -362,7 +370,7 @@ def _row(
     return msgspec.structs.replace(row, **said, data=data_of(case))
 
 
-def _observed_row(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scored]:
+def _observed_row(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scored]:
     """The row of a trajectory of attitudes, positions or Ω in any axes, and what made it."""
     times = [round_to(time, given.precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
@@ -370,7 +378,7 @@ def _observed_row(given: Given, progress: Progress = lambda: None) -> tuple[Row,
     return _row(given, found.problem, times, keep, found.scorer), found
 
 
-def _assess_observed(given: Given, progress: Progress) -> Assessment:
+def _assess_observed(given: GivenTrajectory, progress: Progress) -> Assessment:
     row, found = _observed_row(given, progress)
     count = len(_finite(given))
     told = diagnoses(given, _size(row), found.errors) if count else []
@@ -385,7 +393,7 @@ def _assess_observed(given: Given, progress: Progress) -> Assessment:
     return Assessment(row, peer, told, given.format_guessed, False, used(given))
 
 
-def _finite(given: Given) -> list[tuple[Fraction, ...]]:
+def _finite(given: GivenTrajectory) -> list[tuple[Fraction, ...]]:
     """The states before the first that is not finite."""
     count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
     return [state for state in given.states[:count] if state is not None]
@@ -407,7 +415,7 @@ class _Measured:
     reference: Against
 
 
-def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
+def _peer(given: GivenTrajectory, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
     """heyoka's own run over the same times, compared with the same known motion."""
     precision = given.precision
     if scorer.error is None or not count or precision == DOUBLE_DOUBLE:

@@ -49,7 +49,7 @@ class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
     name: str
 
 
-class Grid(Strict, tag="grid"):
+class SweepGrid(Strict, tag="grid"):
     """Every combination of the values given; numbers as exact text.
 
     inertia, weight, centre, omega, gamma: one value, or a list of values.  A point is called NAME[i,j,...] by its
@@ -173,7 +173,7 @@ def _direction(draw: Callable[[], int]) -> tuple[int, int, int, int]:
             return 2 * (q * s - p * r), 2 * (r * s + p * q), p * p + s * s - q * q - r * r, norm
 
 
-Sweep = Grid | Random
+Sweep = SweepGrid | Random
 
 
 def _text(value: Fraction | Sequence[Fraction]) -> str:

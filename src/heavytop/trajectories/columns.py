@@ -16,7 +16,7 @@ from heavytop.precision import exact
 from heavytop.top.vectors import Vector, vector
 from heavytop.trajectories.observed import RawStart
 
-REMEDY = "docs/score.md lists the columns that are understood."
+REMEDY = "`heavytop docs score` lists the columns that are understood."
 _DEGREES = re.compile(r"[\[(/]?\s*(deg|degrees?|°)\s*[\])]?$", re.IGNORECASE)
 _POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
 _MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
@@ -183,7 +183,7 @@ _ARRAYS = {
 }
 """Keys of JSON documents whose values are a list for each time."""
 KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
-_REMEDY = "docs/score.md shows what a file may hold."
+_REMEDY = "`heavytop docs score` shows what a file may hold."
 _ORDERS = {
     "wxyz": "wxyz",
     "scalar first": "wxyz",
@@ -195,7 +195,7 @@ _ORDERS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ColumnTable:
     """Columns as they were read.
 
     values: by the name of the quantity, the exact numbers of each row, None for a row that is not finite.
@@ -262,7 +262,7 @@ def _numbers(values: Any, what: str, count: int | None) -> list[Fraction]:
     return [written_numbers.finite(value, f"a number of {what}") for value in values]
 
 
-def columns(document: Mapping[str, Any], said: Convention) -> Table:
+def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     """The columns of a document, of a text table or of JSON.
 
     Raises InputError for columns that are not complete, for a sequence that is not said, and for a cell that is none,
@@ -278,7 +278,7 @@ def columns(document: Mapping[str, Any], said: Convention) -> Table:
     return found
 
 
-def _of_table(document: Mapping[str, Any], said: Convention) -> Table:
+def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     header, cells, lines = document["header"], document["cells"], document["lines"]
     space, last = in_space(document), said.quaternion_order == "xyzw"
     both = {"omega", "gamma"} <= header.places.keys()
@@ -301,7 +301,7 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> Table:
         for name in values:
             values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
     texts = [row[place] for row in cells for name in values for _, place in places[name]]
-    return Table(values, texts, [f"line {number}" for number in lines])
+    return ColumnTable(values, texts, [f"line {number}" for number in lines])
 
 
 def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
@@ -315,7 +315,7 @@ def _whole(values: Any) -> tuple[Fraction, ...] | None:
     return None if None in found else found
 
 
-def _of_lists(document: Mapping[str, Any], said: Convention) -> Table:
+def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     given: dict[str, tuple[str, list[Any]]] = {}
     space = in_space(document)
     states = document.get("states")
@@ -343,7 +343,7 @@ def _of_lists(document: Mapping[str, Any], said: Convention) -> Table:
             key, rows = given[name]
             values[name] = [_whole(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
     texts = [str(value) for _, rows in given.values() for row in rows for value in row]
-    return Table(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
+    return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
 
 
 def cell_of(value: Any, where: str) -> Fraction | None:
@@ -378,7 +378,7 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
     return row
 
 
-def start(document: Mapping[str, Any], table: Table, at_start: bool, said: Convention) -> RawStart:
+def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention) -> RawStart:
     """The start: by its keys, else by the row t = 0.
 
     Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.

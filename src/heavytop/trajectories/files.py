@@ -30,7 +30,7 @@ from heavytop.trajectories.observed import (
     LONGEST_NAME,
     MOST,
     AnyBody,
-    Given,
+    GivenTrajectory,
     RawStart,
     named,
     observed,
@@ -43,7 +43,7 @@ from heavytop.trajectories.observed import (
 # Tables of states that other programs write as text: separators, spellings of the header, comments.
 
 
-REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
+REMEDY = "`heavytop docs score` shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
 VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
@@ -71,7 +71,7 @@ def unknown(key: str, known: Sequence[str]) -> InputError:
     return InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?" if near else REMEDY)
 
 
-class Table:
+class TextTable:
     """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
 
     known: the keys that a comment may have.  Raises InputError for a header or a row that cannot be understood, for a
@@ -301,7 +301,7 @@ _ROW_SLACK = Fraction(1, 100)
 """γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
 
 
-def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given:
+def read(path: Path, case: Case | None = None, normalize: bool = False) -> GivenTrajectory:
     """The trajectory in a ``.json`` or ``.csv`` file (or ``.tsv``, ``.dat``), or ``-`` for standard input.
 
     case: gives top, start and system where the file does not.
@@ -357,7 +357,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
         raise InputError("This is no text: it holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST:
         raise too_many(text.count("\n"))
-    table = Table(text, sorted(_KEYS - {"times", "states"}))
+    table = TextTable(text, sorted(_KEYS - {"times", "states"}))
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
@@ -368,7 +368,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
 
 def _given(
     document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> Given:
+) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
         raise too_many(len(document["times"]))
     top, at_start = _top(document, case), _row_of_start(document)
@@ -391,7 +391,7 @@ def _given(
     start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
-    return Given(
+    return GivenTrajectory(
         top=top,
         start=start,
         system=which,
@@ -406,7 +406,7 @@ def _given(
 
 def _observed(
     document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> Given:
+) -> GivenTrajectory:
     """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
     listed = _list(document, "times") if "lines" not in document else observed_file.times(document)
     times = list(check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed]))
@@ -424,7 +424,7 @@ def _observed(
     precision = _precision(document, table.texts)
     found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
     require_physical(found.posed.top, found.posed.start)
-    return Given(
+    return GivenTrajectory(
         top=found.posed.top,
         start=found.posed.start,
         system=which,
@@ -454,7 +454,7 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 
 def _raw_start(
-    document: dict[str, Any], table: observed_file.Table, at_start: bool, said: Any, case: Case | None
+    document: dict[str, Any], table: observed_file.ColumnTable, at_start: bool, said: Any, case: Case | None
 ) -> RawStart:
     """The start of the file, or of the case where the file says nothing of it."""
     if case is not None and not document.keys() & {"omega", "gamma", *observed_file.STARTS}:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy
 
 from heavytop import written_numbers
-from heavytop.diagnose.readings import BodyData, Reading, Seen, Start
+from heavytop.diagnose.readings import BodyData, GivenStart, Reading, Seen
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
@@ -287,7 +287,7 @@ _SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class GivenTrajectory:
     """A trajectory as it was given.
 
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
@@ -337,7 +337,7 @@ def of_arrays(
     precision: Precision | None,
     name: str,
     integrator: str,
-) -> Given:
+) -> GivenTrajectory:
     """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
 
     precision: None for the narrowest format that holds every number as it is given.
@@ -348,7 +348,7 @@ def of_arrays(
     states = [rounded_state([component(value) for value in row], form) for row in rows]
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     names = named(name, "name"), named(integrator, "integrator")
-    return Given(*names, top, start, which, form, times, states, outcome, 0, {}, "")
+    return GivenTrajectory(*names, top, start, which, form, times, states, outcome, 0, {}, "")
 
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
@@ -469,13 +469,13 @@ class Observed:
         return Seen(tuple(times[:count]), columns, body, start, said, of, pivot, count) if count else None
 
 
-def _start(raw: RawStart, posed: Posed) -> Start:
+def _start(raw: RawStart, posed: Posed) -> GivenStart:
     omega = numpy.array([float(value) for value in raw.omega])
     if raw.form != "gamma":
-        return Start(raw.form, numpy.array([float(value) for value in raw.values]), omega, raw.in_space)
+        return GivenStart(raw.form, numpy.array([float(value) for value in raw.values]), omega, raw.in_space)
     assert posed.xi is not None
     rows = [_given(posed, v) for v in (posed.xi, _cross(posed.start.gamma, posed.xi), posed.start.gamma)]
-    return Start("rows", numpy.array(rows, dtype=float).reshape(-1), omega, raw.in_space)
+    return GivenStart("rows", numpy.array(rows, dtype=float).reshape(-1), omega, raw.in_space)
 
 
 def _given(posed: Posed, principal_vector: Sequence[Fraction]) -> list[float]:
@@ -573,7 +573,7 @@ def of_observed_arrays(
     precision: Precision | None,
     names: tuple[str, str],
     normalize: bool = False,
-) -> Given:
+) -> GivenTrajectory:
     """A trajectory from memory: rows of numbers of each quantity, in any format or as text.
 
     precision: None for the narrowest format that holds every number as it is given.  names: of the row and the
@@ -591,7 +591,7 @@ def of_observed_arrays(
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
     top, start = found.posed.top, found.posed.start
     require_physical(top, start)
-    return Given(
+    return GivenTrajectory(
         name,
         integrator,
         top,

@@ -22,7 +22,7 @@ _LONGEST = 120
 _BITS = 512
 
 
-class Kind(Enum):
+class ConditionKind(Enum):
     """What is asked of an expression; the value is how it is written."""
 
     NONZERO = "{} ≠ 0"
@@ -31,9 +31,9 @@ class Kind(Enum):
 
     def is_met_by(self, sign: Sign) -> bool:
         """Whether an expression of that sign meets it."""
-        if self is Kind.NONZERO:
+        if self is ConditionKind.NONZERO:
             return sign.strict
-        return sign.value > 0 and (sign.strict or self is Kind.NONNEGATIVE)
+        return sign.value > 0 and (sign.strict or self is ConditionKind.NONNEGATIVE)
 
 
 def written(text: str) -> str:
@@ -48,7 +48,7 @@ class Need:
     shown: how it is written where that is not the expression itself, such as |u| ≤ 1 for 1 − u² ≥ 0.
     """
 
-    kind: Kind
+    kind: ConditionKind
     expression: sympy.Expr
     shown: str = ""
 
@@ -68,11 +68,11 @@ class Need:
             return None
         rational = self.expression.is_rational_function(*self.expression.free_symbols)
         if ball.is_zero() or (rational and ball.contains(0) and is_exactly_zero(self.expression, values)):
-            return self.kind is Kind.NONNEGATIVE
-        if self.kind is Kind.NONZERO:
+            return self.kind is ConditionKind.NONNEGATIVE
+        if self.kind is ConditionKind.NONZERO:
             return True if not ball.contains(0) else None
-        above = ball > 0 if self.kind is Kind.POSITIVE else ball >= 0
-        below = ball <= 0 if self.kind is Kind.POSITIVE else ball < 0
+        above = ball > 0 if self.kind is ConditionKind.POSITIVE else ball >= 0
+        below = ball <= 0 if self.kind is ConditionKind.POSITIVE else ball < 0
         return True if above else False if below else None
 
 
@@ -80,28 +80,28 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
     """What ``function`` needs of its arguments to be defined and real: ``/`` of a divisor, ``sqrt``, ``log``, ..."""
     u = arguments[0]
     if function == "/":
-        needs = {Need(Kind.NONZERO, u)}
+        needs = {Need(ConditionKind.NONZERO, u)}
     elif function == "sqrt":
-        needs = {Need(Kind.NONNEGATIVE, u)}
+        needs = {Need(ConditionKind.NONNEGATIVE, u)}
     elif function == "log":
-        needs = {Need(Kind.POSITIVE, u)}
+        needs = {Need(ConditionKind.POSITIVE, u)}
     elif function in ("asin", "acos"):
-        needs = {Need(Kind.NONNEGATIVE, 1 - u**2, f"-1 ≤ {u} ≤ 1")}
+        needs = {Need(ConditionKind.NONNEGATIVE, 1 - u**2, f"-1 ≤ {u} ≤ 1")}
     elif function in ("tan", "sec"):
-        needs = {Need(Kind.NONZERO, sympy.cos(u))}
+        needs = {Need(ConditionKind.NONZERO, sympy.cos(u))}
     elif function in ("coth", "csch"):
-        needs = {Need(Kind.NONZERO, sympy.sinh(u))}
+        needs = {Need(ConditionKind.NONZERO, sympy.sinh(u))}
     elif function in ("wp", "wpprime"):
         text = f"{u} is no period of wp(u, {arguments[1]}, {arguments[2]})"
-        needs = {Need(Kind.NONZERO, wpinverse(*arguments), text)}
+        needs = {Need(ConditionKind.NONZERO, wpinverse(*arguments), text)}
     elif function in ("wp3", "wp3prime"):
         _, g2, g3 = arguments
-        needs = {Need(Kind.POSITIVE, g2**3 - 27 * g3**2)}
+        needs = {Need(ConditionKind.POSITIVE, g2**3 - 27 * g3**2)}
     elif function in NAMES:
         m = arguments[1]
-        needs = {Need(Kind.NONNEGATIVE, m), Need(Kind.NONNEGATIVE, 1 - m, f"{m} ≤ 1")}
+        needs = {Need(ConditionKind.NONNEGATIVE, m), Need(ConditionKind.NONNEGATIVE, 1 - m, f"{m} ≤ 1")}
     elif function == "atan2":
-        needs = {Need(Kind.POSITIVE, u**2 + arguments[1] ** 2)}
+        needs = {Need(ConditionKind.POSITIVE, u**2 + arguments[1] ** 2)}
     else:
         needs = set()
     return frozenset(need for need in needs if not _is_plain(need))
@@ -110,7 +110,7 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
 def _is_plain(need: Need) -> bool:
     """Numbers that meet it, as anyone can see."""
     e = need.expression
-    return bool(e.is_Rational and (e > 0 or (e < 0 and need.kind is Kind.NONZERO)))
+    return bool(e.is_Rational and (e > 0 or (e < 0 and need.kind is ConditionKind.NONZERO)))
 
 
 def conditions_of(expressions: Iterable[Any]) -> frozenset[Need]:

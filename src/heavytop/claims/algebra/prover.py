@@ -12,7 +12,14 @@ import sympy
 from flint import arb, fmpq_mpoly
 
 from heavytop.claims.algebra.arcs import Arcs
-from heavytop.claims.algebra.conditions import Kind, Need, is_exactly_zero, is_small_polynomial, on_conditions, written
+from heavytop.claims.algebra.conditions import (
+    ConditionKind,
+    Need,
+    is_exactly_zero,
+    is_small_polynomial,
+    on_conditions,
+    written,
+)
 from heavytop.claims.algebra.evaluate import evaluate
 from heavytop.claims.algebra.fields import Field, Regularity
 from heavytop.claims.algebra.rational import Quotient
@@ -139,7 +146,7 @@ class Region:
         """The claim is made where p is not 0, as it is written, and p keeps its sign."""
         one = self.field.tower.one
         for need in self._needs:
-            if need.kind is not Kind.NONNEGATIVE:
+            if need.kind is not ConditionKind.NONNEGATIVE:
                 try:
                     value = self.field.enter(need.expression)
                 except Unprovable:
@@ -234,7 +241,7 @@ class Region:
 
     def is_met_for_each(self, need: Need) -> bool:
         """Where it asks that its expression is not 0: it is so somewhere, for any values of the parameters."""
-        if need.kind is not Kind.NONZERO:
+        if need.kind is not ConditionKind.NONZERO:
             return True
         try:
             value = self.field.enter(self._on_relations(need).expression)
@@ -257,8 +264,8 @@ class Region:
         plain = sign_of(need.expression)
         if (
             plain.strict
-            if need.kind is Kind.NONZERO
-            else plain.value > 0 and (plain.strict or need.kind is Kind.NONNEGATIVE)
+            if need.kind is ConditionKind.NONZERO
+            else plain.value > 0 and (plain.strict or need.kind is ConditionKind.NONNEGATIVE)
         ):
             return _EVERYWHERE
         try:
@@ -266,19 +273,21 @@ class Region:
         except Unprovable:
             return ""
         sign = self.field.tower.sign(value)
-        apart = need.kind is Kind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
+        apart = (
+            need.kind is ConditionKind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
+        )
         if apart or need.kind.is_met_by(sign):
             return _EVERYWHERE
         if self.keeps_sign(value, need.kind):
             return KEPT
         return ""
 
-    def keeps_sign(self, value: Quotient, kind: Kind) -> bool:
+    def keeps_sign(self, value: Quotient, kind: ConditionKind) -> bool:
         """Along the flow: its numerator does, and its denominator, unless only that it is not 0 is asked."""
         if self._flow is None or not value.numerator or not self.is_kept(value.numerator):
             return False
         below = self.field.tower.signs.factors(value.denominator)[1]
-        return kind is Kind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
+        return kind is ConditionKind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
 
     def _factors_nowhere_zero(self, p: fmpq_mpoly) -> bool:
         return all(
@@ -293,7 +302,7 @@ class Region:
             value = self.field.enter(need.expression)
         except Unprovable:
             return False
-        weak = need.kind is Kind.NONZERO or self.field.tower.sign(value).value > 0
+        weak = need.kind is ConditionKind.NONZERO or self.field.tower.sign(value).value > 0
         return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
 
     def _factors(self, p: fmpq_mpoly) -> list[fmpq_mpoly]:
@@ -348,7 +357,7 @@ class Region:
         """What, assumed of the parameters, would discharge it, or leave zeros that are removable; "" for nothing."""
         parameters = self._setting.parameters
         open_part = need.expression if need.expression.free_symbols <= parameters else None
-        if open_part is None and need.kind is Kind.NONZERO:
+        if open_part is None and need.kind is ConditionKind.NONZERO:
             with suppress(Unprovable):
                 factors = self._factors(self.field.enter(need.expression).numerator)
                 parts = [self.field.expression(Quotient(f, self.field.tower.one)) for f in factors]
@@ -356,7 +365,7 @@ class Region:
                 open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
         if open_part is None or not open_part.free_symbols:
             return ""
-        return written(f"{open_part} {'!=' if need.kind is Kind.NONZERO else '>'} 0")
+        return written(f"{open_part} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0")
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
         """What stands against the values being real and continuous all over the region."""
@@ -439,8 +448,11 @@ class Prover:
         self, statements: Sequence[Statement], sign: int, strict: bool, parts: Iterable[sympy.Expr]
     ) -> Field | None:
         needs = self._kept_facts(statements[0])
-        facts = (*statements[0].domain.facts, *(need.expression for need in needs if need.kind is Kind.POSITIVE))
-        weak = tuple(need.expression for need in needs if need.kind is Kind.NONNEGATIVE)
+        facts = (
+            *statements[0].domain.facts,
+            *(need.expression for need in needs if need.kind is ConditionKind.POSITIVE),
+        )
+        weak = tuple(need.expression for need in needs if need.kind is ConditionKind.NONNEGATIVE)
         assumptions = self._setting.assumptions(sign, strict=strict, facts=facts, weak=weak)
         expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
         kept: set[sympy.Expr] = set()
@@ -460,7 +472,7 @@ class Prover:
         """Of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
         if statement.flow is None:
             return []
-        needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not Kind.NONZERO]
+        needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not ConditionKind.NONZERO]
         try:
             base = Field(self._setting.assumptions(0), [statement.residual, *(need.expression for need in needs)])
         except Unprovable:
@@ -546,7 +558,8 @@ class Prover:
             return False
         # a derivative of |u| is none where u is 0
         if any(
-            Need(Kind.NONZERO, kink.args[0]).is_met(place) is not True for kink in statement.residual.atoms(sympy.sign)
+            Need(ConditionKind.NONZERO, kink.args[0]).is_met(place) is not True
+            for kink in statement.residual.atoms(sympy.sign)
         ):
             return False
         try:

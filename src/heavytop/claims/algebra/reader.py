@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import sympy
 
 from heavytop.claims.algebra import structure
-from heavytop.claims.algebra.conditions import Kind, Need, condition
+from heavytop.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.claims.algebra.evaluate import WEIERSTRASS
 from heavytop.claims.algebra.structure import Defined
 from heavytop.errors import InputError
@@ -46,7 +46,7 @@ _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
 
 
-class Size(NamedTuple):
+class ExpressionBounds(NamedTuple):
     """Bounds on what an expression can grow into: nodes, bits of its numbers, degree, terms when expanded."""
 
     nodes: int
@@ -60,13 +60,13 @@ class Formula:
     """A parsed formula with the bounds on its size, and what it needs to be defined and real as it is written."""
 
     expression: sympy.Expr
-    size: Size
+    size: ExpressionBounds
     needs: frozenset[Need] = frozenset()
 
 
 def symbol(expression: sympy.Expr) -> Formula:
     """A name that formulas may use."""
-    return Formula(expression, Size(1, 0, 1, 1))
+    return Formula(expression, ExpressionBounds(1, 0, 1, 1))
 
 
 class TooLarge(InputError):
@@ -141,7 +141,7 @@ class _Parser:
             raise self._error(f"{token!r} expected before {self._next()[:20]!r}")
 
     def _error(self, what: str) -> InputError:
-        return InputError(f"{self._where}: {what}.", "See docs/claims-in-toml.md for what a formula may hold.")
+        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
 
     def end(self) -> None:
         """Raises InputError if anything is left."""
@@ -203,7 +203,9 @@ class _Parser:
             raise self._error("a division by 0")
         whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
         n = base.size
-        size = Size(n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole))
+        size = ExpressionBounds(
+            n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole)
+        )
         self._check(size)
         if exponent.q == 2:
             needs |= condition("sqrt", (base.expression,))
@@ -230,7 +232,7 @@ class _Parser:
             raise self._error(f"the number {token[:20]!r} is too large or too small")
         value = exact(token)
         bits = value.numerator.bit_length() + value.denominator.bit_length()
-        return self._checked(sympy.Rational(value.numerator, value.denominator), Size(1, bits, 0, 1))
+        return self._checked(sympy.Rational(value.numerator, value.denominator), ExpressionBounds(1, bits, 0, 1))
 
     def _name(self, token: str) -> Formula:
         if token not in self._names:
@@ -256,27 +258,27 @@ class _Parser:
         needs = condition(token, inside).union(*(argument.needs for argument in arguments))
         return self._checked(function(*inside), size, needs)
 
-    def _checked(self, expression: sympy.Expr, size: Size, needs: frozenset[Need] = frozenset()) -> Formula:
+    def _checked(self, expression: sympy.Expr, size: ExpressionBounds, needs: frozenset[Need] = frozenset()) -> Formula:
         self._check(size)
         if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
             raise self._error(f"{expression} is no real number")
         return Formula(expression, size, needs)
 
-    def _check(self, size: Size) -> None:
-        limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
-        for what, value, limit in zip(Size._fields, size, limits, strict=True):
+    def _check(self, size: ExpressionBounds) -> None:
+        limits = ExpressionBounds(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
+        for what, value, limit in zip(ExpressionBounds._fields, size, limits, strict=True):
             if value > limit:
                 raise TooLarge(
                     f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
                 )
 
 
-def _added(a: Size, b: Size) -> Size:
-    return Size(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
+def _added(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
+    return ExpressionBounds(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
 
 
-def _multiplied(a: Size, b: Size) -> Size:
-    return Size(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
+def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
+    return ExpressionBounds(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
 
 
 # What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.
@@ -360,10 +362,10 @@ def assume(
             facts.append(left - right)
     facts += [moment for moment in moments if not moment.is_positive]
     asked = sorted(needs, key=lambda need: need.text)
-    facts += [need.expression for need in asked if need.kind is Kind.POSITIVE]
-    facts += [need.expression**2 for need in asked if need.kind is Kind.NONZERO]
+    facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
+    facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
     facts += [(left - right) ** 2 for left, right in apart]
-    weak = tuple(need.expression for need in asked if need.kind is Kind.NONNEGATIVE)
+    weak = tuple(need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE)
     return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
 
 

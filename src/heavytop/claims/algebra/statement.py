@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import sympy
 
-from heavytop.claims.algebra.conditions import Kind, Need, is_exactly_zero
+from heavytop.claims.algebra.conditions import ConditionKind, Need, is_exactly_zero
 from heavytop.claims.algebra.fields import Assumptions, Solution
 
 Place = dict[sympy.Symbol, Fraction]
@@ -172,7 +172,7 @@ class Setting:
                 continue
             for point in statement.domain.points:
                 place = {self.variable: point, **sample}
-                if not all(Need(Kind.POSITIVE, fact).is_met(place) for fact in statement.domain.facts):
+                if not all(Need(ConditionKind.POSITIVE, fact).is_met(place) for fact in statement.domain.facts):
                     continue
                 if all(is_exactly_zero(relation, place) for relation in self.zeros):
                     yield place

@@ -19,7 +19,7 @@ import msgspec
 
 from heavytop.claims.audit.context import ClaimFile
 from heavytop.claims.audit.guard import AuditEnded, in_time
-from heavytop.claims.audit.judge import Assuming, Audit, Auditable, Row, judge, verdict_of
+from heavytop.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.claims.audit.values import ValueClaim, ValueFile
 from heavytop.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
@@ -33,7 +33,7 @@ from heavytop.top.equations import System, system
 
 
 _MAX_BYTES = 100_000
-_REMEDY = "See docs/claims-in-toml.md; worked examples are in src/heavytop/claims/examples."
+_REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
 
 
 def read_claim(path: Path) -> Auditable | ValueClaim:
@@ -148,7 +148,9 @@ def audit_claim(
     return Audit(*said, deciding)
 
 
-def would_decide(claim: Auditable, about: System, rows: Sequence[Row], seconds: float) -> tuple[tuple[str, str], ...]:
+def would_decide(
+    claim: Auditable, about: System, rows: Sequence[StatementVerdict], seconds: float
+) -> tuple[tuple[str, str], ...]:
     """Assumptions on the parameters of an undecided claim in a file, each of which decides it, with the verdict then.
 
     seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.

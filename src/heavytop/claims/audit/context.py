@@ -15,7 +15,7 @@ from flint import arb
 from msgspec import structs
 
 from heavytop.claims.algebra.conditions import (
-    Kind,
+    ConditionKind,
     Need,
     condition,
     conditions_for_zero,
@@ -58,7 +58,7 @@ class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rotor: Text | Three | None = None
 
 
-class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ClaimedMotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[motion]: Ω(t), γ(t), and the angles (φ, θ, ψ); γ may be left out where the angles are given, and so may Ω."""
 
     omega: Three | None = None
@@ -113,7 +113,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: Annotated[dict[Name, Samples | Text], msgspec.Meta(max_length=20)] = {}
     definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
     relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
-    motion: MotionTable | None = None
+    motion: ClaimedMotionTable | None = None
     quadrature: QuadratureTable | None = None
     integral: IntegralTable | None = None
     entry: Entry | None = None
@@ -198,7 +198,7 @@ def of_bodies(inertia: Sequence[Any]) -> tuple[Need, ...]:
     if not matrix.free_symbols:
         return ()
     spread = sympy.eye(3) * matrix.trace() / 2 - matrix
-    return tuple(Need(Kind.NONNEGATIVE, minor) for minor in _principal_minors(spread) if minor.free_symbols)
+    return tuple(Need(ConditionKind.NONNEGATIVE, minor) for minor in _principal_minors(spread) if minor.free_symbols)
 
 
 TIME = sympy.Symbol("t", real=True)
@@ -422,7 +422,7 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
         return of_bodies(inertia)
     if not any(moment.free_symbols for moment in inertia):
         return ()
-    return tuple(Need(Kind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
+    return tuple(Need(ConditionKind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
 
 
 @dataclass(frozen=True)

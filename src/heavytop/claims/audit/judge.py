@@ -25,7 +25,7 @@ from heavytop.claims.algebra.rational import Quotient
 from heavytop.claims.algebra.signs import Unprovable
 from heavytop.claims.algebra.statement import Formulas, Setting, Statement
 from heavytop.claims.library.entry import Entry
-from heavytop.display import Table, Tabular
+from heavytop.display import Tabular, TitledTable
 from heavytop.exact.flint.balls import radius as radius_of
 from heavytop.exact.flint.balls import radius_text, value_text
 from heavytop.top.equations import System
@@ -45,7 +45,7 @@ _LONGEST = 160
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class StatementVerdict:
     """The verdict on one statement.
 
     holds: True (proven), False (refuted by ``witness``), None (undecided).
@@ -81,7 +81,7 @@ class Row:
         return document
 
 
-def verdict_of(rows: Sequence[Row]) -> str:
+def verdict_of(rows: Sequence[StatementVerdict]) -> str:
     """refuted if one row is, else undecided if one is, else holds."""
     if any(row.holds is False for row in rows):
         return "refuted"
@@ -89,7 +89,7 @@ def verdict_of(rows: Sequence[Row]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ExplanationStep:
     """A step of the explanation: a statement and the verdict on it."""
 
     statement: str
@@ -109,8 +109,8 @@ class Audit(Tabular):
     claim: str
     system: str
     source: str
-    rows: tuple[Row, ...]
-    why: tuple[Finding, ...] = ()
+    rows: tuple[StatementVerdict, ...]
+    why: tuple[ExplanationStep, ...] = ()
     solves: tuple[str, ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     kind: str = "motion"
@@ -148,15 +148,15 @@ class Audit(Tabular):
     def _missing(self) -> dict[str, Any]:
         return {"would_decide": dict(self.deciding)} if self.deciding else {}
 
-    def _table(self) -> Table:
+    def _table(self) -> TitledTable:
         lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
         title = f"{self.claim} as {ABOUT[self.kind]} of {self.system}: {self.verdict}"
-        return Table(title, ("equation", "component", "branch", "domain", "verdict"), lines)
+        return TitledTable(title, ("equation", "component", "branch", "domain", "verdict"), lines)
 
 
 def judge(
     statements: Sequence[Statement], setting: Setting, progress: Callable[[int, int], None] = lambda done, of: None
-) -> tuple[Row, ...]:
+) -> tuple[StatementVerdict, ...]:
     """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
     statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
     prover, solved = Prover(statements, setting), setting.with_solutions()
@@ -173,7 +173,7 @@ def judge(
     return tuple(rows)
 
 
-def _what_is_open(row: Row) -> tuple[bool, int]:
+def _what_is_open(row: StatementVerdict) -> tuple[bool, int]:
     return row.holds is None, sum(not condition.discharged for condition in row.conditions)
 
 
@@ -182,7 +182,7 @@ def _bare(statement: Statement) -> Statement:
     return replace(statement, formulas=Formulas(needs=conditions_of([statement.residual])))
 
 
-def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Row:
+def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> StatementVerdict:
     witness = next(_witnesses(statement, setting, prover), None)
     proven, conditions = prover.prove(statement)
     if witness is not None:
@@ -206,10 +206,12 @@ def _row(
     residual: str,
     conditions: tuple[Condition, ...],
     witness: Mapping[str, Any] | None = None,
-) -> Row:
+) -> StatementVerdict:
     name, note = s.domain.label, s.domain.note
     said = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
-    return Row(s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said)
+    return StatementVerdict(
+        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said
+    )
 
 
 def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
@@ -328,7 +330,7 @@ class Auditable(Protocol):
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
         ...
 
-    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """The steps that explain the verdict, and the names of the systems whose motions the claim is.
 
         rows: the verdicts about the system ``about``, so that they need not be found again.

@@ -13,7 +13,7 @@ import sympy
 
 from heavytop.claims.algebra.conditions import Need
 from heavytop.claims.algebra.statement import Domain, Formulas, Statement
-from heavytop.claims.audit.judge import Finding
+from heavytop.claims.audit.judge import ExplanationStep
 from heavytop.top.attitude import gamma_from_angles, omega_from_angles
 from heavytop.top.equations import (
     GYROSTAT,
@@ -49,7 +49,7 @@ Triple = tuple[sympy.Expr, sympy.Expr, sympy.Expr]
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ClaimedMotion:
     """A claimed motion on one branch and domain, as expressions.
 
     rate: the derivative in time.  angles: (φ, θ); rates: (φ', θ', ψ').
@@ -100,7 +100,7 @@ def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy
     return (*gamma_from_angles(phi, theta, SYMBOLIC), *xi)
 
 
-def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
+def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
     """(1.1), (1.2), (1.3) and, where there are angles, (3.1), each component, about ``system``."""
     y = motion.state
     turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
@@ -121,7 +121,7 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
             yield replace(statement, formulas=motion.angle_formulas)
 
 
-def _integral_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
+def _integral_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
     about_gamma, third = {
         HEAVY_TOP.name: (area, (energy, "Omega.M/2 + P*r.gamma", "C1")),
         GYROSTAT.name: (area, (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")),
@@ -139,11 +139,11 @@ def _integral_statements(motion: Motion, p: Parameters, system: System) -> Itera
             yield _statement("1.3", component, motion, motion.rate(value), f"{left} is constant")
 
 
-def _statement(equation: str, component: int, motion: Motion, residual: sympy.Expr, text: str) -> Statement:
+def _statement(equation: str, component: int, motion: ClaimedMotion, residual: sympy.Expr, text: str) -> Statement:
     return Statement(equation, component, motion.branch, motion.domain, residual, text, motion.formulas)
 
 
-def why_not_equivalent() -> Sequence[Finding]:
+def why_not_equivalent() -> Sequence[ExplanationStep]:
     """The general steps, each a polynomial identity in Ω, γ, δ, I and P r, checked by expanding it.
 
     Along (1.1) with γ' = γ × Ω + δ the rates of (1.3) are 2γ·δ, M·δ and P r·δ; so they force δ = 0 only where
@@ -178,10 +178,10 @@ def why_not_equivalent() -> Sequence[Finding]:
             dot(cross(gamma, [c0 * g for g in gamma]), moment),
         ),
     ]
-    return [Finding(text, True if sympy.expand(identity) == 0 else None) for text, identity in identities]
+    return [ExplanationStep(text, True if sympy.expand(identity) == 0 else None) for text, identity in identities]
 
 
-def determinant(motion: Motion, p: Parameters) -> Statement:
+def determinant(motion: ClaimedMotion, p: Parameters) -> Statement:
     """det(γ, M, P r) = 0 along the claim."""
     value = dot(cross(motion.gamma, momentum(p, motion.state)), p.moment)
     return Statement(

@@ -28,12 +28,12 @@ from heavytop.claims.algebra.structure import Names, rate_along
 from heavytop.claims.audit.context import (
     STATE,
     TIME,
+    ClaimedMotionTable,
     ClaimFile,
     Clock,
     Context,
     FileClaim,
     IntegralTable,
-    MotionTable,
     needs_of,
     read_clock,
     sample_number,
@@ -41,8 +41,8 @@ from heavytop.claims.audit.context import (
     three,
     variable_of,
 )
-from heavytop.claims.audit.judge import Finding, Row, judge, verdict_of
-from heavytop.claims.audit.statements import SYMBOLIC, Motion, Triple, attitude, motion_statements
+from heavytop.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
+from heavytop.claims.audit.statements import SYMBOLIC, ClaimedMotion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
 from heavytop.precision import shown
 from heavytop.top.attitude import omega_from_angles
@@ -57,7 +57,7 @@ def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
 class UserMotion(FileClaim):
     """A motion claimed in a file."""
 
-    motion: Motion = field(init=False)
+    motion: ClaimedMotion = field(init=False)
     clock: Clock = field(init=False)
 
     @property
@@ -95,17 +95,17 @@ class UserMotion(FileClaim):
                 formulas = self.motion.angle_formulas
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
-    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """No steps; the systems whose (1.1), (1.2) are proven, with |γ| = 1."""
         return [], tuple(s.name for s in self.context.systems if self._verdict(s, about, rows) == "holds")
 
-    def _verdict(self, system: System, about: System, rows: Sequence[Row]) -> str:
+    def _verdict(self, system: System, about: System, rows: Sequence[StatementVerdict]) -> str:
         if system is about:
             return verdict_of([row for row in rows if _is_of_motion(row)])
         return verdict_of(judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting))
 
 
-def _is_of_motion(row: Row | Statement) -> bool:
+def _is_of_motion(row: StatementVerdict | Statement) -> bool:
     """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
     return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
 
@@ -118,7 +118,7 @@ def _with_constant_rotor(context: Context, clock: Clock) -> Context:
     return context.with_rotor(rotor, clock.variable not in rotor.free_symbols)
 
 
-def _read_motion(table: MotionTable, context: Context, clock: Clock) -> Motion:
+def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> ClaimedMotion:
     rate, domain, names, needs = clock.rate, clock.domain, context.names, context.needs | clock.needs
 
     def reduced(formulas: Triple) -> Triple:
@@ -146,7 +146,7 @@ def _read_motion(table: MotionTable, context: Context, clock: Clock) -> Motion:
         omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
         omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
-    return Motion(
+    return ClaimedMotion(
         "smooth",
         domain,
         omega,
@@ -440,7 +440,7 @@ class UserIntegral(FileClaim):
         )
         return named, renamed, names.meanings
 
-    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """No steps; the systems that keep it, by proof."""
         found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
         return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from flint import arb
 
-from heavytop.claims.audit.judge import Row
+from heavytop.claims.audit.judge import StatementVerdict
 from heavytop.claims.library.entry import Entry
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.flint.balls import (
@@ -114,7 +114,7 @@ _INVARIANT = ("gamma_squared", "area", "energy", "momentum_squared")
 """First integrals that are the same in any axes."""
 
 
-class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class PrincipalTopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[top]: in principal axes."""
 
     inertia: Three
@@ -164,7 +164,7 @@ class ValueFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     kind: Literal["value"]
     start: StartTable
     value: Annotated[list[ValueTable], msgspec.Meta(min_length=1, max_length=2_000)]
-    top: TopTable | None = None
+    top: PrincipalTopTable | None = None
     body: BodyTable | None = None
     system: str | None = None
     source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
@@ -263,7 +263,7 @@ class ValueClaim:
         require_no_other_rotor(found, self.given[0])
         return found
 
-    def rows(self, about: System) -> tuple[Row, ...]:
+    def rows(self, about: System) -> tuple[StatementVerdict, ...]:
         """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
         motion = _KnownNumbers(*self.given, about)
         motion.require(self.figures)
@@ -271,7 +271,7 @@ class ValueClaim:
             motion.require_handy(self.figures)
         except OutOfReach as error:
             return tuple(_open_row(figure, "not known", f"{error.cause} {error.remedy}") for figure in self.figures)
-        found: dict[Figure, Row] = {}
+        found: dict[Figure, StatementVerdict] = {}
         groups: dict[tuple[Fraction, str], list[Figure]] = {}
         for figure in self.figures:
             groups.setdefault((figure.time, figure.quantity), []).append(figure)
@@ -338,7 +338,7 @@ def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
     return body, start
 
 
-def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[Row]:
+def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVerdict]:
     """The rows of the numbers of one quantity at one time, each judged by the narrowest ball that was made."""
     found: list[Judgement] | None = None
     missing = "the balls that can be proven do not decide whether that is within what is allowed"
@@ -375,7 +375,7 @@ def _negative(value: Fraction | arb) -> Fraction | arb:
     return -value if isinstance(value, Fraction) else value.neg(exact=True)
 
 
-def _row(figure: Figure, judged: Judgement, method: str, missing: str) -> Row:
+def _row(figure: Figure, judged: Judgement, method: str, missing: str) -> StatementVerdict:
     """The row of a number that balls were found for; missing: why none are narrower."""
     value, wide = _texts(judged.middle, judged.wide, figure.number.digits + _MORE_DIGITS)
     figures = _said(figure) | {"digits_right": judged.right, "proven": {"value": value, "radius": wide}}
@@ -402,7 +402,7 @@ def _off(judged: Judgement) -> str:
     return f"off by less than {most}" if low == "0" else f"off by {low} to {most}"
 
 
-def _open_row(figure: Figure, method: str, missing: str) -> Row:
+def _open_row(figure: Figure, method: str, missing: str) -> StatementVerdict:
     return _published(figure, None, missing, method, _said(figure), None)
 
 
@@ -420,12 +420,12 @@ def _published(
     method: str,
     figures: dict[str, Any],
     witness: dict[str, Any] | None,
-) -> Row:
+) -> StatementVerdict:
     name = figure.quantity if figure.quantity not in SIZES else f"{figure.quantity} {figure.component}"
     said = "half a unit of the last digit" if figure.tolerance is None else figure.tolerance_text
     statement = f"{name} = {figure.number.text} within {said} at t = {figure.time_text}"
     domain = f"t={figure.time_text}"
-    return Row(
+    return StatementVerdict(
         figure.quantity,
         figure.component,
         "printed",

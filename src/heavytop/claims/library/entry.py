@@ -17,7 +17,7 @@ import msgspec
 from heavytop.errors import InputError, quoted
 
 FOLDER = Path(__file__).parent
-_REMEDY = "See docs/library.md for the keys of an entry."
+_REMEDY = "See `heavytop docs library` for the keys of an entry."
 _KEYS = ("id", "title", "source", "language", "read", "status", "aliases", "tags", "expects", "note", "corrects")
 _ID = r"^[a-z0-9]+(-[a-z0-9]+)*$"
 _READ = r"^(the text|an abstract|restated .+)$"

@@ -16,11 +16,11 @@ import sympy
 
 from heavytop.claims.algebra.conditions import conditions_of
 from heavytop.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Formulas, Setting, Statement
-from heavytop.claims.audit.judge import Finding, Row, judge, verdict_of
+from heavytop.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
 from heavytop.claims.audit.statements import (
     SYMBOLIC,
     SYSTEMS,
-    Motion,
+    ClaimedMotion,
     attitude,
     determinant,
     motion_statements,
@@ -38,10 +38,12 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, S
 _HOLDS = {"holds": True, "refuted": False, "undecided": None}
 
 
-def explain(motion: Motion, parameters: Parameters, setting: Setting) -> tuple[list[Finding], tuple[str, ...]]:
+def explain(
+    motion: ClaimedMotion, parameters: Parameters, setting: Setting
+) -> tuple[list[ExplanationStep], tuple[str, ...]]:
     """The steps of the explanation for a motion with γ ∥ M, and the systems whose (1.1), (1.2) it satisfies."""
     row = judge([determinant(motion, parameters)], setting)[0]
-    steps = [*why_not_equivalent(), Finding("along the claim det(gamma, M, P*r) = 0 identically", row.holds)]
+    steps = [*why_not_equivalent(), ExplanationStep("along the claim det(gamma, M, P*r) = 0 identically", row.holds)]
     solves = []
     for system in SYSTEMS:
         verdicts = _by_equation(motion, parameters, system, setting)
@@ -53,11 +55,13 @@ def explain(motion: Motion, parameters: Parameters, setting: Setting) -> tuple[l
                 "1.2": "gamma' = gamma x (Omega + lambda*e2)",
                 "3.1": "(3.1) with omega = Omega + lambda*e2 in the place of Omega",
             }
-            steps += [Finding(f"it solves {told[name]}", _HOLDS[verdicts[name]]) for name in told if name in verdicts]
+            steps += [
+                ExplanationStep(f"it solves {told[name]}", _HOLDS[verdicts[name]]) for name in told if name in verdicts
+            ]
     return steps, tuple(solves)
 
 
-def _by_equation(motion: Motion, parameters: Parameters, system: System, setting: Setting) -> dict[str, str]:
+def _by_equation(motion: ClaimedMotion, parameters: Parameters, system: System, setting: Setting) -> dict[str, str]:
     rows = judge(list(motion_statements(motion, parameters, system)), setting)
     names = {row.equation for row in rows}
     return {name: verdict_of([row for row in rows if row.equation == name]) for name in names}
@@ -112,7 +116,7 @@ class PartialClaim:
         return Parameters((_I1, _I1, _I3), (sympy.Integer(0), _P * b, sympy.Integer(0)), _P * b / c.c0)
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> ClaimedMotion:
         """The smooth branch."""
         return self._motion("smooth", ALL)
 
@@ -126,11 +130,13 @@ class PartialClaim:
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
-    def explain(self, _about: System, _rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(
+        self, _about: System, _rows: Sequence[StatementVerdict]
+    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """See :class:`heavytop.claims.audit.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 
-    def _motion(self, branch: str, domain: Domain) -> Motion:
+    def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:
         c = _partial_constants()
         u = self.u(c.a, c.alpha, _T, SYMBOLIC)
         omega2 = u * u
@@ -143,7 +149,7 @@ class PartialClaim:
         omega = (first, omega2, self.omega3(c, omega2, SYMBOLIC))
         psi = self.psi(_I1, _I3, c.alpha, u, _T, SYMBOLIC)
         gamma = ershkov.gamma(c, omega)
-        return Motion(
+        return ClaimedMotion(
             branch,
             domain,
             omega,
@@ -268,7 +274,7 @@ class GeneralClaim:
         return Parameters((_I1, _I2, _I3), (sympy.Integer(0), _P * _B, sympy.Integer(0)), _P * _B / _C0)
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> ClaimedMotion:
         """The branch of the roots that follows the flow."""
         return self._motion("smooth", _ANY)
 
@@ -283,11 +289,13 @@ class GeneralClaim:
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
-    def explain(self, _about: System, _rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(
+        self, _about: System, _rows: Sequence[StatementVerdict]
+    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """See :class:`heavytop.claims.audit.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 
-    def _motion(self, branch: str, domain: Domain) -> Motion:
+    def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:
         c = _GENERAL
         first, third = sympy.sqrt(self.omega1_squared(c, _W)), sympy.sqrt(self.omega3_squared(c, _W))
         speed = sympy.sqrt(self.f1(c, _W)) * sympy.sqrt(self.f2(c, _W))
@@ -306,7 +314,7 @@ class GeneralClaim:
         theta = ershkov_general.theta(c, omega, SYMBOLIC)
         psi_rate = ershkov_general.psi_rate(c, third, rate(phi))
         rates = (rate(phi), rate(theta), psi_rate)
-        return Motion(
+        return ClaimedMotion(
             branch,
             domain,
             omega,
@@ -358,7 +366,7 @@ def _partial_constants() -> ershkov.Constants:
     return ershkov.constants(_I1, _I3, _ALPHA**2 * _I1**2 / (2 * _I3), SYMBOLIC)
 
 
-def _parts(motion: Motion) -> tuple[tuple[str, sympy.Expr], ...]:
+def _parts(motion: ClaimedMotion) -> tuple[tuple[str, sympy.Expr], ...]:
     """γ, its products and the rates: what a residual may be a constant multiple of."""
     single = [(f"gamma{index}", part) for index, part in enumerate(motion.gamma, 1)]
     pairs = combinations_with_replacement(single, 2)

@@ -20,7 +20,7 @@ from flint import arb
 
 from heavytop.errors import InputError
 from heavytop.exact.cases.lagrange import polynomial
-from heavytop.exact.cases.one_interval import Curve, OneGapMotion, gaps, value
+from heavytop.exact.cases.one_interval import IntervalCurve, OneGapMotion, gaps, value
 from heavytop.exact.closed_form import kept
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
@@ -39,7 +39,7 @@ class AlgebraicMotion(WithBearing):
     Raises InputError where the curve has no real motion through the place.
     """
 
-    curve: Curve
+    curve: IntervalCurve
     place: Fraction
     signs: tuple[int, int]
     method: str
@@ -135,7 +135,7 @@ def _signs(squares: tuple[Fraction, Fraction]) -> str:
 
 
 def algebraic_motion(
-    name: str, make: Callable[[], Curve], place: Fraction | None, signs: tuple[int, int]
+    name: str, make: Callable[[], IntervalCurve], place: Fraction | None, signs: tuple[int, int]
 ) -> AlgebraicMotion:
     """The motion on the curve that ``make`` gives, through ``place``, or through the middle of its first gap.
 
@@ -168,10 +168,10 @@ def algebraic_motion(
 #
 # b4 is a unit of time.  Motions are real for 3/5 < B < 5/8 and b4 < 0.
 # Source: D. N. Goryachev, Trudy otd. fiz. nauk 10 (1899) 23; coefficients derived here from the equations, which
-# :class:`heavytop.exact.cases.one_interval.Curve` tests exactly.
+# :class:`heavytop.exact.cases.one_interval.IntervalCurve` tests exactly.
 
 
-def goryachev_curve(second: Fraction, quartic: Fraction) -> Curve:
+def goryachev_curve(second: Fraction, quartic: Fraction) -> IntervalCurve:
     """The curve for B and b4; raises ZeroDivisionError where a denominator vanishes."""
     b, zero = second, Fraction(0)
     c = 8 * b * (2 * b - 1) / (16 * b - 9)
@@ -179,7 +179,7 @@ def goryachev_curve(second: Fraction, quartic: Fraction) -> Curve:
     c2 = -((9 - 16 * b) ** 2) / (16 * b**2)
     shared = (1 - 4 * b) * (3 - 4 * b) ** 2 * (9 - 16 * b) / (32 * b**4 * (1 - 2 * b) * quartic)
     b0, c0 = shared * (3 - 8 * b) * (5 - 8 * b) / (1 - 2 * b), -shared * (9 - 16 * b)
-    return Curve.of((Fraction(1), b, c), polynomial(b0, zero, b2, zero, quartic), polynomial(c0, zero, c2))
+    return IntervalCurve.of((Fraction(1), b, c), polynomial(b0, zero, b2, zero, quartic), polynomial(c0, zero, c2))
 
 
 def goryachev_motion(
@@ -203,16 +203,16 @@ def goryachev_motion(
 # b1 is a unit of time, M·γ = 0.  With x³ = Ω1, Ω2 = x √(b1 + b3 x⁴) and Ω3 = x √(c1 + c3 x⁴) nothing is raised to a
 # broken power; at x = 0 the top is at rest with γ level.  Motions of rigid bodies are real for 3/2 < B < 1.5966, b1 >
 # 0. Source: S. A. Chaplygin, Trudy otd. fiz. nauk 12 (1904) 1, by the form of the solution; derived here from the
-# equations, which :class:`heavytop.exact.cases.one_interval.Curve` tests exactly.
+# equations, which :class:`heavytop.exact.cases.one_interval.IntervalCurve` tests exactly.
 
 
-def chaplygin_curve(second: Fraction, first: Fraction) -> Curve:
+def chaplygin_curve(second: Fraction, first: Fraction) -> IntervalCurve:
     """The curve for B and b1; raises ZeroDivisionError where a denominator vanishes."""
     b, zero = second, Fraction(0)
     c = 9 * (2 * b - 1) / (2 * (16 * b - 9))
     b3, c3 = (1 - c) / ((1 - 2 * b) * (b - c)), -(1 - b) / ((1 - 2 * c) * (b - c))
     c1 = first * (2 * b - 3) * (2 * b - 1) * (16 * b - 9) ** 2 / (12 * b * (5 * b - 3))
-    return Curve.of(
+    return IntervalCurve.of(
         (Fraction(1), b, c), polynomial(first, zero, zero, zero, b3), polynomial(c1, zero, zero, zero, c3), power=3
     )
 
@@ -239,10 +239,10 @@ def chaplygin_motion(
 # and b_n b3^(n − 2), c_n b3^(n − 2) for any b3, a unit of time.  M·γ is not 0.  Ω1'² is of degree 5: one hyperelliptic
 # integral.  Motions of rigid bodies are real from about B = 10/17 to 0.645.
 # Source: N. Kowalewski, Math. Ann. 65 (1908) 528; coefficients derived here from the equations, which
-# :class:`heavytop.exact.cases.one_interval.Curve` tests exactly.
+# :class:`heavytop.exact.cases.one_interval.IntervalCurve` tests exactly.
 
 
-def kowalewski_curve(second: Fraction, cubic: Fraction) -> Curve:
+def kowalewski_curve(second: Fraction, cubic: Fraction) -> IntervalCurve:
     """The curve for B and b3; raises ZeroDivisionError where a denominator vanishes."""
     b, d, k, three, nine = second, 2 * second - 1, 3 * second - 2, 3 * second - 1, (9 * second - 5) ** 2
     b2 = k * (168 * b**2 - 164 * b + 37) / (b**2 * d)
@@ -251,7 +251,7 @@ def kowalewski_curve(second: Fraction, cubic: Fraction) -> Curve:
     c2 = -4 * nine / (9 * b**2)
     c1 = -32 * k**2 * three * nine / (9 * b**4 * d)
     c0 = -16 * k**3 * three * nine / (9 * b**6 * d**2)
-    return Curve.of(
+    return IntervalCurve.of(
         (Fraction(1), b, 9 * b * d / (2 * (9 * b - 5))),
         polynomial(b0 / cubic**2, b1 / cubic, b2, cubic),
         polynomial(c0 / cubic**2, c1 / cubic, c2),

@@ -40,7 +40,7 @@ from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding
 from heavytop.exact.flint.balls import ball, coefficient, series_length, to_bits
-from heavytop.exact.solution import ON_AXIS_1, Condition
+from heavytop.exact.solution import ON_AXIS_1, ExactRelation
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -132,10 +132,10 @@ class BobylevSteklov(ClosedForm):
     """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
 
     method = "closed form: Bobylev-Steklov, Jacobi functions"
-    body = *ON_AXIS_1, Condition("I1 = 2 I3", "I1 - 2 I3", lambda top, _: (top.inertia[0] - 2 * top.inertia[2],))
+    body = *ON_AXIS_1, ExactRelation("I1 = 2 I3", "I1 - 2 I3", lambda top, _: (top.inertia[0] - 2 * top.inertia[2],))
     starts = (
-        Condition("Omega2 = 0", "Omega2", lambda _, start: start.omega[1:2]),
-        Condition("P a gamma3 = I3 Omega1 Omega3", "P a gamma3 - I3 Omega1 Omega3", _off),
+        ExactRelation("Omega2 = 0", "Omega2", lambda _, start: start.omega[1:2]),
+        ExactRelation("P a gamma3 = I3 Omega1 Omega3", "P a gamma3 - I3 Omega1 Omega3", _off),
     )
 
     def evaluate(self, time: Fraction) -> list[Any]:

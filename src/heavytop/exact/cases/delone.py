@@ -38,13 +38,13 @@ from flint import acb, arb
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, level_vector, ordered, pole
-from heavytop.exact.cases.kovalevskaya_theta import Level, Root, Start, start_of
+from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, WorkingStart, start_of
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, initial_xi, instant, kept, tanh_sech
 from heavytop.exact.elliptic.quartic import PreparedMotion, QuarticMotion
 from heavytop.exact.flint.balls import Undecided, ball, coefficient, current_length, series_length, to_bits
 from heavytop.exact.separable.abel import Inversion
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
-from heavytop.exact.solution import SPIN_UPWARDS, XI, Condition, apart, plane_top
+from heavytop.exact.solution import SPIN_UPWARDS, XI, ExactRelation, apart, plane_top
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -72,13 +72,13 @@ class DeloneAzimuth:
     gap: of V.  origin: t' = 0 in its integral.  integral: of Λ, but for (l/2) t'.  None where l = 0 and Λ rests.
     """
 
-    level: Level
+    level: KovalevskayaLevel
     gap: Gap
     origin: arb
     integral: Azimuth | None
 
     @classmethod
-    def of(cls, level: Level) -> DeloneAzimuth:
+    def of(cls, level: KovalevskayaLevel) -> DeloneAzimuth:
         """At the working precision.
 
         Raises Undecided where it does not suffice, OutOfReach for e = 0, a double root of the cubic, and Fourier series
@@ -88,11 +88,11 @@ class DeloneAzimuth:
         if e == 0 or cubic.gcd(cubic.derivative()).degree() > 0:
             raise OutOfReach(f"Delone's level is degenerate: e = {e}, or a double root of its cubic.", _REMEDY)
         found: Any = cubic.complex_roots()
-        curve = [Root(acb(value), 1, True) for value, _ in found]
+        curve = [PhiRoot(acb(value), 1, True) for value, _ in found]
         start = start_of(level)
         interval = _interval(curve, start)
         # beyond the cubic's roots, or between them and 0, where the other variable rests
-        mu, _ = pole([*curve, Root(acb(0), 2, False)], [interval])
+        mu, _ = pole([*curve, PhiRoot(acb(0), 2, False)], [interval])
         gap, offset = _gap(curve, interval, mu), ball(e) - mu
         with series_length(2):
             place = start.inverses(mu)[0]
@@ -119,7 +119,7 @@ class DeloneAzimuth:
         return Bearing.of(level.in_body(state[3:]), level.in_body(level_vector(level, state)), azimuth)
 
 
-def _turned(level: Level, state: Sequence[arb]) -> list[arb]:
+def _turned(level: KovalevskayaLevel, state: Sequence[arb]) -> list[arb]:
     """Ω and γ in the level's units and turned frame."""
     (n1, n2), c = (ball(n) for n in level.moment), ball(level.moment_square).sqrt()
     found = []
@@ -128,7 +128,7 @@ def _turned(level: Level, state: Sequence[arb]) -> list[arb]:
     return found
 
 
-def _interval(curve: list[Root], start: Start) -> Interval:
+def _interval(curve: list[PhiRoot], start: WorkingStart) -> Interval:
     """Where w moves, as in :func:`heavytop.exact.cases.kovalevskaya.intervals`."""
     real = ordered(curve)
     allowed = [(real[0] + 1, 0)] + ([(real[2] + 1, real[1] + 1)] if len(real) == 3 else [])
@@ -143,7 +143,7 @@ def _interval(curve: list[Root], start: Start) -> Interval:
     return found[0]
 
 
-def _gap(curve: list[Root], interval: Interval, mu: arb) -> Gap:
+def _gap(curve: list[PhiRoot], interval: Interval, mu: arb) -> Gap:
     """The gap of V with the integral of the time."""
     branch, lead = [acb(0)], arb(2)
     for root in curve:
@@ -232,7 +232,7 @@ def _prepared(case: Delone) -> tuple[PreparedMotion, list[arb]]:
 @kept
 def _azimuth(case: Delone) -> DeloneAzimuth:
     initial_xi(case.start.gamma)  # raises InputError for γ = 0
-    return DeloneAzimuth.of(Level.of(case.top, case.start))
+    return DeloneAzimuth.of(KovalevskayaLevel.of(case.top, case.start))
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +249,7 @@ class DeloneHomoclinic(WithAngles):
     body = plane_top(2)
     starts = (
         SPIN_UPWARDS,
-        Condition(
+        ExactRelation(
             "the top and start of alpha = Omega3/2",
             "the difference",
             lambda top, start: apart(DeloneHomoclinic.of(top, start), top, start),

@@ -31,7 +31,15 @@ from heavytop.exact.closed_form import ClosedForm, kept, sign
 from heavytop.exact.flint.balls import Undecided, ball, current_length, exponent, midpoint, to_bits, whole_evaluation
 from heavytop.exact.separable.abel import Inversion, decide
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
-from heavytop.exact.solution import HESS, IN_PLANE_13, MOMENTS_1_3, NOT_ACROSS_CENTRE, OFF_AXES_13, Condition, positive
+from heavytop.exact.solution import (
+    HESS,
+    IN_PLANE_13,
+    MOMENTS_1_3,
+    NOT_ACROSS_CENTRE,
+    OFF_AXES_13,
+    ExactRelation,
+    positive,
+)
 from heavytop.precision import exact, round_to, shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -260,13 +268,13 @@ class Dokshevich(_Moving, ClosedForm):
         OFF_AXES_13,
         MOMENTS_1_3,
         HESS,
-        Condition("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
-        Condition("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),
+        ExactRelation("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
+        ExactRelation("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),
     )
     starts = (
         NOT_ACROSS_CENTRE,
-        Condition("B = x y - A x^2 > 0", "B", lambda top, start: (_components(top, start)[0],), positive),
-        Condition("z^2 and gamma as they follow from x", "z^2, gamma along r, across r, gamma2", _levels_off),
+        ExactRelation("B = x y - A x^2 > 0", "B", lambda top, start: (_components(top, start)[0],), positive),
+        ExactRelation("z^2 and gamma as they follow from x", "z^2, gamma along r, across r, gamma2", _levels_off),
     )
 
     def __post_init__(self) -> None:

@@ -20,7 +20,7 @@ from flint import arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
 from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.solution import SPIN_UPWARDS, Condition, apart, positive
+from heavytop.exact.solution import SPIN_UPWARDS, ExactRelation, apart, positive
 from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -50,12 +50,12 @@ class ErshkovPartial(WithAngles):
     method = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
     system = GYROSTAT
     body = (
-        Condition("I1 = I2", "I1 - I2", lambda top, _: (top.inertia[0] - top.inertia[1],)),
-        Condition("I1 > I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), positive),
+        ExactRelation("I1 = I2", "I1 - I2", lambda top, _: (top.inertia[0] - top.inertia[1],)),
+        ExactRelation("I1 > I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), positive),
     )
     starts = (
         SPIN_UPWARDS,
-        Condition(
+        ExactRelation(
             "the top and start of alpha = I3 Omega3/I1",
             "the difference",
             lambda top, start: apart(ErshkovPartial.of(top, start), top, start),

@@ -61,7 +61,7 @@ from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, sretensky
 # Notation as above.
 
 
-class Level(Reduced):
+class GoryachevLevel(Reduced):
     """The exact level of a start."""
 
     __slots__ = ()
@@ -117,7 +117,7 @@ class Root:
         return sum(self.counts)
 
 
-def roots(level: Level) -> list[Root]:
+def roots(level: GoryachevLevel) -> list[Root]:
     """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
     h, constant, a = ball(level.energy), 4 * ball(level.third), size_of(level)
     rotor = ball(level.rotor)
@@ -135,12 +135,12 @@ def roots(level: Level) -> list[Root]:
     return found
 
 
-def size_of(level: Level) -> arb:
+def size_of(level: GoryachevLevel) -> arb:
     """a = c|γ|."""
     return ball(level.moment_square * level.gamma_square).sqrt()
 
 
-def separated_start(level: Level) -> tuple[arb, arb]:
+def separated_start(level: GoryachevLevel) -> tuple[arb, arb]:
     """u1, u2 at t = 0; of the two the one that cancels comes from the product."""
     (w1, w2, _), axial = level.omega, level.axial_momentum
     square = w1 * w1 + w2 * w2
@@ -149,7 +149,7 @@ def separated_start(level: Level) -> tuple[arb, arb]:
     return (larger, -smaller) if axial >= 0 else (smaller, -larger)
 
 
-def gap_ends(level: Level, curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
+def gap_ends(level: GoryachevLevel, curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
     """Between which two real roots u1 and u2 move; the same root twice for a variable that stays there.
 
     Raises Undecided where the balls do not tell.
@@ -174,7 +174,7 @@ def gap_ends(level: Level, curve: Sequence[Root], places: Sequence[arb]) -> list
     return found
 
 
-def _resting(level: Level, curve: Sequence[Root]) -> dict[int, int]:
+def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
     """The variable that rests at a double root, if one does, and the number of that root."""
     place = level.resting()
     if place is None:
@@ -220,13 +220,13 @@ _MINUS, _PLUS = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class GoryachevMotion:
     """The motion of a level at one working precision.
 
     moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  sign: σ.
     """
 
-    level: Level
+    level: GoryachevLevel
     moment: arb
     size: arb
     curve: tuple[Root, ...]
@@ -235,7 +235,7 @@ class Motion:
     sign: int
 
     @classmethod
-    def of(cls, level: Level) -> Motion:
+    def of(cls, level: GoryachevLevel) -> GoryachevMotion:
         """At the working precision.
 
         Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
@@ -383,7 +383,7 @@ class Strip:
     largest: tuple[float, float]
 
     @classmethod
-    def of(cls, motion: Motion, gap: Gap, other: arb) -> Strip:
+    def of(cls, motion: GoryachevMotion, gap: Gap, other: arb) -> Strip:
         """u stays nearer to where it is at Im s = 0 than _ROOM of the way to ``other``, the end of the other gap."""
         place, alpha, beta, less, more, away = _sizes(motion, gap, other)
         room, twice = _ROOM / _ROUNDING * away, 2 * _ROUNDING * float(abs(motion.level.rotor))
@@ -408,7 +408,7 @@ class Strip:
         return cls(height, (float((alpha + grown[1]).max()), float((beta + grown[2]).max())))
 
 
-def _sizes(motion: Motion, gap: Gap, other: arb) -> NDArray[np.float64]:
+def _sizes(motion: GoryachevMotion, gap: Gap, other: arb) -> NDArray[np.float64]:
     """Upper bounds on |u|, |α|, |β|, |a − X'| and |a + X'| on cells of the gap, and a lower one on |u − ``other``|."""
     rows = []
     with working_precision(_BOUND_BITS):
@@ -437,7 +437,7 @@ class Uniform:
     largest: tuple[float, float]
 
     @classmethod
-    def of(cls, motion: Motion, variable: Variable, other: arb) -> Uniform:
+    def of(cls, motion: GoryachevMotion, variable: Variable, other: arb) -> Uniform:
         """other: the end of the other gap.  Raises OutOfReach for a variable that tends to a double root."""
         if isinstance(variable, Rest):
             size, place = motion.size, abs(variable.middle)
@@ -481,7 +481,7 @@ class Torus:
     apart: arb
 
     @classmethod
-    def of(cls, motion: Motion) -> Torus:
+    def of(cls, motion: GoryachevMotion) -> Torus:
         """At the working precision; raises as :meth:`GoryachevChaplyginAttitude.of`."""
         first, second = motion.line.variables
         above, below = first.middle - _reach(first), second.middle + _reach(second)
@@ -499,7 +499,7 @@ class Torus:
         (alpha1, beta1), (alpha2, beta2) = (one.largest for one in self.uniform)
         return arb(max(alpha1 * beta2, beta1 * alpha2)) / self.apart
 
-    def integral(self, motion: Motion, began: Sequence[arb]) -> LineIntegral:
+    def integral(self, motion: GoryachevMotion, began: Sequence[arb]) -> LineIntegral:
         """Of dΛ/ds from where s is ``began`` for both variables."""
         halves = [
             [motion.halves(k, phase, 0) for phase in one.phases(size)]
@@ -525,13 +525,13 @@ class GoryachevChaplyginAttitude:
     began: s of both variables at t = 0.
     """
 
-    motion: Motion
+    motion: GoryachevMotion
     torus: Torus
     began: list[arb]
     integral: LineIntegral
 
     @classmethod
-    def of(cls, motion: Motion) -> GoryachevChaplyginAttitude:
+    def of(cls, motion: GoryachevMotion) -> GoryachevChaplyginAttitude:
         """Beside ``motion``, at its working precision.
 
         Raises Undecided where it does not suffice, OutOfReach for Fourier series of too many terms and for asymptotic
@@ -558,7 +558,7 @@ def _reach(variable: Variable) -> arb:
     return variable.reach if isinstance(variable, Gap) else arb(0)
 
 
-def _symmetry(motion: Motion, variable: int, factor: int) -> Symmetry:
+def _symmetry(motion: GoryachevMotion, variable: int, factor: int) -> Symmetry:
     """Of α or β: √(2d) cos(θ/2) at the lower end of the gap, √(2d) sin(θ/2) at the upper one."""
     low, high = motion.ends[variable]
     at_low, at_high = (low != high and motion.curve[number].counts[factor] > 0 for number in (low, high))
@@ -584,7 +584,7 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        _require_done(Level.of(self.top, self.start))
+        _require_done(GoryachevLevel.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -616,8 +616,8 @@ def _attitude(case: GoryachevChaplygin) -> GoryachevChaplyginAttitude:
 
 
 @kept
-def _motion(case: GoryachevChaplygin) -> Motion:
-    return Motion.of(Level.of(case.top, case.start))
+def _motion(case: GoryachevChaplygin) -> GoryachevMotion:
+    return GoryachevMotion.of(GoryachevLevel.of(case.top, case.start))
 
 
 def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bool:
@@ -626,7 +626,7 @@ def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bo
 
 
 @whole_evaluation
-def _require_done(level: Level) -> None:
+def _require_done(level: GoryachevLevel) -> None:
     """Raises NotInClass on the levels that are not done here, and too near to them."""
     resting = level.resting()
     if resting == 0:

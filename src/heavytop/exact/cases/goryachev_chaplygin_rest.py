@@ -53,20 +53,20 @@ from typing import Any, TypeVar
 from flint import acb, arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.cases.goryachev_chaplygin import Level, separated_start, size_of
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevLevel, separated_start, size_of
 from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.closed_form import ClosedForm, constant, instant, kept
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import Undecided, ball, series_length
 from heavytop.exact.separable.oscillation import Bearing, WithBearing
-from heavytop.exact.solution import GAMMA, LEVEL_MOMENTUM, Condition, plane_top
+from heavytop.exact.solution import GAMMA, LEVEL_MOMENTUM, ExactRelation, plane_top
 from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_VALUES = 1 << 14
 
 
 def _room_of(top: HeavyTop, start: State) -> tuple[Fraction]:
-    return (_room(Level.of(top, start)),)
+    return (_room(GoryachevLevel.of(top, start)),)
 
 
 def _not_negative(values: Sequence[Fraction]) -> bool:
@@ -92,14 +92,14 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     starts = (
         GAMMA,
         LEVEL_MOMENTUM,
-        Condition("G = 0", "G", lambda top, start: (Level.of(top, start).third,)),
-        Condition("h^2 <= |P r|^2 |gamma|^2", "the right side less the left", _room_of, _not_negative),
-        Condition("M or the torque off axis 3", "one of these", _off_axis, any),
+        ExactRelation("G = 0", "G", lambda top, start: (GoryachevLevel.of(top, start).third,)),
+        ExactRelation("h^2 <= |P r|^2 |gamma|^2", "the right side less the left", _room_of, _not_negative),
+        ExactRelation("M or the torque off axis 3", "one of these", _off_axis, any),
     )
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit."""
-        return Level.of(self.top, self.start).rate * time
+        return GoryachevLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -121,22 +121,22 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
 
 @kept
 def _motion(case: GoryachevChaplyginRest) -> RestMotion | UprightMotion:
-    level = Level.of(case.top, case.start)
+    level = GoryachevLevel.of(case.top, case.start)
     return RestMotion.of(level) if _room(level) else UprightMotion.of(level)
 
 
-def _room(level: Level) -> Fraction:
+def _room(level: GoryachevLevel) -> Fraction:
     """κ² = a² − h²."""
     return level.moment_square * level.gamma_square - level.energy**2
 
 
-def _speeds(level: Level) -> list[tuple[arb, arb]]:
+def _speeds(level: GoryachevLevel) -> list[tuple[arb, arb]]:
     """(|u_k|, y_k) at the start."""
     (_, w2, _, _, g2, g3), c = level.turned(), ball(level.moment_square).sqrt()
     return [(abs(u), c * (2 * w2 * g3 - g2 * u)) for u in separated_start(level)]
 
 
-def _the_one(level: Level, possible: Sequence[Signed]) -> Signed:
+def _the_one(level: GoryachevLevel, possible: Sequence[Signed]) -> Signed:
     """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
     with series_length(1):
         turned = level.turned()
@@ -158,7 +158,7 @@ class RestMotion:
     functions: of parameter m.  origin: √a t/2 at the start.
     """
 
-    level: Level
+    level: GoryachevLevel
     energy: arb
     size: arb
     moment: arb
@@ -171,7 +171,7 @@ class RestMotion:
     origin: arb
 
     @classmethod
-    def of(cls, level: Level) -> RestMotion:
+    def of(cls, level: GoryachevLevel) -> RestMotion:
         """At the working precision; raises Undecided where it does not suffice."""
         a, c, h = size_of(level), ball(level.moment_square).sqrt(), ball(level.energy)
         room = ball(_room(level))
@@ -217,7 +217,7 @@ class RestMotion:
         """The six components in the turned frame at a number or series."""
         return self.at(time).state()
 
-    def at(self, time: Any) -> Place:
+    def at(self, time: Any) -> PathPoint:
         """The place at a number or series."""
         root = self.size.sqrt()
         s, k, delta = self.functions.functions(time * (root / 2) + self.origin)
@@ -225,7 +225,7 @@ class RestMotion:
         far = (self.tilt * self.tilt * k * k + self.functions.complement * g3 * s * s).sqrt()
         near = (g2 + g3 * delta * delta).sqrt() * k
         side = -1 if constant(k) < 0 else 1
-        return Place(self, s * delta / (far + side * near), side, root)
+        return PathPoint(self, s * delta / (far + side * near), side, root)
 
     def swept(self, end: arb) -> arb:
         """The integral of dΛ/dy from 0 to ``end``; raises OutOfReach where the quadrature takes too long."""
@@ -255,7 +255,7 @@ class RestMotion:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PathPoint:
     """One place of a motion, a number or series.
 
     lift: x.  side: −1 where 1/p1 and 1/p2 are in the place of p1 and p2.
@@ -320,7 +320,7 @@ class UprightMotion:
     size, moment: a and c.  sum, difference: v1 + v2 at the start, and Δ.  sign: σ.
     """
 
-    level: Level
+    level: GoryachevLevel
     size: arb
     moment: arb
     sum: arb
@@ -328,7 +328,7 @@ class UprightMotion:
     sign: int
 
     @classmethod
-    def of(cls, level: Level) -> UprightMotion:
+    def of(cls, level: GoryachevLevel) -> UprightMotion:
         """At the working precision; raises Undecided where it does not suffice."""
         # sinh v = −2y/|u|³
         one, two = (-2 * y / u**3 for u, y in _speeds(level))

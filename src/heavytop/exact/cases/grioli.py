@@ -22,7 +22,7 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
 from heavytop.exact.flint.balls import ball
-from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, Condition
+from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, ExactRelation
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.vectors import Vector, cross, dot
 
@@ -50,12 +50,12 @@ class Grioli(WithAttitude):
         IN_PLANE_13,
         TORQUE,
         MOMENTS_1_3,
-        Condition("(I2 - I3) a^2 = (I1 - I2) c^2", "P^2 times the difference", _section),
+        ExactRelation("(I2 - I3) a^2 = (I1 - I2) c^2", "P^2 times the difference", _section),
     )
     starts = (
-        Condition("Omega != 0", "Omega", lambda _, start: start.omega, any),
-        Condition("|Omega|^2 |P r|^2 = 2 (Omega·P r)^2", "the difference of spin and precession", _rates),
-        Condition("gamma as it follows from Omega", "the difference", _gamma_off),
+        ExactRelation("Omega != 0", "Omega", lambda _, start: start.omega, any),
+        ExactRelation("|Omega|^2 |P r|^2 = 2 (Omega·P r)^2", "the difference of spin and precession", _rates),
+        ExactRelation("gamma as it follows from Omega", "the difference", _gamma_off),
     )
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:

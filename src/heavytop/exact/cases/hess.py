@@ -48,7 +48,7 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.exact.separable.abel import REMEDY, Inversion, decide
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
-from heavytop.exact.solution import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM, LEVEL_MOMENTUM, Condition
+from heavytop.exact.solution import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM, LEVEL_MOMENTUM, ExactRelation
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.vectors import cross, dot
@@ -59,7 +59,7 @@ from heavytop.top.vectors import cross, dot
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class HessLevel:
     """The exact data with I2 = 1, Ω and γ in units of ``rate`` and ``size``; moment: n in these units."""
 
     rate: Fraction
@@ -70,7 +70,7 @@ class Level:
     gamma: tuple[Fraction, Fraction, Fraction]
 
     @classmethod
-    def of(cls, top: HeavyTop, start: State) -> Level:
+    def of(cls, top: HeavyTop, start: State) -> HessLevel:
         """In units of ordinary size."""
         rate = Fraction(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
         size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
@@ -152,7 +152,7 @@ class Hess(WithBearing, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        level = Level.of(self.top, self.start)
+        level = HessLevel.of(self.top, self.start)
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
             raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", REMEDY)
@@ -160,7 +160,7 @@ class Hess(WithBearing, ClosedForm):
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit: the matrix over its period costs much at many bits."""
-        return Level.of(self.top, self.start).rate * time
+        return HessLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -180,16 +180,16 @@ def _azimuth(case: Hess) -> Azimuth:
 
 @kept
 def _motion(case: Hess) -> HessMotion:
-    return HessMotion.of(Level.of(case.top, case.start))
+    return HessMotion.of(HessLevel.of(case.top, case.start))
 
 
 @whole_evaluation
-def _require_reach(level: Level) -> None:
+def _require_reach(level: HessLevel) -> None:
     """Raises LevelNotDone where the Fourier series of the elliptic integral is too long, or the linear system."""
     decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
 
 
-def _linear(level: Level, gap: Gap) -> System2:
+def _linear(level: HessLevel, gap: Gap) -> System2:
     """The linear system over the phase of the gap."""
     (_, high, top), energy = level.roots(), ball(level.energy)
     torque = ball(level.moment_square).sqrt() * ball(level.area)
@@ -203,7 +203,7 @@ class HessMotion:
     energy, area, size: E, C0, N.  origin: Abel's integral at t = 0.  spinor: (u, v) at θ = 0.
     """
 
-    level: Level
+    level: HessLevel
     gap: Gap
     energy: arb
     area: arb
@@ -214,7 +214,7 @@ class HessMotion:
     spinor: arb_mat
 
     @classmethod
-    def of(cls, level: Level) -> HessMotion:
+    def of(cls, level: HessLevel) -> HessMotion:
         """At the working precision.
 
         Raises Undecided where it does not suffice, OutOfReach where the series need too many terms.
@@ -340,7 +340,7 @@ class HessPendulum(WithAttitude):
         ACROSS_CENTRE,
         GAMMA,
         LEVEL_MOMENTUM,
-        Condition("M, or the torque, off axis 2", "its part in the plane of axes 1 and 3", _in_plane, any),
+        ExactRelation("M, or the torque, off axis 2", "its part in the plane of axes 1 and 3", _in_plane, any),
     )
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:

@@ -34,10 +34,10 @@ from flint import acb, acb_series, arb, arb_series
 from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.cases.kovalevskaya_theta import (
     ORDERS,
-    Level,
-    Root,
-    Start,
+    KovalevskayaLevel,
+    PhiRoot,
     ThetaMotion,
+    WorkingStart,
     linear,
     real_part,
     roots,
@@ -72,7 +72,7 @@ Interval = tuple[int, int]
 """Numbers of the branch points at the lower and upper end in v; 0 is v = 0, j is root number j − 1."""
 
 
-def intervals(level: Level, curve: Sequence[Root], start: Start) -> tuple[Interval, Interval]:
+def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> tuple[Interval, Interval]:
     """Where w1 and w2 move: pairs of numbers of branch points, (lower, upper) in v and so (upper, lower) in w.
 
     Twice the same number for a variable that stays at a double root.
@@ -102,7 +102,7 @@ def intervals(level: Level, curve: Sequence[Root], start: Start) -> tuple[Interv
     return found[0][0], found[1][0]
 
 
-def _resting(level: Level, curve: Sequence[Root], start: Start) -> dict[int, int]:
+def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> dict[int, int]:
     """The variable that rests at a double root, if any, and the number of that root."""
     double = [i for i, root in enumerate(curve) if root.multiplicity > 1]
     if not double or level.separated(level.double()) != 0:
@@ -113,7 +113,7 @@ def _resting(level: Level, curve: Sequence[Root], start: Start) -> dict[int, int
     return found
 
 
-def ordered(curve: Sequence[Root]) -> list[int]:
+def ordered(curve: Sequence[PhiRoot]) -> list[int]:
     """The numbers of the real roots, rising; raises Undecided where two balls meet."""
     real = [i for i, root in enumerate(curve) if root.value.imag.is_zero()]
     real.sort(key=lambda i: midpoint(curve[i].value.real))
@@ -122,7 +122,7 @@ def ordered(curve: Sequence[Root]) -> list[int]:
     return real
 
 
-def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> tuple[arb, float]:
+def pole(curve: Sequence[PhiRoot], occupied: Sequence[Interval]) -> tuple[arb, float]:
     """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
     real = ordered(curve)
     taken = {(upper - 1, lower - 1) for upper, lower in occupied}
@@ -182,8 +182,8 @@ class AbelMotion:
     the three e_j.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.
     """
 
-    level: Level
-    start: Start
+    level: KovalevskayaLevel
+    start: WorkingStart
     pole: arb
     branch: tuple[acb, ...]
     ends: tuple[Interval, Interval]
@@ -192,7 +192,7 @@ class AbelMotion:
     rows: tuple[tuple[acb, ...], tuple[acb, ...]]
 
     @classmethod
-    def of(cls, level: Level, most: int) -> AbelMotion:
+    def of(cls, level: KovalevskayaLevel, most: int) -> AbelMotion:
         """At the working precision.
 
         Raises Undecided where it does not suffice, OutOfReach for Fourier series of more than ``most`` terms.
@@ -334,7 +334,7 @@ class AbelMotion:
             value /= halves[number]
         return value * (self.branch[i] - self.branch[j]) * (-signs) / 2
 
-    def _with_factors(self, curve: Sequence[Root], mu: arb, phases: Sequence[arb]) -> AbelMotion:
+    def _with_factors(self, curve: Sequence[PhiRoot], mu: arb, phases: Sequence[arb]) -> AbelMotion:
         """κ_j, certified at the start."""
         start = self.start
         values = [root.value for root in curve if root.cubic]
@@ -370,7 +370,7 @@ def _real(value: acb, like: acb) -> acb:
     return acb(value.real) if like.imag.is_zero() else value
 
 
-def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[arb]:
+def start_phases(start: WorkingStart, mu: arb, variables: Sequence[Variable]) -> list[arb]:
     """θ1, θ2 at t = 0, modulo whole turns."""
     with series_length(ORDERS):
         v1, v2 = start.inverses(mu)
@@ -382,7 +382,7 @@ def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[a
     return [g.phase(v[0], slope) for g, v, slope in zip(variables, (v1, v2), slopes, strict=True)]
 
 
-def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, lead: arb, most: int) -> Variable:
+def _variable(branch: Sequence[acb], curve: Sequence[PhiRoot], interval: Interval, lead: arb, most: int) -> Variable:
     """The gap between two simple branch points, or the way from a simple one to a double one and back."""
     low, high = (branch[number].real for number in interval)
     if interval[0] == interval[1]:
@@ -469,12 +469,12 @@ class KovalevskayaAttitude:
         return Bearing.of(level.in_body(state[3:]), level.in_body(vector), azimuth - off)
 
 
-def along_gamma(level: Level) -> arb:
+def along_gamma(level: KovalevskayaLevel) -> arb:
     """l."""
     return ball(level.area) / ball(level.gamma_square).sqrt()
 
 
-def level_vector(level: Level, state: Sequence[Any]) -> list[Any]:
+def level_vector(level: KovalevskayaLevel, state: Sequence[Any]) -> list[Any]:
     """v in the turned frame, from the six components there."""
     p, q, r, *gamma = state
     size = ball(level.gamma_square).sqrt()
@@ -491,14 +491,14 @@ def level_vector(level: Level, state: Sequence[Any]) -> list[Any]:
     ]
 
 
-def _factor(level: Level, state: Sequence[arb]) -> arb:
+def _factor(level: KovalevskayaLevel, state: Sequence[arb]) -> arb:
     """f."""
     p, q, *_ = state
     a = ball(level.moment_square * level.gamma_square).sqrt()
     return along_gamma(level) * (p * p + q * q - ball(level.double())) - 2 * a * p
 
 
-def _of_momentum(level: Level, state: Sequence[arb], rate: arb, side: int) -> arb:
+def _of_momentum(level: KovalevskayaLevel, state: Sequence[arb], rate: arb, side: int) -> arb:
     """The angle from M to v about γ; rate: (log f)'."""
     p, q, r, *_ = state
     l = along_gamma(level)  # noqa: E741
@@ -536,7 +536,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
-        _require_done(Level.of(self.top, self.start))
+        _require_done(KovalevskayaLevel.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -570,7 +570,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         """
 
         def evaluate(working: int) -> list[arb]:
-            if isinstance(_motion(self), ThetaMotion) or not _has_thetas(Level.of(self.top, self.start)):
+            if isinstance(_motion(self), ThetaMotion) or not _has_thetas(KovalevskayaLevel.of(self.top, self.start)):
                 raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
             return _thetas(self).at(time, 1)
 
@@ -579,7 +579,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
 
 @kept
 def _motion(case: Kovalevskaya) -> AbelMotion | ThetaMotion:
-    level = Level.of(case.top, case.start)
+    level = KovalevskayaLevel.of(case.top, case.start)
     try:
         return AbelMotion.of(level, MOST_TERMS)
     except OutOfReach:
@@ -598,17 +598,17 @@ def _attitude(case: Kovalevskaya) -> KovalevskayaAttitude:
 
 @kept
 def _thetas(case: Kovalevskaya) -> ThetaMotion:
-    return ThetaMotion.of(Level.of(case.top, case.start))
+    return ThetaMotion.of(KovalevskayaLevel.of(case.top, case.start))
 
 
-def _has_thetas(level: Level) -> bool:
+def _has_thetas(level: KovalevskayaLevel) -> bool:
     """Whether the five roots are distinct, and far enough from each other at the working precision."""
     values = [root.value for root in roots(level)]
     return len(values) == 5 and separation(values) >= SEPARATION
 
 
 @whole_evaluation
-def _require_done(level: Level) -> None:
+def _require_done(level: KovalevskayaLevel) -> None:
     """Raises NotInClass on the levels that are not done here."""
     cubic, double = level.cubic(), level.double()
     if cubic.gcd(cubic.derivative()).degree() > 0:
@@ -626,13 +626,13 @@ def _require_done(level: Level) -> None:
     decide(test)
 
 
-def _both_rest(level: Level, double: Fraction) -> bool:
+def _both_rest(level: KovalevskayaLevel, double: Fraction) -> bool:
     """Whether w1 = w2 = e: a double root of the quadratic of both."""
     beside = level.separated(double + 1), level.separated(double - 1)
     return level.separated(double) == 0 and beside[0] == beside[1]
 
 
-def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
+def _require_apart(curve: Sequence[PhiRoot], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:

@@ -54,7 +54,7 @@ ORDERS = 5
 """Length of the power series in t at the start that fixes phases and signs: zeros there have an order of up to 4."""
 
 
-class Level(Reduced):
+class KovalevskayaLevel(Reduced):
     """The exact level of a start."""
 
     __slots__ = ()
@@ -101,7 +101,7 @@ class Level(Reduced):
 
 
 @dataclass(frozen=True, slots=True)
-class Root:
+class PhiRoot:
     """A root of φ.  cubic: whether it is one of the cubic."""
 
     value: acb
@@ -110,7 +110,7 @@ class Root:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class WorkingStart:
     """The start at the working precision, in the frame of n = (c, 0, 0); series in t of length :data:`ORDERS`.
 
     lower: R̂, upper: R12 + |R|.  still: q = 0 exactly.
@@ -148,22 +148,22 @@ class Start:
         return -4 * q * q / (self.upper + 4 * mu * (q * q)), self.upper / (self.lower - mu * self.upper)
 
 
-def roots(level: Level) -> list[Root]:
+def roots(level: KovalevskayaLevel) -> list[PhiRoot]:
     """The roots of φ at the working precision, of multiplicity 1 or, on the levels (2, 3), once 2."""
     cubic, k, double = level.cubic(), ball(level.fourth).sqrt(), level.double()
     if double * double != level.fourth:
-        return [*_simple(cubic), Root(acb(k), 1, False), Root(acb(-k), 1, False)]
+        return [*_simple(cubic), PhiRoot(acb(k), 1, False), PhiRoot(acb(-k), 1, False)]
     rest = cubic // polynomial(-double, Fraction(1))
-    return [Root(acb(ball(double)), 2, True), *_simple(rest), Root(acb(ball(-double)), 1, False)]
+    return [PhiRoot(acb(ball(double)), 2, True), *_simple(rest), PhiRoot(acb(ball(-double)), 1, False)]
 
 
-def _simple(factor: fmpq_poly) -> list[Root]:
+def _simple(factor: fmpq_poly) -> list[PhiRoot]:
     """The roots of a factor of the cubic."""
     pairs: Any = factor.complex_roots()
-    return [Root(acb(value), many, True) for value, many in pairs]
+    return [PhiRoot(acb(value), many, True) for value, many in pairs]
 
 
-def start_of(level: Level) -> Start:
+def start_of(level: KovalevskayaLevel) -> WorkingStart:
     """The start at the working precision."""
     c = ball(level.moment_square).sqrt()
     h, area, g = ball(level.energy), c * ball(level.area), ball(level.weight)
@@ -174,7 +174,7 @@ def start_of(level: Level) -> Start:
         real, imaginary = b * b - a * a + 2 * h * a - 2 * area * p + g, 2 * (h * b - a * b - area * q)
         upper = -s * s + 2 * h * s - 2 * area * p + g + (real * real + imaginary * imaginary).sqrt()
         lower = 2 * h * s * s - 4 * area * (s * p) + 4 * g * (p * p) + (area * area - 2 * g * h)
-    return Start(c, h, area, g, motion, lower, upper, level.across(level.omega) == 0)
+    return WorkingStart(c, h, area, g, motion, lower, upper, level.across(level.omega) == 0)
 
 
 def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
@@ -187,7 +187,7 @@ def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
     return tuple(motion)
 
 
-def linear(start: Start, values: Sequence[acb]) -> tuple[list[acb], list[acb], acb_mat]:
+def linear(start: WorkingStart, values: Sequence[acb]) -> tuple[list[acb], list[acb], acb_mat]:
     """α_j, β_j and 𝓜^−1, where P_j = α_j (X − e_j Z) + β_j Y and (X, Y, Z) = 𝓜^−1 P.
 
     values: the roots e_j of the cubic.  Raises Undecided where the working precision does not give the inverse.
@@ -258,7 +258,7 @@ _PAIRS: tuple[tuple[int, int], ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class HyperellipticCurve:
     """y² = −2 Π (w − e_j), at one working precision.
 
     roots: e_j, sorted.  inverse: a^−1.  tau: τ, symmetric.
@@ -269,7 +269,7 @@ class Curve:
     tau: acb_mat
 
     @classmethod
-    def of(cls, values: Sequence[acb]) -> Curve:
+    def of(cls, values: Sequence[acb]) -> HyperellipticCurve:
         """Raises Undecided where the working precision does not exclude seven of eight choices of signs."""
         found = sorted(values, key=lambda e: (midpoint(e.real), midpoint(e.imag)))
         halves = [_between(found, k) for k in range(4)]
@@ -375,20 +375,20 @@ class ThetaMotion:
     origin, rate: z_0 and v.  rows: (number of θ, factor) for N, D and for r.
     """
 
-    level: Level
-    start: Start
-    curve: Curve
+    level: KovalevskayaLevel
+    start: WorkingStart
+    curve: HyperellipticCurve
     origin: acb_mat
     rate: acb_mat
     rows: tuple[tuple[tuple[int, acb], ...], ...]
 
     @classmethod
-    def of(cls, level: Level) -> ThetaMotion:
+    def of(cls, level: KovalevskayaLevel) -> ThetaMotion:
         """At the working precision; raises Undecided where it does not suffice, or the roots are not distinct."""
         start, found = start_of(level), roots(level)
         if any(root.multiplicity > 1 for root in found):
             raise Undecided
-        curve = Curve.of([root.value for root in found])
+        curve = HyperellipticCurve.of([root.value for root in found])
         origin = acb_mat(2, 1)
         for w, y in points(start):
             origin += curve.image(w, y)
@@ -458,7 +458,7 @@ class ThetaMotion:
         return above, below, tuple(spin)
 
 
-def points(start: Start) -> list[tuple[arb, arb]]:
+def points(start: WorkingStart) -> list[tuple[arb, arb]]:
     """(w_k, y_k) at t = 0, without w1 where it is infinite."""
     with series_length(ORDERS):
         square = 4 * start.motion[1] * start.motion[1]

@@ -42,7 +42,7 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.exact.separable.abel import Inversion, decide
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
-from heavytop.exact.solution import GAMMA, ON_AXIS_1, Condition, differ
+from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -53,7 +53,7 @@ _SEARCH_BITS = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class IntervalCurve:
     """Q, R and what follows from them; made by :meth:`of`.
 
     inertia: (A, B, C).  power: k.  speed: K.  heights: S, T, U.
@@ -69,7 +69,7 @@ class Curve:
     @classmethod
     def of(
         cls, inertia: tuple[Fraction, Fraction, Fraction], second: fmpq_poly, third: fmpq_poly, power: int = 1
-    ) -> Curve:
+    ) -> IntervalCurve:
         """The motions with these Q and R; raises NotInClass where an identity fails."""
         a, b, c = (rational(moment) for moment in inertia)
         speed, place, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
@@ -140,7 +140,7 @@ class OneGapMotion:
     other roots of QR.  origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
     """
 
-    curve: Curve
+    curve: IntervalCurve
     gap: Gap
     rests: tuple[Roots, Roots]
     stops: tuple[_End, _End]
@@ -149,7 +149,7 @@ class OneGapMotion:
     signs: tuple[int, int]
 
     @classmethod
-    def of(cls, curve: Curve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
+    def of(cls, curve: IntervalCurve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
         """From x and the signs of √Q and √R there, 0 where they vanish; at the working precision.
 
         Raises Undecided where it does not suffice, OutOfReach where the Fourier series needs more than ``most`` terms.
@@ -255,7 +255,7 @@ def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]
 
 
 @whole_evaluation
-def gaps(curve: Curve) -> list[tuple[float, float]]:
+def gaps(curve: IntervalCurve) -> list[tuple[float, float]]:
     """Where Q and R are both positive between two of their roots."""
     with working_precision(_SEARCH_BITS):
         real = sorted(float(root.place.real) for root in _roots(curve) if root.place.imag.is_zero())
@@ -266,7 +266,7 @@ def _lead(polynomial: fmpq_poly) -> arb:
     return arb(polynomial[polynomial.degree()])
 
 
-def _roots(curve: Curve) -> list[_End]:
+def _roots(curve: IntervalCurve) -> list[_End]:
     found: Any = [part.complex_roots() for part in (curve.second, curve.third)]
     return [_End(acb(place), which) for which in (0, 1) for place, _ in found[which]]
 
@@ -337,12 +337,12 @@ class Steklov(WithBearing, ClosedForm):
     """
 
     method = "closed form: Steklov, inversion of an elliptic integral"
-    body = *ON_AXIS_1, Condition("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, differ)
+    body = *ON_AXIS_1, ExactRelation("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, differ)
     starts = (
         GAMMA,
-        Condition("Omega3^2 = c0 + c2 Omega1^2", "the difference", lambda top, start: (_height(top, start)[1],)),
-        Condition("E0 != 0", "E0", lambda top, start: (_height(top, start)[0],), any),
-        Condition("gamma as it follows from Omega", "the difference", _gamma_off),
+        ExactRelation("Omega3^2 = c0 + c2 Omega1^2", "the difference", lambda top, start: (_height(top, start)[1],)),
+        ExactRelation("E0 != 0", "E0", lambda top, start: (_height(top, start)[0],), any),
+        ExactRelation("gamma as it follows from Omega", "the difference", _gamma_off),
     )
 
     def __post_init__(self) -> None:
@@ -397,12 +397,12 @@ def quadratics(a: Fraction, b: Fraction, c: Fraction) -> tuple[Fraction, Fractio
     )
 
 
-def _curve(top: HeavyTop, start: State) -> Curve:
+def _curve(top: HeavyTop, start: State) -> IntervalCurve:
     """The curve of a start with A = 1, in the units of :func:`_units`."""
     height, zero = _height(top, start)[0], Fraction(0)
     b, c = top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0]
     b2, b0, c2, c0 = quadratics(Fraction(1), b, c)
-    return Curve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
+    return IntervalCurve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
 
 
 def steklov_motion(

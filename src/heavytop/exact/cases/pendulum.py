@@ -28,7 +28,7 @@ from flint import arb
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, kept, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import ball, whole
-from heavytop.exact.solution import GAMMA, TORQUE, Condition
+from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.vectors import Vector, cross, dot
 
@@ -65,8 +65,8 @@ class Pendulum(WithAttitude):
     body = (TORQUE,)
     starts = (
         GAMMA,
-        Condition("Omega, or the torque at rest, along a principal axis", "I e x e", _off_principal),
-        Condition("P r and gamma across this axis", "P r·e, gamma·e", _off_plane),
+        ExactRelation("Omega, or the torque at rest, along a principal axis", "I e x e", _off_principal),
+        ExactRelation("P r and gamma across this axis", "P r·e, gamma·e", _off_plane),
     )
 
     @property

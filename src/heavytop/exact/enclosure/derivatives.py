@@ -366,7 +366,7 @@ Balls = list[list[arb]]
 
 
 @dataclass(frozen=True, slots=True)
-class Derivatives:
+class EnclosedDerivatives:
     """start: J, 6 × 6, [i][j] = ∂y_i(t)/∂y_j(0).  data: S, 6 × 6, by :data:`DATA`; None where not asked for."""
 
     start: Balls
@@ -390,12 +390,12 @@ class _Columns:
         )
 
 
-def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[Derivatives]:
+def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[EnclosedDerivatives]:
     """J, and S where asked for, at each of ``times`` in their order: ``bits`` right, relative above 1, absolute below.
 
     Raises OutOfReach where the digits cannot be proven, or would take longer than ``known.effort``.
     """
-    found: dict[Fraction, Derivatives] = {}
+    found: dict[Fraction, EnclosedDerivatives] = {}
     for direction in (1, -1):
         spans = sorted({abs(time) for time in times if time * direction > 0})
         if spans:
@@ -406,15 +406,15 @@ def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bo
 
 
 @whole_evaluation
-def _at_rest(bits: int, data: bool) -> Derivatives:
+def _at_rest(bits: int, data: bool) -> EnclosedDerivatives:
     with working_precision(bits + 8):
         start = [[arb(int(i == j)) for j in range(6)] for i in range(6)]
-        return Derivatives(start, [[arb(0)] * 6 for _ in range(6)] if data else None)
+        return EnclosedDerivatives(start, [[arb(0)] * 6 for _ in range(6)] if data else None)
 
 
 def _one_way(
     known: Validated, direction: int, spans: list[Fraction], bits: int, data: bool
-) -> dict[Fraction, Derivatives]:
+) -> dict[Fraction, EnclosedDerivatives]:
     """Those at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
@@ -584,7 +584,9 @@ def _at(
 
 
 @whole_evaluation
-def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]) -> Derivatives:
+def _in_units(
+    known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]
+) -> EnclosedDerivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes
@@ -601,4 +603,4 @@ def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: 
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]
     start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
-    return Derivatives(start, data if tangent.data else None)
+    return EnclosedDerivatives(start, data if tangent.data else None)

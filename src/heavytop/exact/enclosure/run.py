@@ -73,7 +73,7 @@ _one_writer = Lock()
 
 
 @dataclass(slots=True)
-class Run:
+class EnclosureRun:
     """Nodes of one motion at one working precision, from time 0 on as far as they were asked for.
 
     Any thread may ask: a node depends on its time alone, and what is remembered is replaced, never changed in place.
@@ -143,7 +143,7 @@ class Pilot:
     one that goes further, and does not depend on who came how far.
     """
 
-    run: Run
+    run: EnclosureRun
     ahead: Ahead
 
     def forecast(self, span: Fraction, most_steps: float) -> tuple[float, float]:
@@ -366,7 +366,9 @@ class Validated:
     method: str = "validated: Taylor enclosure"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
-    _runs: dict[tuple[int, int, bool, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _runs: dict[tuple[int, int, bool, int], EnclosureRun] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
     _pilots: dict[tuple[int, int, bool, int], Pilot] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -481,7 +483,7 @@ class Validated:
             self._motions.setdefault(key, motion)
         return self._motions[key]
 
-    def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> Run:
+    def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> EnclosureRun:
         key = (direction, precision, in_words, len(start))
         if key not in self._runs:
             motion = self._motion(direction, start)
@@ -489,7 +491,7 @@ class Validated:
             off = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
             lacking = [value / size for value, size in zip(off, motion.scaled.sizes[: len(off)], strict=True)]
             node = start_node(motion.field, motion.scaled.state, precision, lacking)
-            self._runs.setdefault(key, Run(motion.field, precision, (node,), certified))
+            self._runs.setdefault(key, EnclosureRun(motion.field, precision, (node,), certified))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
@@ -571,7 +573,7 @@ class Validated:
         )
 
 
-def _steps_of(run: Run, span: Fraction) -> Iterator[Step]:
+def _steps_of(run: EnclosureRun, span: Fraction) -> Iterator[Step]:
     node = run.nodes[0]
     while node.time < span:
         found = step(run.motion, node, run.precision, run.certified)

@@ -50,7 +50,7 @@ from gmpy2 import mpq, mpz
 from numpy.typing import NDArray
 
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
-from heavytop.multiword.integers.integer_series import Row, coefficients
+from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients
 from heavytop.multiword.problem import variation as variation_of
 
 # A vector field of degree two, taken apart into exact numbers.
@@ -75,7 +75,7 @@ class Quadratic:
     """
 
     pairs: tuple[tuple[int, int], ...]
-    rows: tuple[Row, ...]
+    rows: tuple[QuadraticComponent, ...]
     q: Fraction
     l: Fraction  # noqa: E741 - the letter of the theorem
     jacobian: Matrix
@@ -119,7 +119,7 @@ def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int
     for i, (products, linear) in enumerate(zip(table, lines, strict=True)):
         common = lcm(*(c.denominator for c in (*products.values(), *linear.values())))
         rows.append(
-            Row(
+            QuadraticComponent(
                 common,
                 tuple((int(c * common), pairs.index(pair)) for pair, c in products.items()),
                 tuple((int(c * common), j) for j, c in linear.items()),
@@ -152,7 +152,7 @@ class StepSeries(Protocol):
     """b_0, …, b_N of every component, in whole ulps.
 
     Made of exact integers (:class:`Whole`) or on a grid of words
-    (:class:`heavytop.multiword.fixed_point.certified_series.Series`).
+    (:class:`heavytop.multiword.fixed_point.certified_series.WordSeries`).
     """
 
     @property

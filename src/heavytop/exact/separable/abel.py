@@ -244,7 +244,7 @@ class Rest:
         return np.zeros(2)
 
 
-class Beside:
+class RestingVariable:
     """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
 
     def __init__(self, variable: Variable, place: arb) -> None:
@@ -351,7 +351,7 @@ class Line:
             if k not in moving:
                 # of ε_o (G_1 − e G_0), one number
                 place, other = variables[k].middle, 1 - k
-                inversion = Inversion((Beside(variables[other], place),), (1,))
+                inversion = Inversion((RestingVariable(variables[other], place),), (1,))
                 rates = (signs[other] * (slopes[1] - place * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
         return cls(variables, moving, inversion, tuple(origin), rates)

@@ -40,7 +40,7 @@ _STEP_ERROR = 1e-12
 Exact = int | Fraction
 
 
-class Derivatives:
+class Jet:
     """A quantity by its derivatives at t = 0, exact: a ring in which the fields can be evaluated.
 
     at: the n-th derivative, for n in turn.
@@ -49,27 +49,27 @@ class Derivatives:
     def __init__(self, at: Callable[[int], Exact]) -> None:
         self.at = at
 
-    def __add__(self, other: Derivatives | Exact) -> Derivatives:
-        if not isinstance(other, Derivatives):
-            return Derivatives(lambda n: self.at(n) + (0 if n else other))
-        return Derivatives(lambda n: self.at(n) + other.at(n))
+    def __add__(self, other: Jet | Exact) -> Jet:
+        if not isinstance(other, Jet):
+            return Jet(lambda n: self.at(n) + (0 if n else other))
+        return Jet(lambda n: self.at(n) + other.at(n))
 
-    def __sub__(self, other: Derivatives) -> Derivatives:
-        return Derivatives(lambda n: self.at(n) - other.at(n))
+    def __sub__(self, other: Jet) -> Jet:
+        return Jet(lambda n: self.at(n) - other.at(n))
 
-    def __mul__(self, other: Derivatives | Exact) -> Derivatives:
-        if not isinstance(other, Derivatives):
-            return Derivatives(lambda n: self.at(n) * other)
-        return Derivatives(lambda n: sum(comb(n, k) * self.at(k) * other.at(n - k) for k in range(n + 1)))
+    def __mul__(self, other: Jet | Exact) -> Jet:
+        if not isinstance(other, Jet):
+            return Jet(lambda n: self.at(n) * other)
+        return Jet(lambda n: sum(comb(n, k) * self.at(k) * other.at(n - k) for k in range(n + 1)))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, divisor: Exact) -> Derivatives:
+    def __truediv__(self, divisor: Exact) -> Jet:
         def at(n: int) -> Exact:
             quotient = Fraction(self.at(n)) / divisor
             return quotient.numerator if quotient.denominator == 1 else quotient
 
-        return Derivatives(at)
+        return Jet(at)
 
 
 def known_parameters(system: System) -> Parameters:
@@ -80,7 +80,7 @@ def known_parameters(system: System) -> Parameters:
 def derivatives(system: System, attitude: bool, count: int, p: Parameters | None = None) -> Iterator[list[Exact]]:
     """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
     values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(XI if attitude else ()))]
-    y = [Derivatives(column.__getitem__) for column in values]
+    y = [Jet(column.__getitem__) for column in values]
     given = p or known_parameters(system)
     rates = system.field(given, y[:6])
     if attitude:

@@ -18,8 +18,8 @@ from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Fl
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_for
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
-from heavytop.multiword.integers.integer_series import Whole
-from heavytop.multiword.problem import Run, Scaled, Status, Steps
+from heavytop.multiword.integers.integer_series import IntegerMotion
+from heavytop.multiword.problem import ResumableRun, Scaled, Status, Steps
 from heavytop.precision import DOUBLE, Precision, decimal_text, last_call
 from heavytop.top.equations import System
 
@@ -92,7 +92,7 @@ class Arithmetic(ABC):
         """Everything that can change bits; they are those of every processor."""
 
     @abstractmethod
-    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         """A motion at its beginning."""
 
     @abstractmethod
@@ -131,7 +131,7 @@ class DoubleDouble(Arithmetic):
             "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",
         }
 
-    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return Floating(scaled, self.schedule, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
@@ -172,7 +172,7 @@ class Words(Arithmetic):
             "step_rule": "powers of two, by the number of orders",
         }
 
-    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return Fixed(scaled, self.grid, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
@@ -197,11 +197,11 @@ class WholeNumbers(Arithmetic):
             "step_rule": "powers of two, by the number of orders",
         }
 
-    def begin(self, scaled: Scaled, forwards: bool) -> Run:
-        return Whole(scaled, self.bits, forwards)
+    def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
+        return IntegerMotion(scaled, self.bits, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
-        check(system, attitude, lambda scaled: Whole(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
+        check(system, attitude, lambda scaled: IntegerMotion(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
         return 0.0
 
 

@@ -16,7 +16,7 @@ from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -159,7 +159,7 @@ def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
     return far and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
 
 
-def _holds(run: Run, precision: Precision) -> bool:
+def _holds(run: ResumableRun, precision: Precision) -> bool:
     """Whether arrays hold the states of this run: two words in a format that has no more, K of a grid in any other."""
     if isinstance(run, Floating):
         return DOUBLE.bits <= precision.bits <= BITS and precision.family != "quad"
@@ -268,7 +268,7 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
 class _Pace:
     """A run advanced in chunks, in the units of the problem."""
 
-    run: Run
+    run: ResumableRun
     scaled: Scaled
     step_limit: int | None
     between: Callable[[], None] | None

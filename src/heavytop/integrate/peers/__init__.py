@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, PeerFailed, quoted
-from heavytop.integrate.integrator import INTEGRATORS, Integrator, Source, described, foreign, load, name_of
+from heavytop.integrate.integrator import INTEGRATORS, Integrator, IntegratorSource, described, foreign, load, name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile
@@ -55,7 +55,7 @@ def is_third_party(name: str) -> bool:
     return name not in INTEGRATORS and name not in FORMER
 
 
-def peer(which: str | Source) -> Peer:
+def peer(which: str | IntegratorSource) -> Peer:
     """The peer, imported; raises InputError for an unknown one and for one that cannot be imported."""
     if not isinstance(which, str):
         return which.load()
@@ -80,7 +80,7 @@ def peer(which: str | Source) -> Peer:
     return found  # type: ignore[no-any-return]
 
 
-def require(which: str | Source) -> None:
+def require(which: str | IntegratorSource) -> None:
     """Raises InputError for an unknown integrator, and for one of this program's that cannot be imported.
 
     One of another package is not imported: how that goes is for the rows to say.  A Python file has to be there.
@@ -91,7 +91,7 @@ def require(which: str | Source) -> None:
         peer(which)
 
 
-def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> Peer:
+def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = None) -> Peer:
     """The peer with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
 
     Its calls raise PeerFailed for whatever others do wrong (:mod:`heavytop.integrate.peers.contract`).
@@ -141,7 +141,7 @@ def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
     return call
 
 
-def control(which: str | Source) -> str:
+def control(which: str | IntegratorSource) -> str:
     """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     if isinstance(which, Command):
         return which.control
@@ -156,7 +156,7 @@ def control(which: str | Source) -> str:
     return ""
 
 
-def control_apart(which: str | Source) -> str:
+def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
     if isinstance(which, Command) or described(which).own:
         return control(which)

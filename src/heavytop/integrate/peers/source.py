@@ -1,7 +1,7 @@
 """Integrators that no package installs: a program described in TOML, a function in a Python file, a callable.
 
-Each is a :class:`Source`: it has a name, which rows bear, and what it needs to be called in another process travels
-with it.  :func:`named` makes one from what a user writes, ``mine.toml``, ``./mine.py:solve`` or a callable.
+Each is an :class:`IntegratorSource`: it has a name, which rows bear, and what it needs to be called in another process
+travels with it.  :func:`named` makes one from what a user writes, ``mine.toml``, ``./mine.py:solve`` or a callable.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
-from heavytop.integrate.integrator import INTEGRATORS, Source
+from heavytop.integrate.integrator import INTEGRATORS, IntegratorSource
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
@@ -31,7 +31,7 @@ from heavytop.top.equations import system
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
 _PYTHON = re.compile(r"(?s)(.+\.py):([A-Za-z_][\w.]*)")
 _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
-_SHOWN = "docs/commands.md shows every key."
+_SHOWN = "`heavytop docs programs` shows every key."
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
 _MOST_SECONDS = 10**7
 
@@ -137,6 +137,8 @@ def as_peer(call: Any, name: str) -> Callable[..., Any]:
     """``call`` as a peer: itself, or around a solver, which takes one argument."""
     if isinstance(call, type) or not callable(call):
         raise InputError(f"The integrator {name} is a {type(call).__name__}, not a function.", _FORMS)
+    if inspect.iscoroutinefunction(call):
+        raise InputError(f"The integrator {name} is a coroutine, not a function.", "Define it without async.")
     try:
         with contained(name, " when its arguments were looked at"):
             arguments = inspect.signature(call).parameters.values()
@@ -153,7 +155,7 @@ def as_peer(call: Any, name: str) -> Callable[..., Any]:
     raise InputError(f"The integrator {name} takes {len(positional)} arguments.", _FORMS)
 
 
-def named(integrator: Any, folder: Path | None = None) -> str | Source:
+def named(integrator: Any, folder: Path | None = None) -> str | IntegratorSource:
     """The integrator that a user names: its name of now where it is the name of one, else its source.
 
     folder: what paths are relative to; None for the working directory.
@@ -176,7 +178,7 @@ def named(integrator: Any, folder: Path | None = None) -> str | Source:
     return found[0]
 
 
-def of_callable(call: Any) -> Source:
+def of_callable(call: Any) -> IntegratorSource:
     """A callable under the name that it gives itself, or of its file and function."""
     if isinstance(call, Command | PythonFile | PythonObject):
         return call

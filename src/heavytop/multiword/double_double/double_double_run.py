@@ -35,7 +35,7 @@ from heavytop.multiword.double_double.arithmetic import (
     split_constant,
 )
 from heavytop.multiword.double_double.steps import FIRST_UNITS, SLACK, parts, quotient, rises
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.top.equations import System
 
 BITS = 106
@@ -106,7 +106,7 @@ machine = once(dd.build)
 """The machine code, compiled at its first use."""
 
 
-class Floating(Run):
+class Floating(ResumableRun):
     """A motion that advances in double-double steps.
 
     low_order: n0 of the first step; None for the largest, from which it falls to what the motion needs.

@@ -87,7 +87,7 @@ class Total(Sequence[int]):
 
 
 @dataclass(frozen=True)
-class Series:
+class WordSeries:
     """b_0, …, b_N of six or nine components, in words: those of ``certified`` from ``centre`` with h = 2^-halvings.
 
     total: Σ b_n.  rounding: Σ_(n < N) of (2) in ulps, which bounds the integral of the defect of all orders below N.
@@ -154,7 +154,7 @@ class CertifiedSeries:
     def __reduce__(self) -> tuple[Any, ...]:
         return (CertifiedSeries, self._own)
 
-    def series(self, centre: Sequence[int], halvings: int) -> Series | None:
+    def series(self, centre: Sequence[int], halvings: int) -> WordSeries | None:
         """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
         orders = self._computed(centre, halvings)
         if orders < 0:
@@ -167,7 +167,7 @@ class CertifiedSeries:
         size = 8 * self.vectors
         sizes = numpy.maximum.reduce(scratch.sizes[: length * size].reshape(length, size), 1) * _UP
         nearest = scratch.values[: length * size].reshape(length, size)[:, self._columns]
-        return Series(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
+        return WordSeries(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
 
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
         """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""

@@ -13,7 +13,7 @@ from heavytop.multiword.codegen.recurrence import series_rates
 from heavytop.multiword.fixed_point import steps
 from heavytop.multiword.fixed_point.arithmetic import Grid, digits, exact, words_of
 from heavytop.multiword.fixed_point.steps import most_of, most_orders, rows_of, sample_row, size_of
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 
 _FIRST_HALVINGS = 3
 _FEWEST_HALVINGS = -4
@@ -90,7 +90,7 @@ def _from_nothing(problem: Scaled) -> list[Fraction]:
     return [value for value in born.values() if value]
 
 
-class Fixed(Run):
+class Fixed(ResumableRun):
     """A motion that advances on a grid of K words; the problem is scaled so that |ω| <= 4."""
 
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:

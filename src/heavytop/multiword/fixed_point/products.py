@@ -27,7 +27,7 @@ from heavytop.multiword.fixed_point.arithmetic import WIDEST, Accumulator, Grid,
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
+class ProductSize:
     """Doubles of a row, of all rows and of the sums; integers of the places."""
 
     row: int
@@ -55,7 +55,7 @@ class Rows(ABC):
 
     @staticmethod
     @abstractmethod
-    def size(grid: Grid, vectors: int, orders: int) -> Size:
+    def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
         """What ``orders`` orders need."""
 
     @staticmethod
@@ -302,9 +302,9 @@ class DigitRows(Rows):
     """
 
     @staticmethod
-    def size(grid: Grid, vectors: int, orders: int) -> Size:
+    def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
         row = LANES * (_BEFORE + digits_of(grid) * (1 + vectors))
-        return Size(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
+        return ProductSize(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
@@ -495,9 +495,9 @@ class WordRows(Rows):
     """A row: R, then L of each vector, K words each.  places: from which order on u leading words are 0."""
 
     @staticmethod
-    def size(grid: Grid, vectors: int, orders: int) -> Size:
+    def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
         row = 8 * grid.words * (1 + vectors)
-        return Size(row, row * orders, 8 * grid.words, grid.words + 2)
+        return ProductSize(row, row * orders, 8 * grid.words, grid.words + 2)
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:

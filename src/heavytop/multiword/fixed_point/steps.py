@@ -40,7 +40,7 @@ from heavytop.multiword.fixed_point.arithmetic import (
     carried,
     centred,
 )
-from heavytop.multiword.fixed_point.products import DigitRows, Rows, Size, WordRows
+from heavytop.multiword.fixed_point.products import DigitRows, ProductSize, Rows, WordRows
 from heavytop.top.equations import System
 
 FIRED, UNSETTLED = -1, -2
@@ -59,7 +59,7 @@ def rows_of(grid: Grid) -> type[Rows]:
     return DigitRows if grid.bounded and grid.words >= _FEWEST_WORDS else WordRows
 
 
-def size_of(grid: Grid, vectors: int) -> Size:
+def size_of(grid: Grid, vectors: int) -> ProductSize:
     """The scratch of a step."""
     return rows_of(grid).size(grid, vectors, most_orders(grid) + 2)
 
@@ -70,7 +70,7 @@ def most_orders(grid: Grid) -> int:
 
 
 @dataclass(slots=True)
-class Series:
+class SeriesCode:
     """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
 
     state, result: K words of each vector.  constants: K words of A and each B (or of those of
@@ -345,7 +345,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
     """
     module = ir.Module("grid")
-    series = Series(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
+    series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
     made = series.write()
     _Advance(module, grid, series.vectors, made).write()
     write_samples(module, grid, series.vectors)

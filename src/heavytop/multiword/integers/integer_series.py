@@ -19,13 +19,13 @@ from flint import fmpz_poly
 from gmpy2 import mpz
 
 from heavytop.multiword.codegen.recurrence import ZERO, turned
-from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.multiword.problem import ResumableRun, Scaled, Status
 
 _BLOCK = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class QuadraticComponent:
     """One component of a field of degree two, (Σ c y_j y_k + Σ c y_j) / denominator with integers c.
 
     products: (c, index of the pair (j, k)).  linear: (c, j).
@@ -36,7 +36,7 @@ class Row:
     linear: tuple[tuple[int, int], ...]
 
 
-class Field(Protocol):
+class QuadraticField(Protocol):
     """A field of degree two without a constant part."""
 
     @property
@@ -44,11 +44,13 @@ class Field(Protocol):
         """The products y_j y_k that occur."""
 
     @property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[QuadraticComponent, ...]:
         """The components."""
 
 
-def coefficients(motion: Field, centre: Sequence[int], precision: int, halvings: int) -> list[list[mpz]] | None:
+def coefficients(
+    motion: QuadraticField, centre: Sequence[int], precision: int, halvings: int
+) -> list[list[mpz]] | None:
     """b_0, b_1, ... of each component, up to two in a row that are within 2 units; None where they do not come to that.
 
     They should within 0.45 orders a bit; a step twice too long is abandoned at half an order a bit.
@@ -66,7 +68,7 @@ def coefficients(motion: Field, centre: Sequence[int], precision: int, halvings:
 class _Series:
     """values: what is known of each component.  between: of each row, the products that are already summed."""
 
-    motion: Field
+    motion: QuadraticField
     precision: int
     shift: int
     longest: int
@@ -143,10 +145,10 @@ _PAIRS = ((1, 2), (2, 0), (0, 1))
 
 @dataclass(frozen=True, slots=True)
 class _Field:
-    """pairs, rows: see :class:`heavytop.multiword.integers.integer_series.Field`."""
+    """pairs, rows: see :class:`heavytop.multiword.integers.integer_series.QuadraticField`."""
 
     pairs: tuple[tuple[int, int], ...]
-    rows: tuple[Row, ...]
+    rows: tuple[QuadraticComponent, ...]
 
 
 def field_of(problem: Scaled, forwards: bool) -> _Field:
@@ -187,16 +189,16 @@ def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
     return found
 
 
-def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) -> Row:
+def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) -> QuadraticComponent:
     common = lcm(*(c.denominator for c in (*products.values(), *linear.values())))
-    return Row(
+    return QuadraticComponent(
         common,
         tuple((int(sign * c * common), pair) for pair, c in products.items() if c),
         tuple((int(sign * c * common), j) for j, c in linear.items()),
     )
 
 
-class Whole(Run):
+class IntegerMotion(ResumableRun):
     """A motion that advances in integers of ``bits`` bits; the problem is scaled so that |ω| ≤ 4."""
 
     def __init__(self, problem: Scaled, bits: int, forwards: bool) -> None:

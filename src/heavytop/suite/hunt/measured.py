@@ -45,7 +45,7 @@ SECONDS = 10.0
 _BEGIN = 60.0
 
 
-class Run(NamedTuple):
+class IntegratedRun(NamedTuple):
     """How a run ended, and its states, one a time, in native numbers; said: why it was aborted."""
 
     outcome: str
@@ -55,7 +55,7 @@ class Run(NamedTuple):
 
 def follow(
     integrator: ChosenIntegrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
-) -> Run:
+) -> IntegratedRun:
     """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
     try:
         if integrator.supports_ensemble or isinstance(integrator.source, Command):
@@ -66,9 +66,9 @@ def follow(
     except InputError:
         raise
     except HeavyTopError as error:
-        return Run(FAILED, (), error.cause)
+        return IntegratedRun(FAILED, (), error.cause)
     short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
-    return Run((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
+    return IntegratedRun((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
 
 
 @lru_cache(maxsize=4)
@@ -88,7 +88,7 @@ class Apart:
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
 
-    def follow(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> Run:
+    def follow(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> IntegratedRun:
         """One motion; one that ends its process or takes too long is an outcome."""
         try:
             if self._pool is None:
@@ -98,14 +98,14 @@ class Apart:
             if isinstance(
                 asked.exception(timeout=self._seconds), KeyboardInterrupt
             ):  # of the integrator, not of a user
-                return Run(FAILED, (), f"{self._integrator.name} raised KeyboardInterrupt")
+                return IntegratedRun(FAILED, (), f"{self._integrator.name} raised KeyboardInterrupt")
             return asked.result()
         except TimeoutError:
             self.end()
-            return Run(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {self._seconds:.3g} s")
+            return IntegratedRun(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {self._seconds:.3g} s")
         except BrokenProcessPool:
             self.end()
-            return Run(FAILED, (), f"{self._integrator.name} ended its whole process")
+            return IntegratedRun(FAILED, (), f"{self._integrator.name} ended its whole process")
 
     def _begin(self) -> None:
         self._mark = new_mark()
@@ -416,7 +416,7 @@ _LEAST = 1e-300
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredMotion:
     """A motion and what an integrator made of it.
 
     outcome: of its run; "" where the truth is unknown, and nothing can be said.  error: infinite of a run that did not
@@ -455,7 +455,7 @@ class Meter:
         if self._apart is not None:
             self._apart.end()
 
-    def measure(self, motions: Sequence[Motion]) -> list[Measured]:
+    def measure(self, motions: Sequence[Motion]) -> list[MeasuredMotion]:
         """Each of them, in order; the bits of one do not depend on the others."""
         if not motions:
             return []
@@ -469,20 +469,20 @@ class Meter:
             turns = float(unit * abs(self.horizon))
             other = self._error(others[i], true, unit) if others and true else None
             if not true:
-                found.append(Measured(motion, "", 0.0, grown, turns))
+                found.append(MeasuredMotion(motion, "", 0.0, grown, turns))
             else:
                 error = self._error(run, true, unit)
                 outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
-                found.append(Measured(motion, outcome, error, grown, turns, other, run.said))
+                found.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
         return found
 
-    def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> Run:
+    def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> IntegratedRun:
         """One run of the integrator that is hunted, or of another."""
         if integrator == self.integrator and self._apart is not None:
             return self._apart.follow(*motion, self.times, self.precision)
         return follow(integrator, *motion, self.times, self.precision)
 
-    def sharper(self, found: Measured) -> Measured:
+    def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
         """The same with the amplification over all directions, from the start on and from each sample on: what is
         rounded on the way may grow by more than what is rounded at the start.
         """
@@ -499,10 +499,10 @@ class Meter:
 
     def _runs(
         self, integrator: ChosenIntegrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
-    ) -> list[Run]:
+    ) -> list[IntegratedRun]:
         if integrator.supports_ensemble:
             runs = integrator.propagate_many(problems, self.times, threads=1)
-            return [Run(run.outcome.value, run.states) for run in runs]
+            return [IntegratedRun(run.outcome.value, run.states) for run in runs]
         if apart is not None:
             return [apart.follow(*motion, self.times, self.precision) for motion in motions]
         return [follow(integrator, *motion, self.times, self.precision) for motion in motions]
@@ -538,7 +538,7 @@ class Meter:
             for run, reached in zip(runs, done, strict=True)
         ]
 
-    def _error(self, run: Run, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
+    def _error(self, run: IntegratedRun, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
         """The largest over the samples; infinite where the run did not reach the last, or is not a number."""
         if _failed(run):
             return math.inf
@@ -549,7 +549,7 @@ class Meter:
         return max(map(lambda one, two: _distance(one, two, unit), states, true))
 
 
-def _failed(run: Run) -> bool:
+def _failed(run: IntegratedRun) -> bool:
     return run.outcome != Outcome.SUCCESS.value
 
 
@@ -594,7 +594,7 @@ def class_of(top: HeavyTop, start: State) -> str:
     return NO_CLASS if found is None else found.method
 
 
-def special(found: Measured) -> list[str]:
+def special(found: MeasuredMotion) -> list[str]:
     """Sentences: moments, spin, equilibrium, separatrix, energy, what the motion amplifies; the telling ones alone."""
     top, start = found.motion
     return [each for each in (*_moments(top), *_start(top, start), *_growth_text(found)) if each]
@@ -645,7 +645,7 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     return [*said, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
 
 
-def _growth_text(found: Measured) -> list[str]:
+def _growth_text(found: MeasuredMotion) -> list[str]:
     eaten = digits_eaten(found.amplification)
     chaotic = found.amplification > 100 * (1 + found.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""

@@ -33,10 +33,10 @@ from heavytop.suite.case_text import forms
 from heavytop.suite.hunt.measured import (
     Dice,
     Family,
-    Measured,
+    IntegratedRun,
+    MeasuredMotion,
     Meter,
     Motion,
-    Run,
     changed,
     class_of,
     drawn,
@@ -244,7 +244,7 @@ class Proof:
     proven: bool
 
 
-def proof(meter: Meter, found: Measured, other: ChosenIntegrator) -> Proof:
+def proof(meter: Meter, found: MeasuredMotion, other: ChosenIntegrator) -> Proof:
     """The error of a found motion and of ``other`` on it, against the best that is known of it.
 
     Raises Contradiction where two proofs exclude each other.
@@ -259,7 +259,7 @@ def proof(meter: Meter, found: Measured, other: ChosenIntegrator) -> Proof:
 
 
 @whole_evaluation
-def _distance(problem: Problem, known: Truth, meter: Meter, run: Run) -> float:
+def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) -> float:
     """max(|δΩ|/rate, |δγ|) over the samples, at least; infinite of a run that was aborted."""
     if run.outcome != Outcome.SUCCESS.value:
         return math.inf
@@ -343,8 +343,8 @@ class Hunted:
     """
 
     asked: Asked
-    found: tuple[Measured, ...]
-    worst: tuple[Measured, ...]
+    found: tuple[MeasuredMotion, ...]
+    worst: tuple[MeasuredMotion, ...]
     motions: int
     planned: int
     law: float
@@ -371,10 +371,10 @@ class _Hunt:
         self.asked, self.meter, self.advance = asked, meter, advance
         self.eps = float(asked.precision.eps)
         self.law = _LEAST_LAW
-        self.all: list[Measured] = []
-        self.pool: list[Measured] = []
-        self.plain: list[Measured] = []
-        self.hits: list[Measured] = []
+        self.all: list[MeasuredMotion] = []
+        self.pool: list[MeasuredMotion] = []
+        self.plain: list[MeasuredMotion] = []
+        self.hits: list[MeasuredMotion] = []
         self.planned = 0
 
     def run(self) -> Hunted:
@@ -430,29 +430,29 @@ class _Hunt:
         other = dice.pick(self.pool)
         return changed(one.motion, other.motion, seed, self.asked.family, self.asked.horizon)
 
-    def _take(self, measured: Sequence[Measured]) -> None:
+    def _take(self, measured: Sequence[MeasuredMotion]) -> None:
         self.all += measured
         self.pool = sorted([*self.pool, *measured], key=self._score, reverse=True)[:_POOL]
         for each in sorted(measured, key=self._score, reverse=True):
             if len(self.hits) < _MOST_HITS and self.exceeds(each) and self.exceeds(sharp := self.meter.sharper(each)):
                 self.hits.append(sharp)
 
-    def _is_lost(self, m: Measured) -> bool:
+    def _is_lost(self, m: MeasuredMotion) -> bool:
         return m.explained(self.eps) * max(self.law, 1.0) > _LOST
 
-    def _score(self, m: Measured) -> float:
+    def _score(self, m: MeasuredMotion) -> float:
         """What the search makes large: the error over what is explained, or over that of ``against``."""
         if not m.outcome or (self._is_lost(m) and not math.isinf(m.error)):
             return 0.0
         return m.error / max(self._beside(m), 1e-300)
 
-    def _beside(self, m: Measured) -> float:
+    def _beside(self, m: MeasuredMotion) -> float:
         explained = m.explained(self.eps)
         if self.asked.against is None:
             return explained
         return max(m.other or 0.0, _LEAST_LAW * explained)
 
-    def exceeds(self, m: Measured) -> bool:
+    def exceeds(self, m: MeasuredMotion) -> bool:
         """Whether its error is found."""
         if not m.outcome:
             return False
@@ -465,16 +465,16 @@ class _Hunt:
             return m.error > limit * self.asked.unit
         return not self._is_lost(m) and m.error > DECADES * self.law * m.explained(self.eps)
 
-    def _shrunk(self) -> list[Measured]:
+    def _shrunk(self) -> list[MeasuredMotion]:
         """The worst found, shrunk; of several that shrink to the same one."""
-        found: dict[object, Measured] = {}
+        found: dict[object, MeasuredMotion] = {}
         worst = sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]
         for hit in worst:
             simple = hit if hit.outcome == OUT_OF_TIME else self._simple(hit)
             found.setdefault(_shape(simple.motion), simple)
         return sorted(found.values(), key=self._score, reverse=True)[:_SHOWN]
 
-    def _simple(self, hit: Measured) -> Measured:
+    def _simple(self, hit: MeasuredMotion) -> MeasuredMotion:
         """The simplest that shows the same; the amplification over all directions is asked at the end, and on the way
         where that did not do.
         """
@@ -484,7 +484,7 @@ class _Hunt:
                 return self.meter.sharper(again)
         return hit
 
-    def _shows(self, hit: Measured, careful: bool) -> Shows:
+    def _shows(self, hit: MeasuredMotion, careful: bool) -> Shows:
         asked = self.asked
 
         def shows(motions: Sequence[Motion]) -> list[bool]:
@@ -494,12 +494,12 @@ class _Hunt:
 
         return shows
 
-    def _as_bad(self, m: Measured, hit: Measured, careful: bool) -> bool:
+    def _as_bad(self, m: MeasuredMotion, hit: MeasuredMotion, careful: bool) -> bool:
         """Whether it is found, and in the same way: a failure does not become an error."""
         same = math.isinf(m.error) == math.isinf(hit.error) and self.exceeds(m)
         return same and (not careful or self.exceeds(self.meter.sharper(m)))
 
-    def _ended(self, done: int, found: list[Measured]) -> Hunted:
+    def _ended(self, done: int, found: list[MeasuredMotion]) -> Hunted:
         good = [m for m in self.all if m.outcome == "success" and not self._is_lost(m)]
         ordered = sorted(good, key=lambda m: m.error, reverse=True)
         sharp = map(self.meter.sharper, list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHARPENED])
@@ -562,7 +562,7 @@ def command_of(asked: Asked, motion: Motion, integrator: str, failed: bool) -> s
     return line if failed else f"{line} --json | heavytop score -"
 
 
-def _document(asked: Asked, m: Measured, proven: Proof, integrator: str, number: int) -> dict[str, Any]:
+def _document(asked: Asked, m: MeasuredMotion, proven: Proof, integrator: str, number: int) -> dict[str, Any]:
     eps = float(asked.precision.eps)
     case = case_of(m.motion, number)
     failed = math.isinf(m.error)

@@ -1,0 +1,40 @@
+"""The pages of the documentation as text, from an installed wheel as from a checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from heavytop.errors import InputError, quoted
+
+_INSTALLED = Path(__file__).parents[1] / "docs"
+"""Where hatch_build.py puts the pages of a wheel."""
+_CHECKOUT = Path(__file__).parents[3] / "docs"
+_OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index"})
+"""Pages that are made when the site is built."""
+
+
+def topics() -> dict[str, str]:
+    """The title of each page, by the name of its file; raises InputError where no page is installed."""
+    return {name: _title(path.read_text("utf-8")) for name, path in sorted(_files().items())}
+
+
+def page(topic: str) -> str:
+    """The page as it was written, in Markdown; raises InputError for a topic without a page."""
+    files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
+    if name not in files:
+        raise InputError(f"There is no page {quoted(topic)}.", "`heavytop docs` lists the topics.")
+    return files[name].read_text("utf-8")
+
+
+def _files() -> dict[str, Path]:
+    folder = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT
+    found = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
+    if not found:
+        raise InputError(
+            "The pages of the documentation are not installed.", "Install heavytop from a wheel or from its checkout."
+        )
+    return {name: path for name, path in found.items() if name not in _OF_THE_SITE}
+
+
+def _title(text: str) -> str:
+    return next(line.removeprefix("# ") for line in text.splitlines() if line.startswith("# "))
