@@ -9,6 +9,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
 
 import heavytop
@@ -78,6 +79,8 @@ nitpick_ignore_regex = [
 ]
 
 _MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
+_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Given", "Solved"}
+"""Classes whose objects a user makes."""
 
 
 def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -87,7 +90,25 @@ def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
         lines[place] = "".join(part if part.startswith("`") else part.replace("|", "\\|") for part in parts)
 
 
+def without_constructor(app: Any, what: str, name: str, *rest: Any) -> tuple[str, None] | None:
+    """No arguments of a class that only the program makes objects of."""
+    return ("", None) if what == "class" and name.rpartition(".")[2] not in _CONSTRUCTED else None
+
+
+def public_name(app: Any, env: Any, node: Any, shown: Any) -> Any:
+    """A link to what stands in a room of the program, by its public name."""
+    parts = node["reftarget"].split(".")
+    for name in (".".join(["heavytop", *parts[-length:]]) for length in (1, 2)):
+        if parts[0] == "heavytop" and name in env.domains.python_domain.objects:
+            text = name.removeprefix("heavytop.") + ("()" if node["reftype"] in ("func", "meth") else "")
+            shown = nodes.literal("", text) if isinstance(shown, nodes.literal) else nodes.Text(text)
+            return env.domains.python_domain.resolve_xref(env, node["refdoc"], app.builder, "obj", name, node, shown)
+    return None
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx; before napoleon, whose own markup has bars."""
     app.connect("autodoc-process-docstring", plain_bars, priority=100)
+    app.connect("autodoc-process-signature", without_constructor)
+    app.connect("missing-reference", public_name)
     app.add_lexer("csv", TextLexer)
