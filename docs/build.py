@@ -2,17 +2,20 @@
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
 from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
-line from the program (command_reference.py).  Then every link inside the site is followed, and the words of pages,
-docstrings and messages are looked up among common misspellings.
+line from the program (command_reference.py).  Then every link inside the site is followed, the reference of Python
+is searched for names that are no part of the interface, and the words of pages, docstrings and messages are looked up
+among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from time import perf_counter
@@ -26,6 +29,9 @@ CLAIMS = DOCS / "_build" / "claims.md"
 COMMANDS = DOCS / "_build" / "commands.md"
 ROOT = DOCS.parent
 SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
+
+PUBLIC = ("heavytop.plot.", "heavytop.integrate.peers.double.", "heavytop.api.integrators.check_integrator")
+"""What the reference of Python shows beside the names of ``heavytop`` itself."""
 
 
 class Page(HTMLParser):
@@ -62,6 +68,14 @@ def broken_links(site: Path) -> list[str]:
             if missing:
                 found.append(f"{path.relative_to(site)}: {link}")
     return found
+
+
+def internals(site: Path) -> list[str]:
+    """Names of the reference of Python that are no part of the interface: of inner rooms, and private ones."""
+    page = (site / "api.html").read_text("utf-8")
+    text = unescape(re.sub(r"<[^>]+>", "", page[page.index("<article") : page.index("</article>")]))
+    names = set(re.findall(r"heavytop\.[a-z_]+\.\w+(?:\.\w+)*|(?<![\w.])_[A-Za-z]\w*", text))
+    return [f"api.html: {name} is no part of the interface" for name in sorted(names) if not name.startswith(PUBLIC)]
 
 
 def misspelt() -> list[str]:
@@ -103,7 +117,7 @@ def main() -> int:
     print(*[line for line in built.stderr.splitlines() if not line.startswith("[IPKernelApp]")], sep="\n")
     if built.returncode:
         return built.returncode
-    found = [*broken_links(OUT.resolve()), *misspelt()]
+    found = [*broken_links(OUT.resolve()), *internals(OUT), *misspelt()]
     print("\n".join([*found, f"site: {OUT.relative_to(ROOT)}/index.html, {perf_counter() - began:.0f} s"]))
     return 1 if found else 0
 

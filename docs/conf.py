@@ -9,6 +9,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
 
 import heavytop
@@ -35,8 +36,9 @@ exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 toc_object_entries = False
 html_theme = "furo"
 html_title = "heavytop"
-html_theme_options = {"navigation_with_keys": True}
-if "Source" in URLS:
+html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
+html_theme_options["footer_icons"] = [{"name": name, "url": URLS[name], "html": name, "class": ""} for name in URLS]
+if re.match(r"https://(github|gitlab|bitbucket)\.", URLS.get("Source", "")):  # hosts whose pages the theme knows
     html_theme_options |= {"source_repository": URLS["Source"], "source_branch": "main", "source_directory": "docs/"}
 html_static_path = ["_static", str(_MATHJAX)]
 mathjax_path = "tex-svg.js"
@@ -78,6 +80,8 @@ nitpick_ignore_regex = [
 ]
 
 _MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
+_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Given", "Solved"}
+"""Classes whose objects a user makes."""
 
 
 def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -87,7 +91,25 @@ def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
         lines[place] = "".join(part if part.startswith("`") else part.replace("|", "\\|") for part in parts)
 
 
+def without_constructor(app: Any, what: str, name: str, *rest: Any) -> tuple[str, None] | None:
+    """No arguments of a class that only the program makes objects of."""
+    return ("", None) if what == "class" and name.rpartition(".")[2] not in _CONSTRUCTED else None
+
+
+def public_name(app: Any, env: Any, node: Any, shown: Any) -> Any:
+    """A link to what stands in a room of the program, by its public name."""
+    parts = node["reftarget"].split(".")
+    for name in (".".join(["heavytop", *parts[-length:]]) for length in (1, 2)):
+        if parts[0] == "heavytop" and name in env.domains.python_domain.objects:
+            text = name.removeprefix("heavytop.") + ("()" if node["reftype"] in ("func", "meth") else "")
+            shown = nodes.literal("", text) if isinstance(shown, nodes.literal) else nodes.Text(text)
+            return env.domains.python_domain.resolve_xref(env, node["refdoc"], app.builder, "obj", name, node, shown)
+    return None
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx; before napoleon, whose own markup has bars."""
     app.connect("autodoc-process-docstring", plain_bars, priority=100)
+    app.connect("autodoc-process-signature", without_constructor)
+    app.connect("missing-reference", public_name)
     app.add_lexer("csv", TextLexer)
