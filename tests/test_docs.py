@@ -252,8 +252,8 @@ def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
         assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
 
 
-def test_the_tutorial_shows_the_example_as_it_is() -> None:
-    shown = [block.text for block in blocks(DOCS / "tutorials" / "gate-my-integrator.md")]
+def test_the_page_of_gates_shows_the_example_as_it_is() -> None:
+    shown = [block.text for block in blocks(DOCS / "gate.md")]
     for file in ("mine.py", "gate.toml"):
         assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
 
