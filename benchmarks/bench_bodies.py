@@ -26,7 +26,7 @@ MOTIONS = {
     "enclosure": (*GENERIC, 100),
 }
 SAMPLES, END, DIGITS = 50, 1000, 50
-FORMATS = ("double", "extended", "double-double", "quad", "real:200")
+FORMATS = ("double", "extended", "double-double", "quad", "real:70", "real:200")
 
 
 def least(repeats: int, call: Callable[[], object]) -> float:

@@ -75,7 +75,7 @@ def main(count: int, plan: Plan) -> int:
     errors = sum(m.kind == "error" and m.log10 is not None for row in baseline.rows for m in row.metrics.values())
     for factor in FACTORS:
         planted = [compare(baseline, spoiled(other, factor), Policy(), KINDS) for other in others]
-        worse = sum(result.tally.get(Verdict.WORSE, 0) for result in planted)
+        worse = sum(each.verdict is Verdict.WORSE and not each.of for result in planted for each in result.changed)
         reported = sum(result.verdict == "worse" for result in planted)
         print(f"  {factor:>5}: {reported} of {len(others)} reports worse, {worse / errors / len(others):.0%} of errors")
     return int(200 * alarms > len(pairs))

@@ -1,27 +1,37 @@
 """Build the site into docs/_build/html: ``python docs/build.py``.
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
-from `results/claims/library.json`, or by new audits where that is not of the entries as they stand.  Then every link
-inside the site is followed, and the words of pages, docstrings and messages are looked up among common misspellings.
+from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
+line from the program (command_reference.py).  Then every link inside the site is followed, the reference of Python
+is searched for names that are no part of the interface, and the words of pages, docstrings and messages are looked up
+among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from time import perf_counter
 from urllib.parse import unquote, urlsplit
 
+import command_reference
+
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
 CLAIMS = DOCS / "_build" / "claims.md"
+COMMANDS = DOCS / "_build" / "commands.md"
 ROOT = DOCS.parent
 SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
+
+PUBLIC = ("heavytop.plot.", "heavytop.integrate.peers.double.", "heavytop.api.integrators.check_integrator")
+"""What the reference of Python shows beside the names of ``heavytop`` itself."""
 
 
 class Page(HTMLParser):
@@ -60,6 +70,14 @@ def broken_links(site: Path) -> list[str]:
     return found
 
 
+def internals(site: Path) -> list[str]:
+    """Names of the reference of Python that are no part of the interface: of inner rooms, and private ones."""
+    page = (site / "api.html").read_text("utf-8")
+    text = unescape(re.sub(r"<[^>]+>", "", page[page.index("<article") : page.index("</article>")]))
+    names = set(re.findall(r"heavytop\.[a-z_]+\.\w+(?:\.\w+)*|(?<![\w.])_[A-Za-z]\w*", text))
+    return [f"api.html: {name} is no part of the interface" for name in sorted(names) if not name.startswith(PUBLIC)]
+
+
 def misspelt() -> list[str]:
     """Common misspellings, by codespell; ``docs/words.txt`` lists the words that are right here."""
     command = [sys.executable, "-m", "codespell_lib", "--ignore-words", str(DOCS / "words.txt")]
@@ -92,13 +110,14 @@ def main() -> int:
         shutil.rmtree(DOCS / "_build", ignore_errors=True)
     began = perf_counter()
     write_claims()
+    COMMANDS.write_text(command_reference.markdown(), "utf-8")
     sphinx = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-n", "-b", "html", str(DOCS), str(OUT)]
     built = subprocess.run(sphinx, stderr=subprocess.PIPE, text=True, check=False)
     # the kernels of notebooks talk over the loopback device, and say so each time
     print(*[line for line in built.stderr.splitlines() if not line.startswith("[IPKernelApp]")], sep="\n")
     if built.returncode:
         return built.returncode
-    found = [*broken_links(OUT.resolve()), *misspelt()]
+    found = [*broken_links(OUT.resolve()), *internals(OUT), *misspelt()]
     print("\n".join([*found, f"site: {OUT.relative_to(ROOT)}/index.html, {perf_counter() - began:.0f} s"]))
     return 1 if found else 0
 

@@ -3,26 +3,46 @@
 from __future__ import annotations
 
 import re
+import sys
+import tomllib
+from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
 
 import heavytop
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+# MathJax with its fonts in one file; the extension that the package is would copy 20 MB
+_MATHJAX = distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
+URLS = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["urls"]
 
 project = "heavytop"
 author = copyright = "The heavytop authors"
 version = release = heavytop.__version__
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "myst_nb",
+    "sphinx_copybutton",
+    "thumbnails",
+]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 toc_object_entries = False
 html_theme = "furo"
 html_title = "heavytop"
 html_theme_options = {"navigation_with_keys": True}
-html_static_path = ["_static"]
+if "Source" in URLS:
+    html_theme_options |= {"source_repository": URLS["Source"], "source_branch": "main", "source_directory": "docs/"}
+html_static_path = ["_static", str(_MATHJAX)]
+mathjax_path = "tex-svg.js"
+# what a page prints is not for pasting
+copybutton_selector = "div.highlight:not(.highlight-text .highlight, .output .highlight) pre"
 html_css_files = ["site.css"]
 html_show_copyright = False
 html_copy_source = False
@@ -30,7 +50,7 @@ default_role = "code"
 smartquotes = False
 pygments_style = "default"
 
-myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
+myst_enable_extensions = ["deflist", "dollarmath", "colon_fence", "attrs_block"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "notebooks")
@@ -59,6 +79,8 @@ nitpick_ignore_regex = [
 ]
 
 _MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
+_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Given", "Solved"}
+"""Classes whose objects a user makes."""
 
 
 def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -68,7 +90,25 @@ def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
         lines[place] = "".join(part if part.startswith("`") else part.replace("|", "\\|") for part in parts)
 
 
+def without_constructor(app: Any, what: str, name: str, *rest: Any) -> tuple[str, None] | None:
+    """No arguments of a class that only the program makes objects of."""
+    return ("", None) if what == "class" and name.rpartition(".")[2] not in _CONSTRUCTED else None
+
+
+def public_name(app: Any, env: Any, node: Any, shown: Any) -> Any:
+    """A link to what stands in a room of the program, by its public name."""
+    parts = node["reftarget"].split(".")
+    for name in (".".join(["heavytop", *parts[-length:]]) for length in (1, 2)):
+        if parts[0] == "heavytop" and name in env.domains.python_domain.objects:
+            text = name.removeprefix("heavytop.") + ("()" if node["reftype"] in ("func", "meth") else "")
+            shown = nodes.literal("", text) if isinstance(shown, nodes.literal) else nodes.Text(text)
+            return env.domains.python_domain.resolve_xref(env, node["refdoc"], app.builder, "obj", name, node, shown)
+    return None
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx; before napoleon, whose own markup has bars."""
     app.connect("autodoc-process-docstring", plain_bars, priority=100)
+    app.connect("autodoc-process-signature", without_constructor)
+    app.connect("missing-reference", public_name)
     app.add_lexer("csv", TextLexer)

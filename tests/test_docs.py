@@ -34,6 +34,8 @@ NOT_CODE = {
     "{note}",
     "{include} ../CHANGELOG.md",
     "{include} _build/claims.md",
+    "{include} _build/commands.md",
+    "{thumbnails}",
 }
 CELL = "{code-cell} ipython3"
 MOST_LINES = 10
@@ -180,6 +182,23 @@ def test_the_program_understands_what_is_too_long_to_run(command: str) -> None:
     known[asked].make_context(asked, arguments)
 
 
+def test_the_reference_of_the_command_line_has_all_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    import command_reference
+
+    first, *sections = command_reference.markdown().split("\n\n## ")
+    known = typer.main.get_command(app).commands
+    assert "--completion SHELL" in first
+    assert [section.partition("\n")[0] for section in sections] == [f"heavytop {name}" for name in known] + [
+        "Exit codes"
+    ]
+    for section, command in zip(sections, known.values(), strict=False):
+        assert all(name in section for parameter in command.params for name in parameter.opts)
+        assert all(len(re.findall(r"(?<!\\)\|", line)) == 3 for line in section.splitlines() if line.startswith("|"))
+    assert "\\[default: default\\]" in sections[0]
+    assert "0 good, 1 a finding" in sections[-1]
+
+
 def test_commands_are_found_and_wrong_ones_refused() -> None:
     assert len(NOT_RUN) > 3
     known = typer.main.get_command(app).commands
@@ -233,8 +252,8 @@ def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
         assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
 
 
-def test_the_tutorial_shows_the_example_as_it_is() -> None:
-    shown = [block.text for block in blocks(DOCS / "tutorials" / "gate-my-integrator.md")]
+def test_the_page_of_gates_shows_the_example_as_it_is() -> None:
+    shown = [block.text for block in blocks(DOCS / "gate.md")]
     for file in ("mine.py", "gate.toml"):
         assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
 

@@ -321,6 +321,13 @@ class Spread(msgspec.Struct, frozen=True, gc=False):
     map: CellMap | None
 
 
+class Explained(msgspec.Struct, frozen=True, gc=False):
+    """A mistake that explains the states of a run: kind, one of those of ``diagnosis`` of a score; text: a sentence."""
+
+    kind: str
+    text: str
+
+
 class Row(msgspec.Struct, frozen=True, gc=False):
     """One measurement, of one motion compared with one reference.
 
@@ -333,6 +340,7 @@ class Row(msgspec.Struct, frozen=True, gc=False):
     data: of the top and its start, before any rounding; null where no motion is measured.
     amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
     an estimate; null where no single motion is integrated.
+    explained: what explains the states of a third-party integrator that are far off, where something does.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     worst: of a survey, first the worst; spread: its distributions.  chunk: Parquet bytes of a part of one; no report
     holds it.
@@ -368,6 +376,7 @@ class Row(msgspec.Struct, frozen=True, gc=False):
     worst: tuple[Worst, ...] | msgspec.UnsetType = msgspec.UNSET
     spread: Spread | msgspec.UnsetType = msgspec.UNSET
     chunk: bytes | msgspec.UnsetType = msgspec.UNSET
+    explained: Explained | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def identity(self) -> Identity:

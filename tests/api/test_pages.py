@@ -69,5 +69,5 @@ def test_on_a_terminal_a_page_is_laid_out(monkeypatch: pytest.MonkeyPatch, capsy
     with pytest.raises(typer.Exit):
         typer.main.get_command(app).commands["docs"].callback(topic="compare")  # type: ignore[attr-defined]
     printed = capsys.readouterr().out
-    assert "Comparing reports" in printed
+    assert "Compare reports" in printed
     assert "| verdict |" not in printed

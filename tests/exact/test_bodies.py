@@ -283,3 +283,12 @@ def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, ab
     (text,) = found
     assert f"about the centre of mass, diagonal {diagonal}, is not that of a rigid body" in text
     assert ('give about = "centre of mass"' in text) == (about == "pivot")
+
+
+def test_what_may_be_0_is_printed_as_0_with_its_radius() -> None:
+    body = ht.Body(2, "9.81", ("1/10", "2/10", "3/10"), (1, 2, "5/2"), "pivot")
+    start = ht.State(omega=(1, -2, "1/2"), attitude=Attitude.axis_angle((1, 1, 1), "180deg"))
+    w, *axis = ht.reference(body, start, [0], digits=12).balls("quaternion")[0]
+    assert w.value == "0"
+    assert 0 < Fraction(w.radius) < Fraction(1, 10**20)
+    assert {component.value for component in axis} == {"0.5773502691896"}

@@ -34,24 +34,32 @@ def problem(seed: int) -> tuple[HeavyTop, State, list[Fraction]]:
 
 
 def runge_kutta(
-    top: HeavyTop, start: State, times: list[Fraction], step: float = 0.02, signs: tuple[int, int] = (1, 1)
+    top: HeavyTop,
+    start: State,
+    times: list[Fraction],
+    step: float = 0.02,
+    signs: tuple[int, int] = (1, 1),
+    further: int = 0,
+    negated: int | None = None,
 ) -> np.ndarray:
     """The states by the classical method of order 4: an honest motion, off by its own error.
 
-    signs: of the products M × Ω and γ × Ω.
+    signs: of the products M × Ω and γ × Ω.  further: steps too many in each interval.  negated: the component whose
+    derivative has the other sign.
     """
     given = Parameters([float(v) for v in top.inertia], [float(v) for v in top.moment], 0)
     free = Parameters(given.inertia, [0.0] * 3, 0)
 
     def slope(y: np.ndarray) -> np.ndarray:
         whole, products = np.array(heavy_top(given, y)), np.array(heavy_top(free, y))
-        return whole + products * np.repeat(np.subtract(signs, 1), 3)
+        slopes = whole + products * np.repeat(np.subtract(signs, 1), 3)
+        return slopes if negated is None else slopes * np.where(np.arange(6) == negated, -1, 1)
 
     state, at, found = np.array([float(v) for v in start.flat]), 0.0, []
     for time in times:
         count = max(1, round(abs(float(time) - at) / step))
         h = (float(time) - at) / count
-        for _ in range(count):
+        for _ in range(count + further):
             a = slope(state)
             b = slope(state + h / 2 * a)
             c = slope(state + h / 2 * b)
@@ -141,6 +149,26 @@ def test_a_sign_in_the_equations_is_told(signs: tuple[int, int], kind: str) -> N
     assert (told.kind, told.numbers) == (kind, {})
     assert told.left < 1e-5 * told.error
     assert "sign" in diagnosis_text(told)
+
+
+def test_one_equation_with_the_other_sign_is_named() -> None:
+    top, start, times = problem(45)
+    times = [time / 4 for time in times]
+    (told,) = found(top, start, times, runge_kutta(top, start, times, 0.01, negated=4))
+    assert (told.kind, told.numbers) == ("component_sign", {"column": "γ2"})
+    assert "equation of γ2 has the other sign" in diagnosis_text(told)
+
+
+@pytest.mark.parametrize(
+    ("further", "said"), [(1, "one step too long (51 steps"), (-1, "one step too short (49 steps")]
+)
+def test_a_step_too_many_in_each_interval_is_named(further: int, said: str) -> None:
+    top, start, _ = problem(46)
+    times = [Fraction(3, 10) * k for k in range(1, 13)]
+    (told,) = found(top, start, times, runge_kutta(top, start, times, 0.006, further=further))
+    assert told.kind == "time_unit"
+    assert told.numbers["steps"] == str(50 * further)
+    assert said in diagnosis_text(told)
 
 
 def test_columns_in_any_order_are_named() -> None:

@@ -6,7 +6,7 @@ from heavytop.comparison.findings import MOST
 from heavytop.comparison.noise import Policy
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Law, Row, Subject
+from heavytop.records import Against, Explained, Law, Row, Subject
 from support.report_helpers import error
 from support.reports import compare, replace
 from support.small_reports import report, row
@@ -55,9 +55,10 @@ def test_a_report_against_itself_has_one_sentence() -> None:
     assert found([row()], [row()]) == ["Nothing changed: 2 metrics are the same within rounding noise."]
 
 
-def work(steps: int, size: str, **changes: object) -> Row:
+def work(steps: int, size: str, drift: str = "", **changes: object) -> Row:
     subject = Subject("computed", "mine:rk5", step=f"1/{steps}")
-    made = rk5(case="euler/T=100", measure="work_precision", metrics={"error_max": error(size)}, steps=steps, **changes)
+    metrics = {"error_max": error(size)} | ({"drift_energy_max": error(drift)} if drift else {})
+    made = rk5(case="euler/T=100", measure="work_precision", metrics=metrics, steps=steps, **changes)
     return replace(made, key=replace(made.key, subject=subject))
 
 
@@ -144,3 +145,29 @@ def test_a_run_that_stops_earlier_says_where() -> None:
     new = replace(old, time_reached="40")
     said = "1 row of mine:rk5 stops earlier on euler at T = 100 (mine:rk5, double): step_limit, at t = 40 of 100."
     assert found([old], [new])[0] == said
+
+
+@pytest.mark.parametrize(("errors", "below"), [(("1e-4", "1e-7", "1e-7"), True), (("1e-4", "2e-6", "1e-7"), False)])
+def test_an_error_that_only_the_finest_setting_shows_is_of_lower_order(errors: tuple[str, ...], below: bool) -> None:
+    counts = (10, 100, 1000)
+    healthy = [work(n, f"1e-{3 * i + 1}", drift=f"1e-{3 * i + 1}") for i, n in enumerate(counts, 1)]
+    faulty = [
+        replace(each, metrics={**each.metrics, "drift_energy_max": error(size)})
+        for each, size in zip(healthy, errors, strict=True)
+    ]
+    said = next(each for each in found(healthy, faulty) if each.startswith("Drift of the energy"))
+    assert ("of lower order than the method's" in said) is below
+
+
+def test_what_explains_the_states_comes_first_and_counts_its_rows() -> None:
+    late, other = Explained("start_row_missing", "The states are one row late."), Explained("weight", "Another weight.")
+    healthy = [rk5(case=case, metrics={DIGITS: error("1e-9")}) for case in ("euler", "lagrange", "grioli")]
+    faulty = [
+        replace(each, metrics={DIGITS: error("0.5")}, explained=what)
+        for each, what in zip(healthy, (other, late, late), strict=True)
+    ]
+    first = found(healthy, faulty)[0]
+    assert first == "The states are one row late. Seen on lagrange at T = 100 (mine:rk5, double) and 1 other row."
+    long = [replace(each, explained=Explained("start", "x" * 5000)) for each in faulty]
+    assert len(found(healthy, long)[0]) <= 300
+    assert not any("late" in each for each in found(faulty, [replace(faulty[0], metrics={}), *faulty[1:]]))

@@ -212,7 +212,7 @@ def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError):
             ht.run(file, out=tmp_path / "out")
     file.write_text(text.replace('"5"', "2.5", 1))
-    assert read(str(file), KINDS)[0].row_timeout == 2.5
+    assert float(read(str(file), KINDS)[0].row_timeout) == 2.5
     assert not (tmp_path / "out").exists()
 
 

@@ -71,7 +71,7 @@ def propagate(
             "heavy_top".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
         attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
-            :func:`heavytop.top.attitude.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
+            γ by the rule of `heavytop docs outputs`, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
             nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
         angles: True for ``angles()`` of the run too, the Euler angles φ, θ, ψ with all turns, followed from t = 0 on
@@ -93,7 +93,7 @@ def propagate(
         OutOfReach: where the run would take more than 1e12 steps, unless ``step_limit`` ends it before.
 
     Source:
-        (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).
+        (1.1) and (1.2) of the paper; the Taylor method is heyoka's (Biscani and Izzo, 2021).
     """
     if arguments.flag(angles, "angles"):
         if xi is not None or observer is not None or attitude is False:

@@ -321,7 +321,7 @@ def drift(run: Trajectory) -> Drifts:
         InputError: for what is no trajectory, and for one whose states went to an observer.
 
     Source:
-        (1.3), and the classical cases of :mod:`heavytop.top.equations`.
+        (1.3) of the paper, and the integrals of the classical cases.
     """
     if not isinstance(run, Trajectory):
         raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")

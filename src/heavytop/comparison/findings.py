@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, groupby, pairwise
 from typing import NamedTuple
 
@@ -24,8 +25,8 @@ from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 
-MOST, _LONGEST = 8, 300
-"""Sentences, and characters of one."""
+MOST, _LONGEST, _CLIPPED = 8, 300, 20
+"""Sentences, characters of one, and those that say how long a clipped text is."""
 RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW, Verdict.SAME)
 """The verdicts, the worst first."""
 _ORDER_MOVED = 0.5
@@ -36,6 +37,10 @@ _ENDS_AS_BEFORE = 0.5
 """Decades by which the error of the last state may have grown where the dense output alone is worse."""
 _STEPS_MOVED = 0.02
 """Decades: a step size control that rounds otherwise moves the steps by less."""
+_LOWER_ORDER = (
+    "; coarser settings are the same: the new error is of lower order than the method's, as of a coefficient or a "
+    "stage in lower precision"
+)
 _MOST_KEPT = 20_000
 """Rows whose numbers are held; further ones are counted, and named by their findings."""
 _DIGITS = (SOLUTION_ERROR, ERRORS[0].name)
@@ -149,8 +154,21 @@ class Changes:
         logs = [metric.log10 for metric in errors if metric is not None and metric.log10 is not None]
         if len(logs) == 2 and old.steps and new.steps:
             steps = math.log10(old.steps), math.log10(new.steps)
-            key = old.case, old.key.subject.name, old.precision
+            key = _curve(old.identity)
             self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
+
+    def at_finest_alone(self, change: Change) -> bool:
+        """Whether of all settings of an integrator on a case the finest alone has changed, in as many steps.
+
+        What it has changed by then falls more slowly than the method's own error, which is larger at the others.
+        """
+        if change.old is None or change.new is None or abs(_steps(change)) > _STEPS_MOVED:
+            return False
+        row = change.identity
+        points = self.points.get(_curve(row), [])
+        finest = max((point.steps[0] for point in points), default=0.0)
+        changed = [each.identity for each in self.rows if _curve(each.identity) == _curve(row)]
+        return len(points) > 1 and changed == [row] and math.log10(change.old.steps) == finest
 
     @property
     def worst_first(self) -> list[Change]:
@@ -176,12 +194,12 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
         return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
     orders = list(_orders(changes))
-    found = [sentence for moved, sentence in orders if moved < 0]
+    found = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
     found += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
     for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
-        for make in (_digits_moved, _steps_moved, _laws_moved, _others_moved):
+        for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
             found += make(rows, verdicts)
     found += [sentence for moved, sentence in orders if moved > 0]
     still = _still_failed(failed)
@@ -267,6 +285,11 @@ def _digits(row: Row | None) -> float | None:
     return None if error is None or error.log10 is None else -error.log10
 
 
+def _curve(row: Identity) -> tuple[str, str, str]:
+    """Case, integrator and format: what the settings of one work-precision curve share."""
+    return row.case, row.key.subject.name, row.precision
+
+
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
@@ -313,7 +336,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
     """The same of −Δ log error/Δ log steps between one setting and the next finer one."""
     changed: dict[tuple[str, str, str], set[Identity]] = {}
     for row in (change.identity for change in changes.rows):
-        changed.setdefault((row.case, row.key.subject.name, row.precision), set()).add(row)
+        changed.setdefault(_curve(row), set()).add(row)
     for key, rows in changed.items():
         _, name, precision = key
         for coarse, fine in pairwise(sorted(changes.points.get(key, []))):
@@ -326,6 +349,24 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                     where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
                     said = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
                     yield name, after - before, Sentence(said, frozenset(rows))
+
+
+def _explained(changes: Changes) -> Iterator[Sentence]:
+    """What explains the states that are far off now and were not: of each integrator what explains most rows."""
+    found: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
+    for change in changes.worst_first:
+        new, old = (each.explained if each else msgspec.UNSET for each in (change.new, change.old))
+        if new and (not old or old.kind != new.kind):
+            kinds = found.setdefault(change.identity.key.subject.name, {})
+            kinds.setdefault(new.kind, []).append((new.text, change.identity))
+    for kinds in found.values():
+        cases = max(kinds.values(), key=len)
+        (text, first), also = cases[0], len(cases) - 1
+        more = f" and {_count(also, 'other row')}" if also else ""
+        seen = f" Seen on {_where(first)}{more}."
+        if len(text) + len(seen) > _LONGEST:
+            text = clip(text, _LONGEST - len(seen) - _CLIPPED)
+        yield Sentence(text + seen, frozenset(row for _, row in cases))
 
 
 def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence]:
@@ -457,7 +498,7 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
     return f"{what} {_COMPONENTS.get(component, component.replace('_', ' '))}".strip()
 
 
-def _others_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
+def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Drifts, escape times, errors of steps, seconds: the largest change of each quantity and integrator."""
     found: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
     for change in rows:
@@ -476,7 +517,10 @@ def _others_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}.", together)
+        below = (
+            _LOWER_ORDER if Verdict.WORSE in verdicts and all(changes.at_finest_alone(c) for _, c, _ in cases) else ""
+        )
+        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
 
 
 def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:

@@ -247,7 +247,9 @@ def _of_reading(reading: hypotheses.ColumnsHypothesis, left: float) -> Suppositi
 
 def _of_clock(clock: hypotheses.TimesHypothesis, left: float, units: Units) -> Supposition:
     numbers = {"shift": _text(clock.shift, units.time)} if clock.kind == "times_shifted" else {}
-    numbers |= {"factor": f"{clock.factor:.6g}"} if clock.kind == "time_unit" else {}
+    if clock.kind == "time_unit":
+        steps = hypotheses.steps_of_interval(clock.factor)
+        numbers = {"factor": f"{clock.factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
     return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
 
 

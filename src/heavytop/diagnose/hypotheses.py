@@ -10,13 +10,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from itertools import permutations, product
 from math import isfinite
 from typing import Any, TypeVar
 
 import numpy
 
-from heavytop.diagnose.samples import ALIKE, FARTHEST, FLOOR, SHORT, SMALL, Array, Examined, motion, named, notable
+from heavytop.diagnose.samples import (
+    ALIKE,
+    FARTHEST,
+    FITTED_DROP,
+    FLOOR,
+    SHORT,
+    SMALL,
+    Array,
+    Examined,
+    motion,
+    named,
+    notable,
+)
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
@@ -411,17 +424,35 @@ def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
 
 
 _TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_velocity)
+_ANOTHER_MOTION = 0.03
+"""Relative errors below it are not those of another field, each of which is compiled anew."""
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
 def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquations]:
-    """Each with the error that is left."""
+    """Each with the error that is left; one equation with the other sign only where nothing else fits."""
+    found: list[FoundEquations] = []
     if truth is not None:
-        yield _any_order(given, truth)
-        yield from _axes_of_space(given, truth)
-        yield from constant_column(given, truth)
+        found += [_any_order(given, truth), *_axes_of_space(given, truth), *constant_column(given, truth)]
     if given.system is HEAVY_TOP:
-        yield from _signs(given)
+        found += _signs(given)
+    yield from found
+    error = given.error(truth)
+    if error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
+        for place, name in enumerate(NAMES):
+            supposed = replace(given, system=_negated(given.system, place)).supposed(given.times)
+            yield "component_sign", {"column": name}, given.error(supposed)
+
+
+@lru_cache(maxsize=18)
+def _negated(system: System, place: int) -> System:
+    """The same equations with the derivative of one component negated."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        found = system.field(p, y)
+        return (*found[:place], -1 * found[place], *found[place + 1 :])
+
+    return replace(system, name=f"{system.name}_{NAMES[place]}_negated", field=field)
 
 
 def _signs(given: Examined) -> Iterator[FoundEquations]:
@@ -483,6 +514,8 @@ _NEAR_ONE = 0.05
 """A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
 _SHORT = 3
 _EXACTLY = 1e-9
+_MOST_STEPS = 300
+"""In an interval between samples, of which one too many or too few is recognised: further ones are too near to 1."""
 _UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
@@ -554,8 +587,16 @@ def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
                     yield found, error
 
 
+def steps_of_interval(factor: float) -> int | None:
+    """n where the factor is (n + 1)/n, as of intervals of n steps that are one too long; −n where it is (n − 1)/n."""
+    n = round(1 / (factor - 1)) if abs(factor - 1) > 1 / (2 * _MOST_STEPS) else 0
+    return n if 1 < abs(n) <= _MOST_STEPS and abs(factor - 1 - 1 / n) < _EXACTLY else None
+
+
 def _is_short(factor: float) -> bool:
-    """Whether the factor, or one over it, is a decimal of three digits, as no integrator's lag is; 1 is none."""
+    """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
+    if steps_of_interval(factor) is not None:
+        return True
     near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
     return any(
         one != 1 and abs(one / Fraction(each) - 1) < _EXACTLY

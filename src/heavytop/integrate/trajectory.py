@@ -402,7 +402,7 @@ class Trajectory(Tabular):
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
 
-        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
         Raises InputError for a run without attitude.
         """
         return self._in_double(output("quaternion"))
@@ -468,7 +468,7 @@ class Trajectory(Tabular):
     def amplification(self) -> float:
         """The largest factor by which the motion itself has amplified a change of its start up to ``time_reached``.
 
-        An estimate, computed when it is asked for: :mod:`heavytop.top.amplification`.
+        An estimate from the variational equation, computed when it is asked for.
         """
         from heavytop.top.amplification import amplification
 

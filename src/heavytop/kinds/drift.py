@@ -13,6 +13,7 @@ from heavytop.document.document import Block, Chart
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
 from heavytop.kinds.base import Kind
+from heavytop.kinds.explained import with_explanation
 from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
@@ -120,7 +121,7 @@ class DriftKind(Kind):
         if task.integrator.supports_ensemble:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
-        return _row(task, run, scorer)
+        return with_explanation(_row(task, run, scorer), task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""

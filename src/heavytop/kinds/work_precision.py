@@ -29,6 +29,7 @@ from heavytop.integrate import peers
 from heavytop.integrate.integrator import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
+from heavytop.kinds.explained import with_explanation
 from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
@@ -173,7 +174,8 @@ class WorkPrecision(Kind):
         if not done and alone.outcome is Outcome.SUCCESS:
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
-        return msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        return with_explanation(row, task, run, scorer)
 
     def _timed(
         self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None

@@ -274,7 +274,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
 
     written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
-    :func:`heavytop.top.attitude.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
+    the ξ(0) of `heavytop docs outputs`; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
     derivatives: on request, with respect to the start and the data.
     """
@@ -347,7 +347,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
 
-        The sign is continuous from one time to the next and w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
+        The sign is continuous from one time to the next and w ≥ 0 at t = 0.
         Raises InputError for a reference without attitude.
         """
         return self._in_double(output("quaternion"))

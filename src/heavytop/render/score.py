@@ -213,7 +213,9 @@ def _said(found: Diagnosis, system: str) -> str:
         case "times_shifted":
             return f"The times are shifted: the state given at t is that at t {_signed(numbers['shift'])}"
         case "time_unit":
-            return f"The time has another unit: the state given at t is that at {numbers['factor']}·t"
+            return _time_unit(**numbers)
+        case "component_sign":
+            return f"The equation of {numbers['column']} has the other sign: the states fit with its derivative negated"
         case "weight":
             return f"The states fit another weight: {named}"
         case "start":
@@ -250,6 +252,15 @@ def _said(found: Diagnosis, system: str) -> str:
         case "rounded":
             return _rounded(numbers)
     return _integrals_off(numbers)
+
+
+def _time_unit(factor: str, steps: str = "") -> str:
+    where = f"the state given at t is that at {factor}·t"
+    if not steps:
+        return f"The time has another unit: {where}"
+    n, off = abs(int(steps)), "long" if int(steps) > 0 else "short"
+    taken = n + (1 if int(steps) > 0 else -1)
+    return f"Each interval is one step too {off} ({taken} steps of 1/{n} of it), or the time has another unit: {where}"
 
 
 def _signed(shift: str) -> str:

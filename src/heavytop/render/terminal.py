@@ -129,7 +129,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     else:
         parts = [_counted(seen(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {number} measurements, "
-    head += f"{bad} did not reach their horizon:" if bad else "all finished."
+    head += f"{bad} did not reach {'its' if bad == 1 else 'their'} horizon:" if bad else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]

@@ -18,7 +18,8 @@ from functools import cache
 from time import monotonic
 from typing import Any
 
-from heavytop.errors import OutOfTime
+from heavytop.errors import HeavyTopError, OutOfTime
+from heavytop.integrate.peers.contract import said
 from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
@@ -81,13 +82,16 @@ class RowLimits:
 
 
 class _Worker:
-    """A process for one task at a time, started when it is first used."""
+    """A process for one task at a time, started when it is first used.
+
+    It serves one third-party integrator at most, which may change whatever is around it.
+    """
 
     def __init__(self, kinds: Kinds) -> None:
         self._kinds = kinds
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
-        self._mark = ""
+        self._mark = self._guest = ""
         self._hello: Future[int] | None = None
         self.index = -1
         self.row: Future[Row] | None = None
@@ -101,8 +105,12 @@ class _Worker:
             return None
         return self.began + self.limit - monotonic()
 
-    def submit(self, index: int, limit: float | None, *arguments: Any) -> None:
+    def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
         """Begins a task: its time runs from when the process is there."""
+        guest = task.key.subject.name if task.is_third_party else ""
+        if self._guest not in ("", guest):
+            self.end()
+        self._guest = guest
         self.index, self.limit, self.began = index, limit, monotonic()
         if self._pool is None:
             self._mark = new_mark()
@@ -111,10 +119,10 @@ class _Worker:
             )
             self._hello = self._pool.submit(os.getpid)
         try:
-            self.row = self._pool.submit(measure, *arguments)
+            self.row = self._pool.submit(measure, kind, task, saved)
         except BrokenProcessPool:  # it died between two tasks
             self.end()
-            self.submit(index, limit, *arguments)
+            self.submit(index, limit, kind, task, saved)
 
     def awaited(self) -> list[Future[Any]]:
         """What is to be waited for: the process, then its row."""
@@ -132,6 +140,7 @@ class _Worker:
         if self._pool is not None:
             end_pool(self._pool, self._guard, self._mark)
         self._pool = self._guard = self._hello = self.row = None
+        self._guest = ""
 
 
 def _begin(*kinds: MeasuredKind) -> None:
@@ -192,11 +201,18 @@ def in_limited_processes(
 def in_order(tasks: Sequence[Task], kinds: Kinds, queue: Iterable[int]) -> tuple[dict[int, float], deque[int]]:
     """The cost of each task, and the tasks in the order in which they are to begin.
 
-    Those of third-party integrators come first, the quick ones before the long ones, whose limits rest on them.
+    Those of third-party integrators come first, one integrator after the other, and of each the quick ones before the
+    long ones, whose limits rest on them.
     """
     costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
-    first = {index: (0, costs[index]) if tasks[index].is_third_party else (1, -costs[index]) for index in costs}
-    return costs, deque(sorted(costs, key=first.__getitem__))
+    guests = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
+
+    def place(index: int) -> tuple[int, float]:
+        task = tasks[index]
+        third_party = task.is_third_party
+        return (guests.index(task.key.subject.name), costs[index]) if third_party else (len(guests), -costs[index])
+
+    return costs, deque(sorted(costs, key=place))
 
 
 @cache
@@ -233,10 +249,17 @@ def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row |
     """The row of a worker that has ended or had to be; None where it goes on.  Raises BrokenProcessPool."""
     assert worker.row is not None
     if worker.row.done():
-        # a child leaves interrupts to this process, so one that comes from there was raised by its integrator
-        interrupted = isinstance(worker.row.exception(), KeyboardInterrupt)
-        row = failed(task, f"{task.key.subject.name} raised KeyboardInterrupt") if interrupted else worker.row.result()
-        worker.row = None
+        name, error = task.key.subject.name, worker.row.exception()
+        if error is None:
+            row, worker.row = worker.row.result(), None
+        elif isinstance(error, KeyboardInterrupt):
+            # a child leaves interrupts to this process, so one that comes from there was raised by its integrator
+            row, worker.row = failed(task, f"{name} raised KeyboardInterrupt"), None
+        elif not task.is_third_party or isinstance(error, HeavyTopError | BrokenProcessPool):
+            raise error
+        else:  # it changed what is around it, such as modules of this program
+            row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
+            worker.end()
         limits.finished(task, cost, monotonic() - worker.began)
         return row
     if worker.left is None or worker.left > 0:

@@ -139,7 +139,7 @@ def _omega_with_rotor(p: Parameters, y: Any) -> tuple[Any, ...]:
 class System:
     """One of the three systems: its field, and the angular velocity with which the body turns in space.
 
-    enters: which of the :class:`heavytop.top.equations.Parameters` enter the field, by name.
+    enters: which parameters enter the field, by name.
     """
 
     name: str

@@ -33,7 +33,7 @@ class HeavyTop:
     rotor: k = (k1, k2, k3), the constant angular momentum, relative to the body, of a rotor that it carries: the system
     is then `heavy_gyrostat`.  None for no rotor, which is another top than one with k = 0.
 
-    Each is read by :func:`heavytop.precision.exact`; raises InputError for a moment that is not positive.
+    Each is an exact number; raises InputError for a moment that is not positive.
     """
 
     inertia: Vector
@@ -115,9 +115,9 @@ class State:
     Up: the equations are M' = M × Ω + P γ × r, γ' = γ × Ω and the energy is ½ Ω·M + P r·γ, higher with r along γ.
 
     omega: Ω in body axes, or omega_space: R Ω, which needs an attitude.  gamma: γ, or attitude: R, whose last row γ is.
-    Numbers are read by :func:`heavytop.precision.exact`.  Of an attitude with irrational entries, γ and Ω = Rᵀ Ω_space
+    Numbers are exact.  Of an attitude with irrational entries, γ and Ω = Rᵀ Ω_space
     here are those of a rational rotation within 2^-250 of it; what computes with the state takes the attitude itself,
-    to the bits that it needs (:mod:`heavytop.exact.bodies`).
+    to the bits that it needs.
 
     Raises InputError where two of them contradict each other, or one is missing.
     """

@@ -417,12 +417,15 @@ def _integer(text: str) -> int:
 
 
 def value_text(value: arb, digits: int) -> tuple[str, str]:
-    """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
+    """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value.
+
+    A ball that holds 0 is printed as 0, with what it reaches to as its radius: no digit of its middle is known.
+    """
     (m, e), (r, s) = ((int(part[0]), int(part[1])) for part in (value.mid().man_exp(), value.rad().man_exp()))
     # over one denominator that need not be the least
     unit = min(e, s, 0)
     middle, wide = m << (e - unit), r << (s - unit)
-    text = ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
+    text = "0" if abs(middle) <= wide else ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
     above, below = Decimal(text).as_integer_ratio()
     off = wide * below + abs((above << -unit) - middle * below)
     return text, ratio_text(off, below << -unit, _RADIUS_DIGITS, ROUND_CEILING)

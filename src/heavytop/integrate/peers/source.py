@@ -137,6 +137,8 @@ def as_peer(call: Any, name: str) -> Callable[..., Any]:
     """``call`` as a peer: itself, or around a solver, which takes one argument."""
     if isinstance(call, type) or not callable(call):
         raise InputError(f"The integrator {name} is a {type(call).__name__}, not a function.", _FORMS)
+    if inspect.iscoroutinefunction(call):
+        raise InputError(f"The integrator {name} is a coroutine, not a function.", "Define it without async.")
     try:
         with contained(name, " when its arguments were looked at"):
             arguments = inspect.signature(call).parameters.values()
