@@ -713,12 +713,18 @@ def outcomes(count: int, points: int, seed: int) -> Iterator[Outcome]:
         verdict, reason = _verdict(claim)
         seconds = time.process_time() - begin
         passed = passes(claim, points, draw)
-        fault = ""
-        if verdict == "holds" and (passed is not True or claim.truth == "trap"):
-            fault = "false holds"
-        if verdict == "refuted" and passed is True and claim.truth == "true":
-            fault = "false refuted"
-        yield Outcome(claim, verdict, fault, seconds, reason)
+        yield Outcome(claim, verdict, _fault(claim.truth, verdict, passed), seconds, reason)
+
+
+def _fault(truth: str, verdict: str, passed: bool | None) -> str:
+    """What is wrong with a verdict.
+
+    Numbers below ``_SMALL`` excuse no false claim, and points at which a true one is nowhere defined (the logarithm
+    of an integral that was negative at each) accuse none.
+    """
+    if verdict == "holds" and (truth != "true" or passed is False):
+        return "false holds"
+    return "false refuted" if verdict == "refuted" and truth == "true" else ""
 
 
 def main() -> None:

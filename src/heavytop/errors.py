@@ -1,5 +1,16 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
+import re
+
+_TYPES = {
+    "str": "text",
+    "array": "a list",
+    "object": "a table",
+    "int": "an integer",
+    "float": "a number",
+    "bool": "true or false",
+}
+
 
 def quoted(value: object, most: int = 60) -> str:
     """Any value for a message: its ``repr`` on one line, cut short; what has none is named by its type."""
@@ -8,6 +19,25 @@ def quoted(value: object, most: int = 60) -> str:
     except Exception:  # an integer of more digits than Python prints, or a foreign __repr__ that raises
         return f"<{type(value).__name__}>"
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def invalid(error: Exception) -> str:
+    """What is wrong with a value in a table of TOML: where it stands, what it has to be, and what it is."""
+    text, _, place = str(error).partition(" - at `$")
+    place = place.strip("`.") or "the file"
+    if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
+        wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
+        # a plan has its decimals as text
+        is_number = match[2] == "str" and match[1].startswith(("int", "float"))
+        return f"{place} has to be {wanted}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
+    if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
+        what = "of length " if match[1] in ("array", "str") else ""
+        return f"{place} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
+    if match := re.fullmatch(r"Object missing required field `(.*)`", text):
+        return f"{place} lacks the key {match[1]}"
+    if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):
+        return f"{match[1]} in {place}"
+    return str(error)
 
 
 class HeavyTopError(Exception):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
+import sympy
 from typer.testing import CliRunner
 
+from heavytop.claims.algebra.conditions import written
 from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table
 from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
@@ -59,7 +61,7 @@ def open_conditions(report: Audit) -> str:
         ("1 + 0*log(t)", "all", "t > 0"),
         ("1 + 0*sqrt(-t)", "t>0", "-t ≥ 0"),
         ("1 + 0*asin(2 + t^2)", "all", "at no sample in the domain"),
-        ("(t + sqrt(t^2))/(t + sqrt(t^2))", "all", "t + Abs(t) ≠ 0"),
+        ("(t + sqrt(t^2))/(t + sqrt(t^2))", "all", "t + sqrt(t^2) ≠ 0"),
         ("t*(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2))/(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2)) - t + 1", "all", "≠ 0"),
     ],
 )
@@ -320,6 +322,20 @@ def test_a_zero_of_a_divisor_is_removable_on_each_half_of_the_time(domain: str) 
     table = _spinning("sin(-g*t)/sin(-g*t)") | {"domain": domain}
     assert _verdict(table, ["g != 0"])[0] == "holds"
     assert _verdict(table, [])[0] == "undecided"
+
+
+def test_messages_write_formulas_as_files_do() -> None:
+    table = SPIN | {"parameters": {"g": ["1"]}, "integral": {"value": "Omega1"}}
+    for assumed, relations in ((["g^2 > sqrt(g^2)^3"], []), ([], ["g^2 - 3"])):
+        with pytest.raises(InputError, match=r"breaks the (assumption|relation) g\^2 ") as error:
+            _verdict(table | {"relations": relations}, assumed)
+        assert "**" not in str(error.value)
+        assert "Abs" not in str(error.value)
+    text = written("Abs(Omega1) - a*Abs(c + Abs(b*(d)))**2")
+    assert text == "sqrt(Omega1^2) - a*sqrt((c + sqrt((b*(d))^2))^2)^2"
+    parsed, meant = (sympy.sympify(t.replace("^", "**")) for t in (text, "Abs(Omega1) - a*Abs(c + Abs(b*d))**2"))
+    assert sympy.simplify(parsed.subs({"Omega1": -2, "a": 3, "b": -5, "c": 1, "d": 7}) - (2 - 3 * 36**2)) == 0
+    assert meant.subs({"Omega1": -2, "a": 3, "b": -5, "c": 1, "d": 7}) == 2 - 3 * 36**2
 
 
 @pytest.mark.usefixtures("unhurried")

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.audit import audit_claim, claim_from_table, own_system
 from heavytop.claims.audit.judge import verdict_of
 from heavytop.claims.library.entry import FOLDER, library, split
 
@@ -68,7 +68,9 @@ def test_what_could_not_be_read_is_listed_and_has_no_entry() -> None:
 def test_the_verdict_is_the_expected_one(name: str) -> None:
     entry, table = split(tomllib.loads((FOLDER / f"{name}.toml").read_text("utf-8")), name)
     assert entry is not None
-    rows = audit_claim(claim_from_table(table, name)).rows
+    report = audit_claim(claim_from_table(table, name))
+    assert report.system == own_system(name)
+    rows = report.rows
     assert verdict_of(rows) == entry.expects
     if entry.expects == "refuted":
         assert any(row.witness for row in rows if row.holds is False)

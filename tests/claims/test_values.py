@@ -305,12 +305,14 @@ def test_scales_times_and_digits_far_from_one() -> None:
         ({"value": [one("kovalevskaya", 1, "1")]}, "none of this motion"),
         ({"value": [one("omega", 4, "1")]}, "no component 4"),
         ({"value": [one("energy", 2, "1")]}, "no component 2"),
+        ({"value": [{"quantity": "gamma", "number": "1", "time": "0"}]}, "gamma of a component that is not named"),
+        ({"top": TOP | {"rotor": ["1", "0"]}}, "top.rotor has to be a list of length >= 3"),
         ({"value": [one("omega", 0, "1")]}, ">= 1"),
         ({"value": [one("omega", 1, "1"), one("omega", 1, "2", "0.0")]}, "stands in value 1 already"),
         ({"value": [one("omega", 1, "1", tolerance="-1")]}, "negative"),
         ({"value": [one("omega", 1, "1", tolerance="nan")]}, "tolerance"),
         ({"value": [one("omega", 1, "1", "inf")]}, "time"),
-        ({"value": [one("omega", 1, 0.5)]}, "Expected `str`"),  # type: ignore[arg-type]
+        ({"value": [one("omega", 1, 0.5)]}, "has to be text, and is a number"),  # type: ignore[arg-type]
         ({"value": [one("omega", 1, "1") | {"unit": "m"}]}, "unit"),
         ({"body": TENSOR_BODY}, "one of"),
         ({"top": None}, "one of"),

@@ -125,6 +125,40 @@ def test_permanent_rotations_turn_gamma():
     assert_attitude(motion, F(7, 3))
 
 
+TINY = F(1, 10**20)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "rotor"),
+    [
+        *[(axes, ("1/2", "1/3", "1/5")) for axes in ((2, 2, 1), (1, 2, 2), (2, 1, 2), (2, 2 + TINY, 1))],
+        *[((3, 2, 1), tuple(F(j == i, 2) for j in range(3))) for i in range(3)],
+        ((2, 2, 1), (1, 0, 0)),
+        ((2, 2 + TINY, 1), (0, 0, "1/5")),
+        ((2, 2 + TINY, 2 - TINY), (1, 1, 1)),
+        ((3, 2, 1), (TINY, TINY, 0)),
+    ],
+)
+def test_beside_its_limits_it_is_what_the_enclosure_encloses(inertia, rotor):
+    """Moments that are equal, or nearly so; a rotor along each principal axis, or next to nothing."""
+    top = HeavyTop(inertia, 0, (0, 0, 0), rotor)
+    motion = find(top, START, HEAVY_GYROSTAT)
+    assert isinstance(motion, ZhukovskyVolterra)
+    enclosed = Validated(top, START, HEAVY_GYROSTAT).state(F(1), 180)
+    assert all(a.overlaps(b) for a, b in zip(motion.state(F(1), 180), enclosed, strict=True))
+    assert_narrow(motion, F(10**6))
+
+
+def test_a_separatrix_is_left_to_the_enclosure_and_without_rotor_to_eulers_closed_form():
+    """M = (6, -4, 12) has the size and the energy of the unstable rotation M = (0, -14, 0)."""
+    start = State(("2/3", -1, 3), START.gamma)
+    with pytest.raises(LevelNotDone, match="aperiodic"):
+        ZhukovskyVolterra(HeavyTop((9, 5, 4), 0, (0, 0, 0), (0, 1, 0)), start)
+    assert ht.reference(HeavyTop((9, 5, 4), 0, (0, 0, 0), (0, 1, 0)), start, [20], 20).method.startswith("validated")
+    free = ht.reference(HeavyTop((9, 5, 4), 0, (0, 0, 0), (0, 0, 0)), State((1, 2, 3), START.gamma), [10**6], 20)
+    assert "Euler" in free.method
+
+
 @pytest.mark.parametrize(("inertia", "rotor"), [((2, 2, 1), (0, 0, 1)), ((2, 2, 2), (1, 2, 3)), ((2, 2, 1), (0, 0, 0))])
 def test_limits_are_refused_by_name_and_enclosed(inertia, rotor):
     top = HeavyTop(inertia, 0, (0, 0, 0), rotor)

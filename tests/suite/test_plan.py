@@ -23,6 +23,8 @@ WORK = (
     "[[measure]]\nkind = 'work_precision'\ncases = ['euler']\nhorizon = '10'\n"
     "ladders = [{ integrator = 'heyoka', tolerances = ['1e-3', '0.001'] }]\n"
 )
+AUDIT = "[[measure]]\nkind = 'audit'\nclaims = ['ershkov-partial']\n"
+CARRIED = AUDIT.replace("ershkov-partial", "sretensky-gyrostat")
 ONE = WORK.replace(", '0.001'", "")
 GROWTH = (
     "[[measure]]\nkind = 'growth'\ncases = ['euler']\nruns = [\n"
@@ -94,13 +96,18 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         ("name = 'x'\nmeasure = []", "measures nothing"),
         (f"name = 'x'\nsurprise = 1\n{MEASURE}", "unknown field `surprise`"),
         (f"name = 'x'\n{MEASURE}extra = 1\n", "unknown field `extra`"),
+        (f"name = 'x'\n{AUDIT}system = 'gyrostat'", "kind = 'audit' has claims, systems"),
+        (f"name = 'x'\n{AUDIT}systems = 'gyrostat'", "measure[0].systems has to be a list, and is text"),
+        (f"name = 'x'\n{AUDIT}systems = ['wheel']", "Unknown system 'wheel'"),
+        (f"name = 'x'\n{AUDIT}systems = ['heavy_gyrostat']", "The paper says nothing about heavy_gyrostat"),
+        (f"name = 'x'\n{CARRIED}systems = ['gyrostat']", "sretensky-gyrostat is about heavy_gyrostat, and systems"),
         (f"name = 'x'\n{MEASURE.replace('drift', 'drifts')}", "drifts"),
         (f"name = 'x'\n{MEASURE.replace('euler', 'oiler')}", "Unknown case 'oiler'"),
         (f"name = 'x'\n{MEASURE.replace('double', 'float')}", "Unknown precision 'float'"),
         (f"name = 'x'\n{MEASURE.replace('10', '-10')}", "positive"),
         (f"name = 'x'\n{MEASURE.replace('10', 'nan')}", "not a finite number"),
         (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "0 samples"),
-        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "Expected `int`"),
+        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "has to be an integer"),
         (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
         (f"name = 'x'\n{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
         (f"name = 'x'\n{TOP}{MEASURE}", "does not measure mine"),
@@ -130,6 +137,17 @@ def test_what_is_impossible_is_refused_and_named(tmp_path: Path, text: str, mess
     assert message in str(error.value).replace("\n", " ")
 
 
+def test_claims_are_audited_as_motions_of_their_own_system_unless_others_are_named(tmp_path: Path) -> None:
+    def systems(text: str) -> list[tuple[str, str]]:
+        return [(task.key.case, task.key.system) for task in plan_of(tmp_path, f"name = 'x'\n{text}")]
+
+    own = [("sretensky-gyrostat", "heavy_gyrostat")]
+    assert systems(CARRIED) == systems(f"{CARRIED}systems = ['heavy_top', 'heavy_gyrostat']") == own
+    assert systems(AUDIT) == [("ershkov-partial", "heavy_top")]
+    both = [("ershkov-partial", "heavy_top"), ("ershkov-partial", "gyrostat")]
+    assert systems(f"{AUDIT}systems = ['heavy_top', 'gyrostat']") == both
+
+
 def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
     (task,) = plan_of(tmp_path, f"name = 'x'\n{TOP}{MEASURE.replace('euler', 'mine')}")
     assert task.title == "mine"
@@ -157,7 +175,12 @@ quaternion = [1, 0, 0, 0]
     assert task.case.body.gravity == Fraction("9.80665000000000000000001")
     assert task.case.body.centre == (0, 1, Fraction(1, 2))
     assert task.case.given_start.omega == (0, -1, Fraction(1, 5))
-    for wrong, said in (("nan", "not a finite number"), ("true", "Expected"), ("[1]", "Expected"), ("1" * 5000, "not")):
+    for wrong, said in (
+        ("nan", "not a finite number"),
+        ("true", "has to be text"),
+        ("[1]", "is a list"),
+        ("1" * 5000, "not"),
+    ):
         with pytest.raises(InputError, match=said):
             plan_of(tmp_path, f"name = 'x'\n{body.replace('= 15', f'= {wrong}')}{MEASURE.replace('euler', 'mine')}")
 

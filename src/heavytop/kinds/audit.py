@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import log10
-from typing import Literal
 
 from heavytop.claims.audit.audit import PAPER, audited, own_system, paper_claim
 from heavytop.claims.audit.judge import judge
 from heavytop.claims.library.entry import library
 from heavytop.document.document import Block, Card, Headline, In, Note, Word, clip
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
@@ -30,20 +29,32 @@ class AuditTable(PlanTable, tag=NAME):
     """The claims, and the systems whose motions those of the paper are said to be.
 
     claims: "ershkov-general", "ershkov-partial", ids of the library, or "library" for every entry of it.
+    systems: without them that of each claim, the heavy top of the paper's.  An entry of the library is about its own.
     """
 
     claims: list[str]
-    systems: tuple[Literal["heavy_top", "gyrostat"], ...] = ()
+    systems: tuple[str, ...] = ()
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError for an unknown claim."""
+        """One a row; raises InputError for an unknown claim or system, and for a system that a claim is not about."""
         keys: list[RowKey] = []
         for claim in self.claims:
-            if claim in PAPER:
-                keys += [RowKey(NAME, claim, system, Subject("claimed", claim)) for system in self.systems]
-            else:
-                keys += [RowKey(NAME, name, own_system(name), Subject("claimed", name)) for name in _entries(claim)]
+            systems = self._systems(claim)
+            for name in [claim] if claim in PAPER else _entries(claim):
+                keys += [RowKey(NAME, name, about or own_system(name), Subject("claimed", name)) for about in systems]
         return [Task(key, "", NAME) for key in keys]
+
+    def _systems(self, claim: str) -> tuple[str, ...]:
+        """The systems of a claim's rows, "" for its own."""
+        asked = [system(name) for name in self.systems]
+        if claim in PAPER:
+            return tuple(paper_claim(claim).about(each).name for each in asked) or (HEAVY_TOP.name,)
+        if asked and claim in library() and (own := own_system(claim)) not in self.systems:
+            raise InputError(
+                f"The claim {claim} is about {own}, and systems = {quoted(list(self.systems))}.",
+                "Leave systems out: an entry of the library is about that of its file.",
+            )
+        return ("",)
 
 
 def _entries(claim: str) -> list[str]:

@@ -21,7 +21,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, invalid, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.files import read_whole
 from heavytop.integrate.integrator import IntegratorSource
@@ -149,7 +149,8 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
     except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
-        raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
+        cause = f"The plan {name} is not valid: {invalid(error)}."
+        raise InputError(cause, "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -220,6 +221,7 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     tables = {each.name: each.table for each in kinds.values() if each.table is not None}
     _require_kinds(document, "measure", tables)
     _require_kinds(document, "sweep", {str(each.__struct_config__.tag) for each in get_args(Sweep)})
+    _require_keys(document, tables)
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
     whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
@@ -236,7 +238,20 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
             near = get_close_matches(kind, known, 1)
             meant = f"; did you mean {near[0]}" if near else ""
             raise msgspec.ValidationError(
-                f"kind = {quoted(kind)} in `$.{section}[{place}]` is none of {', '.join(sorted(known))}{meant}"
+                f"kind = {quoted(kind)} in {section}[{place}] is none of {', '.join(sorted(known))}{meant}"
+            )
+
+
+def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]]) -> None:
+    """Raises ValidationError for a [[measure]] with a key that its kind does not have: with those that it has."""
+    entries = records.of_document(document).get("measure")
+    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+        table = tables.get(entry.get("kind", "")) if isinstance(entry, dict) else None
+        keys = {"kind"} if table is None else {"kind", *table.__struct_encode_fields__}
+        if table is not None and (unknown := min(entry.keys() - keys, default="")):
+            raise msgspec.ValidationError(
+                f"unknown field `{unknown[:40]}` in measure[{place}]; kind = {quoted(entry['kind'])} has "
+                + ", ".join(sorted(keys - {"kind"}))
             )
 
 

@@ -37,7 +37,15 @@ class ConditionKind(Enum):
 
 
 def written(text: str) -> str:
-    """A formula as files have it: a power is ``^``."""
+    """A formula as files have it: a power is ``^``, and SymPy's Abs(x) is sqrt(x^2)."""
+    while "Abs(" in text:
+        before, _, rest = text.partition("Abs(")
+        depth, length = 1, 0
+        while depth and length < len(rest):
+            depth += (rest[length] == "(") - (rest[length] == ")")
+            length += 1
+        inside = rest[: length - 1]
+        text = f"{before}sqrt({inside if inside.isalnum() else f'({inside})'}^2){rest[length:]}"
     return text.replace("**", "^")
 
 

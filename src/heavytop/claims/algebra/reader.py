@@ -138,7 +138,8 @@ class _Parser:
 
     def _require(self, token: str) -> None:
         if not self._take(token):
-            raise self._error(f"{token!r} expected before {self._next()[:20]!r}")
+            there = self._next()[:20]
+            raise self._error(f"{token!r} expected {f'before {there!r}' if there else 'at the end'}")
 
     def _error(self, what: str) -> InputError:
         return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")

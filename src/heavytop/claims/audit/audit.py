@@ -23,8 +23,8 @@ from heavytop.claims.audit.judge import Assuming, Audit, Auditable, StatementVer
 from heavytop.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.claims.audit.values import ValueClaim, ValueFile
 from heavytop.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
-from heavytop.errors import HeavyTopError, InputError
-from heavytop.top.equations import System, system
+from heavytop.errors import HeavyTopError, InputError, invalid
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
 # Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
 #
@@ -62,7 +62,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     try:
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {error}.", _REMEDY) from None
+        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
     tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
     if content.kind not in tables:
         raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral, relation or value.")
@@ -81,7 +81,7 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
     try:
         return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {error}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+        raise InputError(f"{where}: {invalid(error)}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
     except InputError as error:
         raise InputError(f"{where}: {error.cause}", error.remedy) from None
 
@@ -231,8 +231,10 @@ def _verdict(found: Audit) -> Verdict:
 
 @cache
 def own_system(name: str) -> str:
-    """The system that an entry is about, by its file."""
-    return read_claim(FOLDER / f"{name}.toml").about(None).name
+    """The system that an entry is about, by the keys of its file: ``about`` of its claim, but no formula is read."""
+    table = tomllib.loads((FOLDER / f"{name}.toml").read_text("utf-8"))
+    carries = isinstance((table.get("top") or table["body"]).get("rotor"), list)
+    return str(table.get("system") or (HEAVY_GYROSTAT if carries else HEAVY_TOP).name)
 
 
 def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda: None) -> dict[str, Judged]:

@@ -21,6 +21,7 @@ from heavytop.claims.algebra.conditions import (
     conditions_for_zero,
     is_exactly_zero,
     solve_relations,
+    written,
 )
 from heavytop.claims.algebra.evaluate import evaluate
 from heavytop.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
@@ -358,23 +359,23 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
         free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
         moving = sorted(map(str, free & {TIME, *STATE, *variables}))
         if moving:
-            text = quoted(str(formula.expression))[1:-1]
+            text = quoted(written(str(formula.expression)))[1:-1]
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
 def _check_samples(context: Context, bounds: Sequence[Bound], unequal: Sequence[Bound]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in context.samples:
-        shown = ", ".join(f"{name} = {value}" for name, value in sample.items())
-        for left, right in bounds:
-            if not _at(left - right, sample) > 0:
-                raise InputError(f"The sample {shown} breaks the assumption {left} > {right}.", "Change the sample.")
-        for left, right in unequal:
-            if is_exactly_zero(left - right, sample) is not False:
-                raise InputError(f"The sample {shown} breaks the assumption {left} != {right}.", "Change the sample.")
-        for relation in context.relations:
-            if is_exactly_zero(relation, sample) is False:
-                raise InputError(f"The sample {shown} breaks the relation {relation} = 0.", "Change the sample.")
+        shown = ", ".join(f"{name} = {value}" for name, value in sample.items()) or "without parameters"
+        broken = [f"assumption {left} > {right}" for left, right in bounds if not _at(left - right, sample) > 0]
+        broken += [
+            f"assumption {left} != {right}"
+            for left, right in unequal
+            if is_exactly_zero(left - right, sample) is not False
+        ]
+        broken += [f"relation {zero} = 0" for zero in context.relations if is_exactly_zero(zero, sample) is False]
+        if broken:
+            raise InputError(f"The sample {shown} breaks the {written(broken[0])}.", "Change the sample.")
         for index, moment in enumerate(minors(context.top.inertia), 1):
             if not _at(moment, sample) > 0:
                 full = isinstance(context.top.inertia[0], tuple)
@@ -387,7 +388,7 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
         return evaluate(expression, sample, _SAMPLE_BITS)
     except (KeyError, Unprovable):
         raise InputError(
-            f"{str(expression)[:80]} is not a number at a sample.", "It may hold parameters only."
+            f"{written(str(expression))[:80]} is not a number at a sample.", "It may hold parameters only."
         ) from None
 
 

@@ -148,12 +148,12 @@ class StartTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ValueTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[[value]]: one number.  component: 1, 2, 3, of a quaternion w, x, y, z 1 to 4, of a first integral 1."""
+    """[[value]]: one number.  component: 1, 2, 3, of a quaternion w, x, y, z 1 to 4, of a first integral none or 1."""
 
     time: Text
     quantity: Text
     number: Text
-    component: Annotated[int, msgspec.Meta(ge=1, le=4)] = 1
+    component: Annotated[int, msgspec.Meta(ge=1, le=4)] | None = None
     tolerance: Text | None = None
 
 
@@ -287,15 +287,14 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
         where = f"value {index}"
         time = _number(table.time, f"{where}: time")
         size = SIZES.get(table.quantity, 1)
-        if table.component > size:
-            raise InputError(
-                f"{where}: {table.quantity[:40]} has no component {table.component}.",
-                f"Its components are 1 to {size}.",
-            )
-        place = time, table.quantity, table.component
+        component = table.component or 1
+        if component > size or (table.component is None and size > 1):
+            lacks = "of a component that is not named" if table.component is None else f"has no component {component}"
+            raise InputError(f"{where}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
+        place = time, table.quantity, component
         if seen.setdefault(place, index) != index:
             raise InputError(
-                f"{where}: {table.quantity[:40]} {table.component} at t = {table.time[:40]} stands in value "
+                f"{where}: {table.quantity[:40]} {component} at t = {table.time[:40]} stands in value "
                 f"{seen[place]} already.",
                 "Give each number once.",
             )

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, invalid, quoted
 
 FOLDER = Path(__file__).parent
 _REMEDY = "See `heavytop docs library` for the keys of an entry."
@@ -86,7 +86,7 @@ def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str,
     try:
         found = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {error}.", _REMEDY) from None
+        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
     claim = {key: value for key, value in table.items() if key not in _KEYS}
     return found, claim | {"name": found.title[:80], "source": found.source.text[:2_000]}
 
