@@ -36,8 +36,9 @@ exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 toc_object_entries = False
 html_theme = "furo"
 html_title = "heavytop"
-html_theme_options = {"navigation_with_keys": True}
-if "Source" in URLS:
+html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
+html_theme_options["footer_icons"] = [{"name": name, "url": URLS[name], "html": name, "class": ""} for name in URLS]
+if re.match(r"https://(github|gitlab|bitbucket)\.", URLS.get("Source", "")):  # hosts whose pages the theme knows
     html_theme_options |= {"source_repository": URLS["Source"], "source_branch": "main", "source_directory": "docs/"}
 html_static_path = ["_static", str(_MATHJAX)]
 mathjax_path = "tex-svg.js"

@@ -383,7 +383,8 @@ def headline_of(kind: str, rows: list[Row]) -> str:
 
 
 ALONE = {
-    "claim_model": "The claimed Ω is off by 1 % of α from |t| = 0.002 on (ershkov-partial-6/forward, printed).",
+    "claim_model": "The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from |t| = 0.002 on (ershkov-partial-6/forward, "
+    "printed).",
     "claim_evaluation": "In double the printed form is off by up to 1.11e-7 in Ω, not finite from |t| = 7.4; the "
     "stable form is off by up to 1.03e-15 in Ω, finite throughout.",
     "homoclinic": "heyoka stays on a homoclinic motion up to |t| = 12.3 to 63 in double, 62.8 to 321 in real:237.",

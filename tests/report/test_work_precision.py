@@ -283,4 +283,6 @@ def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     # beside integrators of this program too: theirs are the plan's own curves
     assert beside_ours(ALL + mine) == said
     assert beside_ours(ALL) == []
-    assert beside_ours(mine[:2]) == []
+    (alone,) = beside_ours(mine[:2])
+    assert alone.notes == ["mine:rk4: largest error in its time"]
+    assert alone.rows == [["step 1/10", "1.0e-04 in 12 ms"], ["step 1/30", "2.0e-10 in 123 s"]]

@@ -162,10 +162,12 @@ class Changes:
 
         What it has changed by then falls more slowly than the method's own error, which is larger at the others.
         """
-        if change.old is None or change.new is None or abs(_steps(change)) > _STEPS_MOVED:
-            return False
         row = change.identity
         points = self.points.get(_curve(row), [])
+        if change.old is None or change.new is None or not change.old.steps or not change.new.steps:
+            return False
+        if abs(_steps(change)) > _STEPS_MOVED:
+            return False
         finest = max((point.steps[0] for point in points), default=0.0)
         changed = [each.identity for each in self.rows if _curve(each.identity) == _curve(row)]
         return len(points) > 1 and changed == [row] and math.log10(change.old.steps) == finest

@@ -161,12 +161,13 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
 
 def beside_ours(rows: Sequence[Row]) -> list[Table]:
     """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
-    a line a point of the curve, of its error, its seconds and what heyoka takes for that error.
+    a line a point of the curve, of its error, its seconds and, where heyoka is measured, what it takes for that error.
     """
-    found = {case: lines for case, lines in panels(rows).items() if any(line.integrator == OURS for line in lines)}
+    found = panels(rows)
     names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
+    beside = any(line.integrator == OURS for lines in found.values() for line in lines)
     tables = []
-    for name in sorted(names if len(names) == 1 else names - INTEGRATORS.keys()):
+    for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
         cases: dict[str, dict[str, str]] = {}
         for case, lines in list(found.items())[:_MOST_CASES]:
             for line in lines:
@@ -176,7 +177,7 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                     cases[case] = cases.get(case, {}) | cells
         points = dict.fromkeys(point for cells in cases.values() for point in cells)
         lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
-        note = f"{name}: largest error in its time (heyoka's time for that error)"
+        note = f"{name}: largest error in its time" + (" (heyoka's time for that error)" if beside else "")
         if lines_of:
             tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
     return tables
@@ -187,9 +188,11 @@ def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
 
 
 def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
+    cell = f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)}"
+    if not ours:
+        return cell
     seconds, _ = _quickest(ours, point.log10)
-    theirs = "not reached" if seconds is None else seconds_text(seconds, 2)
-    return f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)} ({theirs})"
+    return f"{cell} ({'not reached' if seconds is None else seconds_text(seconds, 2)})"
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:

@@ -281,7 +281,8 @@ class ClaimModel(Kind):
             both((row, _cells(row, times)) for row in rows),
             [
                 "Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers.",
-                "Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α, proven, not a sample.",
+                "Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α = Ω3(0) I3/I1, proven, "
+                "not a sample.",
             ],
         )
         truths = {row.key.case: row.against for row in rows}
@@ -299,18 +300,19 @@ def _headline(rows: Sequence[Row]) -> Headline:
     if parted:
         _, row = min(parted, key=lambda each: each[0])
         at, where = f"|t| = {short(row.metrics[PARTS.text].value)}", f"{clip(row.case, 40)}, {row.key.subject.branch}"
-        return Headline(f"The claimed Ω is off by 1 % of α from {at} on ({where}).")
+        return Headline(f"The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from {at} on ({where}).")
     horizon = short(max((row.horizon.removeprefix("-") for row in rows), key=exact))
     return Headline(f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")
 
 
-def _parting_times(rows: Sequence[Row]) -> Iterator[Note]:
+def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
     found: dict[str, dict[str, str]] = {}
     for row in rows:
         found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
-    for case, times in found.items():
-        said = ", ".join(f"{t} ({branch})" for branch, t in times.items())
-        yield Note(f"{case}: Ω off by 1 % of α = Ω3(0)/2 at |t| = {said}", shown=In.SHORT)
+    branches = list(dict.fromkeys(branch for times in found.values() for branch in times))
+    cells = [[case, *(times.get(branch, "-") for branch in branches)] for case, times in found.items()]
+    if cells:
+        yield Cells("Ω off by 1 % of α = Ω3(0) I3/I1 at |t|", ["", *branches], cells, shown=In.SHORT)
 
 
 def _cells(row: Row, times: Sequence[str]) -> list[Cell]:

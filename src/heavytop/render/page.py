@@ -312,10 +312,20 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> l
     in_order = sorted(rows, key=lambda row: (0, "") if one_format else (row.bits, row.precision))
     columns = list(dict.fromkeys(row.key.subject.name if one_format else row.precision for row in in_order))
     cells = [[found.get(column, "-") for column in columns] for found in lines.values()]
-    columns = [clip(column, 13) for column in columns]
+    widest = max(13, min(39, 62 // len(columns) - 2))
+    columns = [clip(column, widest) for column in columns]
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
-    named_cells = [[clip(name, min(max(room, 16), 39)), *found] for name, found in zip(lines, cells, strict=True)]
+    room = min(max(room, 16), 39)
+    named_cells = [line for name, found in zip(lines, cells, strict=True) for line in _in_lines(name, found, room)]
     return [Table(title, ["", *columns], named_cells, shown=In.SHORT)]
+
+
+def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
+    """The line of a motion; where case and integrator do not fit beside each other, one below the other."""
+    case, comma, integrator = name.partition(", ")
+    if len(name) <= room or not comma:
+        return [[clip(name, room), *cells]]
+    return [[clip(f"{case},", room), *("" for _ in cells)], ["  " + clip(integrator, room - 2), *cells]]
 
 
 def digits_columns(rows: Sequence[Row]) -> list[Table]:
