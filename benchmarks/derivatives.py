@@ -1,10 +1,12 @@
 """Proven derivatives on random data of every class: contained differences, laws of the flow, radii and cost.
 
     python benchmarks/derivatives.py [--count 100] [--case NAME]
+    python benchmarks/derivatives.py --cost
 
 For each built-in case, COUNT random starts of its top (of a special motion: other roundings), each at a random time:
 one random column of ∂y/∂y0 and one of ∂y/∂(I, n) against a central difference of references, every law of the flow, and
-the seconds of this process against those of the enclosure without derivatives.  A line a case.
+the seconds of this process against those of the enclosure without derivatives.  A line a case.  With --cost: seconds
+of references of a generic top without derivatives, with respect to the start, and to start and data.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+import heavytop as ht
 from heavytop.cases import CASES, Case
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import working_precision
@@ -31,10 +34,29 @@ def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--count", type=int, default=100)
     options.add_argument("--case")
+    options.add_argument("--cost", action="store_true")
     given = options.parse_args()
+    if given.cost:
+        _cost()
+        return 0
     cases = [case for name, case in CASES.items() if given.case in (None, name)]
     wrong = [_case(case, given.count) for case in cases]
     return int(any(wrong))
+
+
+def _cost() -> None:
+    top = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+    start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    for digits, until in ((20, 8), (30, 8), (40, 8), (60, 8), (25, 30), (30, 100)):
+        found: dict[str | None, list[float]] = {None: [], "start": [], "all": []}
+        for _ in range(4):
+            for which, seconds in found.items():
+                began = time.process_time()
+                ht.reference(top, start, [until], digits, attitude=False, derivatives=which)
+                seconds.append(time.process_time() - began)
+        plain, *others = (min(seconds) for seconds in found.values())
+        ratios = "".join(f"{seconds:9.3f} ({seconds / plain:4.1f})" for seconds in others)
+        print(f"{digits:4} digits at t = {until:<5}{plain:9.4f}{ratios}", flush=True)
 
 
 def _case(case: Case, count: int) -> bool:

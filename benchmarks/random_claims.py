@@ -486,8 +486,42 @@ def gyrostat_claim(draw: random.Random) -> Claim:
     return Claim(table, truth, "gyrostat's integral", "heavy_gyrostat")
 
 
+def carried_motion_claim(draw: random.Random) -> Claim:
+    """A motion of a heavy gyrostat: Lagrange's precession, or a pendulum with k along its axis; or with a fault."""
+    r = Rewriter(draw, draw.choice(["all", "t<=0", "t>0"]))
+    make, place = draw.choice([(_precession, 2), (_pendulum, 0), (_swing, 0)])
+    table = make(r)
+    table["parameters"] = table["parameters"] | {"w": ["1/2", "-2"]}
+    top = table["top"]
+    top["rotor"] = ["w" if axis == place else "0" for axis in range(3)]
+    if make is _precession:
+        top["centre"][2] += " + m*w"
+    if draw.random() < 0.5:
+        return Claim(table, "true", f"carried{make.__name__}", "heavy_gyrostat")
+    if draw.random() < 0.5:
+        part, index = draw.choice(["omega", "gamma"]), draw.randrange(3)
+        table["motion"][part][index] += f" + {draw.choice(_WRONG)}"
+    else:
+        top["rotor"][(place + 1) % 3] = draw.choice(["1e-20", "w", "k"])
+    return Claim(table, "false", f"carried{make.__name__}", "heavy_gyrostat")
+
+
+def value_claim(draw: random.Random) -> Claim:
+    """Numbers of a motion, with a rotor in every third, printed right, or with errors, by an integration of its own."""
+    import random_values
+
+    table, expected = random_values.claim_of(draw)
+    about = "heavy_gyrostat" if "rotor" in table["body"] else "heavy_top"
+    if draw.random() < 0.5:
+        right = [value for value, (is_right, _) in zip(table["value"], expected, strict=True) if is_right]
+        return Claim(table | {"value": right or table["value"]}, "true" if right else "false", "values", about)
+    return Claim(table, "true" if all(is_right for is_right, _ in expected) else "false", "values", about)
+
+
 def random_claim(draw: random.Random) -> Claim:
     """Any of them."""
+    if (kind := draw.random()) < 0.1:
+        return value_claim(draw) if kind < 0.03 else carried_motion_claim(draw)
     kind = draw.random()
     if kind < 0.2:
         return elliptic_claim(draw)
@@ -640,7 +674,7 @@ class Numbers:
 
 def passes(claim: Claim, points: int, draw: random.Random) -> bool | None:
     """Whether the equations hold at every point where all is defined; None where it is nowhere defined."""
-    if claim.table["kind"] == "relation" or claim.table.get("integral", {}).get("where"):
+    if claim.table["kind"] in ("relation", "value") or claim.table.get("integral", {}).get("where"):
         return claim.truth == "true"  # on a set that random points miss: known by construction
     with mpmath.workdps(DIGITS):
         numbers, defined = Numbers(claim), 0
@@ -741,7 +775,8 @@ def main() -> None:
         counts[outcome.claim.truth, outcome.verdict.partition(":")[0]] += 1
         seconds.append(outcome.seconds)
         if outcome.fault or (outcome.claim.truth == "true" and outcome.verdict != "holds"):
-            shown = outcome.claim.table.get("motion") or outcome.claim.table["integral"]
+            table = outcome.claim.table
+            shown = table.get("motion") or table.get("integral") or table["value"]
             print(outcome.fault or "missed", outcome.verdict, outcome.claim.family, outcome.reason, shown, flush=True)
     for (truth, verdict), number in sorted(counts.items()):
         print(f"{truth:6} {verdict:10} {number}")

@@ -130,6 +130,20 @@ def right_digits(text: str, off: Any) -> tuple[bool, int]:
     return off <= unit / 2, count
 
 
+def claim_of(random: Random) -> tuple[dict[str, Any], list[tuple[bool, int]]]:
+    """A claim of kind value, and of each of its numbers whether it is right, and how many of its digits."""
+    body, (start, q) = body_of(random), start_of(random)
+    time = f"{random.choice((-1, 1)) * random.randint(1, 10) / 10}"
+    values, expected = [], []
+    for quantity, numbers in known(body, start, q, time).items():
+        for component, true in enumerate(numbers, 1):
+            near = true + random.choice((0, 1, -1)) * LIB.mpf(10) ** -random.randint(1, 26) * random.random()
+            text = LIB.nstr(near, random.randint(1, 25), strip_zeros=False, min_fixed=-99, max_fixed=99)
+            values.append({"time": time, "quantity": quantity, "component": component, "number": text})
+            expected.append(right_digits(text, abs(number(text) - true)))
+    return {"name": "x", "kind": "value", "body": body, "start": start, "value": values}, expected
+
+
 def main() -> int:
     """Prints the counts; 1 where a verdict is false."""
     parser = argparse.ArgumentParser(description="Judge random published numbers.")
@@ -139,16 +153,7 @@ def main() -> int:
     random = Random(asked.seed)
     counts = {"right": 0, "wrong": 0, "undecided": 0, "false": 0}
     for _ in range(asked.bodies):
-        body, (start, q) = body_of(random), start_of(random)
-        time = f"{random.choice((-1, 1)) * random.randint(1, 10) / 10}"
-        values, expected = [], []
-        for quantity, numbers in known(body, start, q, time).items():
-            for component, true in enumerate(numbers, 1):
-                near = true + random.choice((0, 1, -1)) * LIB.mpf(10) ** -random.randint(1, 26) * random.random()
-                text = LIB.nstr(near, random.randint(1, 25), strip_zeros=False, min_fixed=-99, max_fixed=99)
-                values.append({"time": time, "quantity": quantity, "component": component, "number": text})
-                expected.append(right_digits(text, abs(number(text) - true)))
-        table = {"name": "x", "kind": "value", "body": body, "start": start, "value": values}
+        table, expected = claim_of(random)
         report = audit_claim(claim_from_table(table, "random"))
         for row, (right, digits) in zip(report.rows, expected, strict=True):
             said = (row.figures or {}).get("digits_right")

@@ -1,4 +1,4 @@
-"""Marks the tests of slow.txt as `slow`: whole files, or ``FILE::FUNCTION``, that take more than a second.
+"""Marks the tests of slow.txt as `slow`: ``FILE`` or ``FILE::FUNCTION``, of more than half a second in all its cases.
 
 And unloads the integrators that a test loaded from its own folder.
 """

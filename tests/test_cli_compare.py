@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import pytest
 import typer
 
+import heavytop as ht
 from heavytop.cli import run_command_line
 from support.reports import store
 from support.small_reports import error, report, row
@@ -159,3 +160,28 @@ def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch,
     assert "break_away_time" in Path("h.html").read_text()
     assert heavytop(monkeypatch, "history", "old", "same") == 0
     assert "Nothing changed" in capsys.readouterr().out
+
+
+def test_python_gives_what_the_commands_write(reports, monkeypatch, capsys) -> None:
+    commands = {
+        "history": ["history", "old", "same", "worse", "--html", "h.html", "--json"],
+        "compare": ["compare", "old", "worse", "--junit", "c.xml", "--markdown", "c.md", "--json"],
+        "show": ["show", "old", "--html", "s.html", "--markdown", "s.md"],
+        "export": ["export", "old", "--to", "csv"],
+        "shown": ["show", "old", "--json"],
+    }
+    printed = {}
+    for name, line in commands.items():
+        heavytop(monkeypatch, *line)
+        printed[name] = capsys.readouterr().out
+    over, beside, report = ht.history(["old", "same", "worse"]), ht.compare("old", "worse"), ht.read_report("old")
+    assert (json.loads(printed["history"]), Path("h.html").read_text()) == (over.to_json(), over.to_html())
+    assert json.loads(printed["compare"]) == beside.to_json()
+    assert (Path("c.xml").read_text(), Path("c.md").read_text()) == (beside.to_junit(), beside.to_markdown())
+    assert (Path("s.html").read_text(), Path("s.md").read_text()) == (report.to_html(), report.to_markdown())
+    assert (printed["export"], json.loads(printed["shown"])) == (report.export("csv"), report.to_json())
+    assert [over.names[i] for track in over.tracks for i in track.steps] == ["worse"]
+    assert "drift_energy_max" in repr(over)
+    with pytest.raises(ht.InputError, match="two reports or more"):
+        ht.history([report])
+    assert ht.history([report, "worse"]).to_json()["tracks"] == ht.history(["old", "worse"]).to_json()["tracks"]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from heavytop.api.events import events, poincare
     from heavytop.api.hunt import Hunt, hunt
     from heavytop.api.motions import Integrator, Propagated, ensemble, propagate, reference
-    from heavytop.api.reports import Comparison, Report, compare, read_report, run
+    from heavytop.api.reports import Comparison, History, Report, compare, history, read_report, run
     from heavytop.api.run_folder import read_survey
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.claims.audit.judge import Audit
@@ -35,7 +35,7 @@ _PLACES = {
     "api.events": ("events", "poincare"),
     "api.hunt": ("Hunt", "hunt"),
     "api.motions": ("Integrator", "Propagated", "ensemble", "propagate", "reference"),
-    "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
+    "api.reports": ("Comparison", "History", "Report", "compare", "history", "read_report", "run"),
     "api.run_folder": ("read_survey",),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
@@ -68,6 +68,7 @@ __all__ = [
     "Events",
     "HeavyTop",
     "HeavyTopError",
+    "History",
     "Hunt",
     "InputError",
     "Integrator",
@@ -92,6 +93,7 @@ __all__ = [
     "drift",
     "ensemble",
     "events",
+    "history",
     "holding",
     "hunt",
     "plot",

@@ -227,6 +227,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         ht.compare,
         {"baseline": "nowhere", "candidate": "nowhere", "policy": None, "floor": None, "loss": None},
     ),
+    "history": (ht.history, {"reports": ["nowhere", "nowhere"], "metric": "", "case": "*", "policy": None}),
 }
 
 

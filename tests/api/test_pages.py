@@ -56,6 +56,9 @@ def test_a_page_is_what_its_file_says_and_has_nothing_that_only_the_site_can_sho
     for name in ("", "../README", "no such page"):
         with pytest.raises(InputError, match="There is no page"):
             pages.page(name)
+    with pytest.raises(InputError) as caught:
+        pages.page("Compere")
+    assert caught.value.remedy == "Did you mean compare?  `heavytop docs` lists the topics."
 
 
 def test_without_pages_the_cause_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

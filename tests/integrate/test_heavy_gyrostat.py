@@ -270,6 +270,27 @@ def test_permanent_rotations_are_found_and_carry_the_attitude() -> None:
     assert not isinstance(find(HeavyTop(inertia, 1, n, (0, 0, 0)), start, HEAVY_GYROSTAT), Staude)
 
 
+def test_integrals_are_those_of_the_system_that_the_top_tells() -> None:
+    top, start = HeavyTop((3, 2, 1), 0, (0, 0, 0), (0, 0, 1)), CASES["euler"].start
+    names = [integral.name for integral in ht.holding(top, start)]
+    assert names == [integral.name for integral in ht.holding(top, start, HEAVY_GYROSTAT)]
+    assert names[:4] == ["gamma_squared", "area", "energy", "momentum_squared"]
+    with pytest.raises(InputError, match="rotor"):
+        ht.holding(top, start, ht.HEAVY_TOP)
+
+
+@pytest.mark.parametrize(
+    "name", ["kovalevskaya", "goryachev-chaplygin", "hess", "lagrange", "euler", "steklov", "dokshevich", "delone"]
+)
+def test_a_heavy_gyrostat_without_momentum_has_the_closed_forms_of_the_heavy_top(name) -> None:
+    case = CASES[name]
+    top = HeavyTop(case.top.inertia, case.top.weight, case.top.centre, (0, 0, 0))
+    found, known = find(top, case.start, HEAVY_GYROSTAT), find(case.top, case.start)
+    assert found.method.startswith("closed form")
+    for a, b in zip(found.state(Fraction(7, 3), 140), known.state(Fraction(7, 3), 140), strict=True):
+        assert a.overlaps(b)
+
+
 def test_no_closed_form_of_the_heavy_top_is_taken_for_a_top_with_a_rotor() -> None:
     """Each would forget k: of a top with weight the enclosure is the only one, and the heavy top refuses the data."""
     for name in ("euler", "lagrange", "kovalevskaya", "goryachev-chaplygin", "hess"):

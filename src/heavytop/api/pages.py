@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 
 from heavytop.errors import InputError, quoted
@@ -22,7 +23,9 @@ def page(topic: str) -> str:
     """The page as it was written, in Markdown; raises InputError for a topic without a page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
-        raise InputError(f"There is no page {quoted(topic)}.", "`heavytop docs` lists the topics.")
+        near = get_close_matches(name.lower(), files, 1)
+        remedy = f"Did you mean {near[0]}?  " if near else ""
+        raise InputError(f"There is no page {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
     return files[name].read_text("utf-8")
 
 

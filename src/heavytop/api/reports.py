@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from heavytop import records
@@ -21,10 +21,13 @@ from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import whole
+from heavytop.render import export as exports
+from heavytop.render import history as over
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
 from heavytop.store import store
 from heavytop.store.parquet import COLUMNS, lines
+from heavytop.top.vectors import ordered
 
 if TYPE_CHECKING:
     import pandas
@@ -51,6 +54,28 @@ class Report(Tabular, records.Report):
             raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
+    def export(self, to: str) -> str:
+        """The text of a file for another tool: ``to`` is bencher, github-action-benchmark, asv, junit or csv.
+
+        Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.  Raises
+        InputError for another tool.
+        """
+        return exports.export(self, arguments.text(to, "to"), KINDS)
+
+    def to_html(self) -> str:
+        """The page of `show --html`: one self-contained file."""
+        from heavytop.render.page import report_page
+
+        return report_page(self, KINDS)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `show --json`."""
+        return exports.to_json(self, KINDS)
+
+    def to_markdown(self) -> str:
+        """What `show --markdown` writes."""
+        return exports.to_markdown(self, KINDS)
+
     def _table(self) -> TitledTable:
         count = sum(failed(row, KINDS) for row in self.rows)
         title = f"Report of plan {self.plan.get('name', '')}: {len(self.rows)} rows, {self.verdict}"
@@ -71,6 +96,14 @@ class Comparison(Tabular, comparing.Differences):
 
     __slots__ = ()
 
+    def to_junit(self) -> str:
+        """What `compare --junit` writes: a test case a metric."""
+        return exports.comparison_junit(self)
+
+    def to_markdown(self) -> str:
+        """What `compare --markdown` writes: the findings, then a line for each row that changed."""
+        return exports.comparison_markdown(self)
+
     def _table(self) -> TitledTable:
         body = [
             list(map(printable, (row_name(f.row), metric_name(f), f.verdict.value, *values(f), f.reason)))
@@ -79,6 +112,33 @@ class Comparison(Tabular, comparing.Differences):
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
         notes += [printable(each.sentence) for each in self.motions if each.sentence]
         return TitledTable(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
+
+
+@dataclass(frozen=True, repr=False)
+class History(Tabular):
+    """Metrics over reports: ``names`` of the reports, the oldest first, and ``tracks``, one a metric of a row.
+
+    A track has ``row`` and ``metric``, its ``values``, one a report and None where that has none, and ``steps``: by the
+    index of a report the verdict on the change from the one before it, with the reason; the same is left out.
+    """
+
+    names: list[str]
+    tracks: list[over.Track]
+    reports: list[store.AnyReport]
+
+    def to_html(self) -> str:
+        """The page of `history --html`: a small chart a metric."""
+        return over.history_page(self.names, self.reports, self.tracks)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `history --json`."""
+        return over.history_json(self.names, self.tracks)
+
+    def _table(self) -> TitledTable:
+        heads = ("row", "metric", *(str(number) for number in range(1, len(self.names) + 1)))
+        notes = [printable(f"{number}  {name}") for number, name in enumerate(self.names, 1)]
+        title = f"{len(self.tracks)} metrics over {len(self.names)} reports"
+        return TitledTable(title, heads, [list(map(printable, over.cells(track))) for track in self.tracks], notes)
 
 
 def run(
@@ -190,6 +250,48 @@ def compare(
         surveys = beside(arguments.path(baseline, "baseline")), beside(arguments.path(candidate, "candidate"))
     found = comparing.compare(old, new, rules, KINDS, surveys=surveys)
     return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
+
+
+def history(
+    reports: Sequence[records.Report | PathLike],
+    *,
+    metric: str = "",
+    case: str = "*",
+    policy: PathLike | None = None,
+) -> History:
+    """Metrics over reports, with every step from one to the next.
+
+    Arguments:
+        reports: two or more, the oldest first: reports, or the folders or files of them.
+        metric: a pattern such as ``drift_*``; without it all metrics that changed, and no others.
+        case: a pattern for the cases.
+        policy: a TOML file of what counts as a step (`heavytop docs compare`).
+
+    Returns:
+        A :class:`History`.
+
+    Raises:
+        InputError: for fewer than two reports, and for what is no report or policy.
+    """
+    return read_history(reports, metric, case, policy, lambda: None)
+
+
+def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, read: Callable[[], None]) -> History:
+    """The same; ``read`` is called after each report."""
+    given = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
+    if len(given) < 2:
+        raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
+    rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
+    cases, metrics = policies.glob(arguments.text(case, "case")), policies.glob(arguments.text(metric, "metric") or "*")
+    names, found = [], []
+    for number, each in enumerate(given, 1):
+        ready = isinstance(each, records.Report)
+        names.append(f"report {number}" if ready else str(arguments.path(each, "reports")))
+        found.append(each if ready else store.read_brief(arguments.path(each, "reports"), KINDS))
+        read()
+    tracks = over.history(found, rules, KINDS)
+    tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
+    return History(names, [track for track in tracks if metric or track.steps], found)
 
 
 def _report(given: Any, what: str) -> records.Report:

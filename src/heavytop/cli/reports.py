@@ -83,28 +83,17 @@ def history(
     json: Json = False,
 ) -> int:
     """Show metrics over reports, with every step marked."""
-    from heavytop.comparison.noise import glob
-    from heavytop.kinds import KINDS
-    from heavytop.render import history as over
-    from heavytop.store import store
+    from heavytop.api.reports import read_history
+    from heavytop.render.history import history_text
 
-    if len(reports) < 2:
-        raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
-    rules, cases, metrics = _policy(policy, None, None), glob(case), glob(metric or "*")
-    read = _read(reports, store.read_brief)
-    tracks = over.history(read, rules, KINDS)
-    tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
-    if not metric:
-        tracks = [track for track in tracks if track.steps]
-    names = [str(path) for path in reports]
+    with counted("reading", len(reports), "reports", _REPORT_SECONDS) as advance:
+        found = read_history(reports, metric, case, policy, advance)
     if html is not None:
-        from heavytop.render.history import history_page
-
-        _write([(html, history_page(names, read, tracks))])
+        _write([(html, found.to_html())])
     if json:
-        print_json(over.history_json(names, tracks))
+        print_json(found.to_json())
     else:
-        show_on_terminal(over.history_text(names, tracks))
+        show_on_terminal(history_text(found.names, found.tracks))
     return 0
 
 
@@ -147,10 +136,9 @@ def show(
 
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
+    from heavytop.api.reports import read_report
     from heavytop.files import whole
-    from heavytop.kinds import KINDS
     from heavytop.store import parquet as tables
-    from heavytop.store import store
 
     if parquet is not None:
         tables.check_name(parquet)
@@ -161,18 +149,14 @@ def show(
     if not files:
         _print(report, full, json)
         return 0
-    found = store.read(report, KINDS)
+    found = read_report(report)
     with ExitStack() as stack:
         stack.enter_context(writing())
         if html is not None:
-            from heavytop.render.page import report_page
-
-            page = report_page(found, KINDS).encode()
+            page = found.to_html().encode()
             stack.enter_context(whole(html)).write(page)
         if markdown is not None:
-            from heavytop.render.export import to_markdown
-
-            stack.enter_context(whole(markdown)).write(to_markdown(found, KINDS).encode())
+            stack.enter_context(whole(markdown)).write(found.to_markdown().encode())
         if parquet is not None:
             tables.write(parquet, found.rows, found.plan)
     for path in files:
@@ -214,11 +198,9 @@ def export(
 
     Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.
     """
-    from heavytop.kinds import KINDS
-    from heavytop.render.export import export as exported
-    from heavytop.store import store
+    from heavytop.api.reports import read_report
 
-    text = exported(store.read(report, KINDS), to, KINDS)
+    text = read_report(report).export(to)
     if out is None:
         print(text, end="")
     else:

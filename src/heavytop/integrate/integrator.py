@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import FORMATS, decimal_text, log10
+from heavytop.precision import FORMATS, decimal_text, last_call, log10
 from heavytop.top.amplification import square_of_rate
 from heavytop.top.equations import SYSTEMS
 
@@ -176,12 +176,21 @@ def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None
     return math.isqrt(square.numerator // square.denominator)
 
 
+@last_call
+def _square_in_doubles(problem: Problem) -> float:
+    """The square of the rate at which the motion changes; inf where doubles do not hold it."""
+    try:
+        p, start = problem.parameters.mapped(float), tuple(map(float, problem.start.flat))
+        return float(square_of_rate(problem.system, p, start))
+    except (OverflowError, ZeroDivisionError):
+        return math.inf
+
+
 def _is_near(problem: Problem, end: Fraction) -> bool:
     """True only where the end is in reach by far; in doubles."""
     try:
-        p, start, span = problem.parameters.mapped(float), tuple(map(float, problem.start.flat)), float(end)
-        return bool(span * span * square_of_rate(problem.system, p, start) < _FAR_BELOW**2)
-    except (OverflowError, ZeroDivisionError):
+        return float(end) ** 2 * _square_in_doubles(problem) < _FAR_BELOW**2
+    except OverflowError:
         return False
 
 

@@ -97,11 +97,12 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             Text("\nNothing changed, or nothing matches. --metric '*' shows what did not change too.", style="bold"),
         )
     numbers = [str(number) for number in range(1, len(names) + 1)]
-    shown = table(["row", "metric", *numbers], map(_cells, tracks), words=2)
+    shown = table(["row", "metric", *numbers], map(cells, tracks), words=2)
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), shown)
 
 
-def _cells(track: Track) -> list[str]:
+def cells(track: Track) -> list[str]:
+    """A line of the table: row, metric, the value and the mark of each report."""
     marks = [MARK[track.steps[number][0]] if number in track.steps else " " for number in range(len(track.values))]
     values = [f"{short(value or '-')} {mark}" for value, mark in zip(track.values, marks, strict=True)]
     return [row_name(track.row), track.metric or "whole row", *values]

@@ -420,12 +420,14 @@ def largest(integral: Integral, p: Parameters, omega: Any) -> Any:
     return integral.value(p.mapped(_Magnitude), [*map(_Magnitude, (omega,) * 3), *map(_Magnitude, (1, 1, 1))]).size
 
 
-def holding(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> tuple[Integral, ...]:
+def holding(top: HeavyTop, start: State, system: System | None = None) -> tuple[Integral, ...]:
     """Every integral that holds for this top and start, found by exact rational tests on the exact data.
 
+    system: without it the heavy gyrostat of a top with a rotor, else the heavy top.
     Invariant relations (Goryachev-Chaplygin, Hess) are offered only for starts on them.
     """
     square = Integral("gamma_squared", gamma_squared, "every motion")
+    system = system or system_of(None, top)
     if system is GYROSTAT:
         return (square, Integral("area", area, "every motion"), *_of_gyrostat(top))
     with_rotor = system is HEAVY_GYROSTAT

@@ -46,7 +46,7 @@ from heavytop.exact.enclosure.step import (
     taylor_series,
 )
 from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Total
 from heavytop.precision import decimal_text
 from heavytop.top.equations import Parameters, System
 
@@ -136,11 +136,12 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
     bounds = _Bounds.of(tangent, step)
     if bounds is None:
         return None
-    centre = list(step.node.centre)
+    centre = step.node.centre
     origin, columns, errors = _end(step.series, tau), [], []
     for j in range(tangent.field.dimension):
-        beside = [value + ((k == j) << tangent.bits) for k, value in enumerate(centre)]
-        series = taylor_series(tangent.field, _centred(step, beside), tangent.precision, tangent.certified)
+        series = taylor_series(
+            tangent.field, _centred(step, _beside(centre, j, 1 << tangent.bits)), tangent.precision, tangent.certified
+        )
         error = bounds.end_error(tangent.field, series)
         if series is None or error is None:
             return None
@@ -157,6 +158,13 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
         [value - start for value in values] for start, values in zip(origin, zip(*columns, strict=True), strict=True)
     ]
     return StepDerivatives(rows, [error * _UP for error in errors], bounds.moved)
+
+
+def _beside(centre: Sequence[int], component: int, by: int) -> Sequence[int]:
+    """The centre with ``by`` ulps added to a component."""
+    if isinstance(centre, Total):
+        return centre.beside(component, by)
+    return [value + by * (k == component) for k, value in enumerate(centre)]
 
 
 def _centred(step: Step, centre: Sequence[int]) -> Node:

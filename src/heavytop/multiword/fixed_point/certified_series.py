@@ -79,6 +79,12 @@ class Total(Sequence[int]):
         grid, places = self._carrier.grid, self._carrier.places
         return list(_whole(self.words[places], grid))
 
+    def beside(self, component: int, by: int) -> Total:
+        """The same with ``by`` ulps added to a component."""
+        words, certified = self.words.copy(), self._carrier
+        words[certified.places[component]] = _words(self[component] + by, certified.grid)
+        return Total(words, certified)
+
     def __len__(self) -> int:
         return len(self._carrier.places)
 
