@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
-from functools import wraps
+from functools import lru_cache, wraps
 from numbers import Rational
 from operator import index, is_
 from typing import Any, TypeVar, cast
@@ -404,10 +404,15 @@ def quotient_text(value: Fraction, digits: int, rounding: str) -> str:
 
 def ratio_text(above: int, below: int, digits: int, rounding: str) -> str:
     """:func:`quotient_text` of above/below, which may have common factors: a large greatest one takes long to find."""
-    # nothing is left to decimal.DefaultContext, which is one for the whole process
-    context = Context(digits, rounding, Emin=MIN_EMIN, Emax=MAX_EMAX, capitals=1, clamp=0, flags=[], traps=[Overflow])
+    context = _context(digits, rounding)
     quotient = context.divide(Decimal(above), Decimal(below))
     return context.to_sci_string(quotient) if quotient else "0"
+
+
+@lru_cache(maxsize=64)
+def _context(digits: int, rounding: str) -> Context:
+    """Nothing is left to decimal.DefaultContext, which is one for the whole process; flags are not looked at."""
+    return Context(digits, rounding, Emin=MIN_EMIN, Emax=MAX_EMAX, capitals=1, clamp=0, flags=[], traps=[Overflow])
 
 
 def log10(value: Fraction) -> float | None:

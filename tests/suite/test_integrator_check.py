@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import monotonic, sleep
 
 import pytest
 
@@ -44,6 +45,7 @@ def solve(given):
         ("while abs(given.start[0]) > 1e9: time.sleep(0.1)", "huge", "note", "within 2 s; its process was ended"),
         ("if len(given.times) > 100: time.sleep(600)", "many times", "violated", "within 2 s; its process was ended"),
         ("if len(given.times) > 100: os._exit(1)", "many times", "violated", "It ended its whole process."),
+        ("if len(given.times) > 100: raise KeyboardInterrupt", "many times", "violated", "by KeyboardInterrupt."),
     ],
 )
 def test_what_was_found_before_a_part_that_hangs_stands(
@@ -59,3 +61,23 @@ def test_what_was_found_before_a_part_that_hangs_stands(
     assert (found[place].verdict, said in found[place].text) == (verdict, True)
     rest = [each.check for each in found[place + 1 :]]
     assert rest == ([] if verdict == "note" else ["rest of the contract"])
+
+
+def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) -> None:
+    """It holds the pipes of the process that forked it."""
+    fault = f"os.fork() or (open({str(tmp_path / 'left')!r}, 'a').write(f'{{os.getpid()}} '), time.sleep(600))"
+    (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", fault))
+    found = check(named(f"{tmp_path / 'mine.py'}:solve"))
+    assert not [each for each in found if each.verdict == "violated"]
+    left, wait = (tmp_path / "left").read_text().split(), monotonic() + 20
+    while any(alive(int(each)) for each in left) and monotonic() < wait:
+        sleep(0.05)
+    assert not any(alive(int(each)) for each in left)
+
+
+def alive(process: int) -> bool:
+    """Whether it runs: one that was killed may wait for its parent to notice."""
+    try:
+        return " Z " not in Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False

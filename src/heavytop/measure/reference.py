@@ -181,7 +181,7 @@ class KnownMotion:
         """Bits by which a ball is too wide; inf where it is not finite.  narrow: of :meth:`_narrow`."""
         if not value.is_finite():
             return math.inf
-        if self.as_written:
+        if self.as_written or value.is_exact():
             return 0
         if output.name != "position":
             if value.rel_one_accuracy_bits() >= bits_of(self.digits):

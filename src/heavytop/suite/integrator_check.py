@@ -21,9 +21,10 @@ from heavytop.integrate import peers
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
+from heavytop.integrate.peers.contract import said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
-from heavytop.processes import ChildContext
+from heavytop.processes import ChildContext, end_pool, lead_group, new_mark
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
@@ -64,8 +65,12 @@ def check(which: str | IntegratorSource) -> list[Checked]:
             return list(_Contract(msgspec.structs.replace(which, timeout=str(limit))).checks())
         finally:
             close_all()
-    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+    mark = new_mark()
+    pool = ProcessPoolExecutor(1, mp_context=ChildContext(mark), initializer=lead_group)
+    try:
         return list(_in_child(pool, which))
+    finally:
+        end_pool(pool, None, mark)
 
 
 def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Iterator[Checked]:
@@ -74,8 +79,16 @@ def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Itera
         seconds = _PATIENCE_OF.get(name, _PATIENCE)
         ended = True
         try:
-            found = pool.submit(_part, which, place).result(timeout=seconds)
-            ended = False
+            future = pool.submit(_part, which, place)
+            # an interrupt that comes from the child was raised by the integrator
+            error = future.exception(timeout=seconds)
+            if error is None:
+                found, ended = future.result(), False
+            elif isinstance(error, HeavyTopError | BrokenProcessPool):
+                raise error
+            else:
+                cause = ": ".join(filter(None, (type(error).__name__, said(error))))
+                found = Checked(name, "violated", f"It left its process by {cause}.")
         except TimeoutError:
             for process in list((pool._processes or {}).values()):
                 process.kill()

@@ -216,7 +216,12 @@ class Contained:
         if self.declared is not None and asked:
             self.declared.require(self.name, system, asked[-1], precision)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
-        *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **setting})))
+        given: list[Any]
+        own: dict[str, Any]
+        try:
+            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **setting})))
+        except pickle.PicklingError as error:
+            raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
             began = perf_counter()
