@@ -22,6 +22,8 @@ from uuid import uuid4
 
 MARK = "HEAVYTOP_GUARD"
 """The variable of the environment by which a guard finds what left its process group."""
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Python's own: a file such as random.py in the working directory is not taken for a module."""
 _KILL_ALL = f"""read -r _
 for file in $(grep -ls "{MARK}=$1" /proc/[0-9]*/environ); do
   process=${{file#/proc/}}
@@ -40,9 +42,17 @@ class _Child(SpawnProcess):
     A daemon of multiprocessing, such as the worker of Dask, may start one: it ends with its parent, however that ends.
 
     mark: what its environment holds from the beginning, for :func:`kill_marked`; nothing where that is empty.
+    own_path: whether :data:`SAFE_PATH` is set while it begins alone.
     """
 
     mark = ""
+    own_path = False
+
+    def run(self) -> None:
+        """In the process: what it starts in turn finds modules as usual."""
+        if self.own_path:
+            os.environ.pop(SAFE_PATH, None)
+        super().run()
 
     def start(self) -> None:
         config = current_process()._config  # type: ignore[attr-defined]
@@ -67,29 +77,29 @@ class _Child(SpawnProcess):
                 return data
 
             spawn.get_preparation_data = without_script
-            resource_tracker.ensure_running()  # which outlives the child, and so has no mark
+            process_obj.own_path = SAFE_PATH not in os.environ
             try:
-                with _environment(process_obj.mark):
-                    return SpawnProcess._Popen(process_obj)
+                with _environment({SAFE_PATH: os.environ.get(SAFE_PATH, "1")}):
+                    resource_tracker.ensure_running()  # which outlives the child, and so has no mark
+                    with _environment({MARK: process_obj.mark} if process_obj.mark else {}):
+                        return SpawnProcess._Popen(process_obj)
             finally:
                 spawn.get_preparation_data = prepare
 
 
 @contextmanager
-def _environment(mark: str) -> Iterator[None]:
-    """What is started meanwhile has the mark: a process shows the environment that it began with, forked ones too."""
-    if not mark:
-        yield
-        return
-    former = os.environ.get(MARK)
-    os.environ[MARK] = mark
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """What is started meanwhile has these: a process shows the environment that it began with, forked ones too."""
+    former = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
         yield
     finally:
-        if former is None:
-            del os.environ[MARK]
-        else:
-            os.environ[MARK] = former
+        for name, value in former.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 class ChildContext(SpawnContext):
@@ -102,6 +112,8 @@ class ChildContext(SpawnContext):
     def __init__(self, mark: str = "") -> None:
         super().__init__()
         self._mark = mark
+        with _starting, _environment({SAFE_PATH: os.environ.get(SAFE_PATH, "1")}):
+            resource_tracker.ensure_running()  # the first lock of a pool would start it, from the working directory
 
     def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
         """A process that is not yet started."""

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
 from io import StringIO
@@ -20,6 +21,7 @@ from rich.console import Console
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
+from heavytop.processes import ChildContext
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.render.terminal import brief, summary
 from heavytop.store.checks import contradictions
@@ -315,3 +317,17 @@ def test_a_scheduler_that_does_not_answer_is_a_clear_error(tasks, monkeypatch: p
     for address in ("tcp://127.0.0.1:9", "nonsense"):
         with pytest.raises(InputError, match="No scheduler answers"):
             measured(tasks, 1, address)
+
+
+def test_a_file_with_the_name_of_a_module_is_no_module_for_workers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where Python itself is started in that folder the file counts, as always."""
+    (tmp_path / "pickle.py").write_text("raise RuntimeError('the file of the user')")
+    monkeypatch.chdir(tmp_path)
+    alone = [sys.executable, "-c", "import pickle"]
+    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+        found = pool.submit(eval, "__import__('pickle').__file__").result()
+        started = pool.submit(subprocess.call, alone, stderr=subprocess.DEVNULL).result()
+    assert not Path(found).is_relative_to(tmp_path)
+    assert started == 1
