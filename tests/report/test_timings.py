@@ -131,7 +131,7 @@ def test_a_plan_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert timed.seconds.keys() == {*plain.seconds, "band"}
     assert timed.seconds["repeats"] == 11
     assert 0 <= timed.seconds["band"] < 2
-    with pytest.raises(InputError, match="bool"):
+    with pytest.raises(InputError, match="true or false"):
         ran(tmp_path, "timings = 1\n")
 
 

@@ -216,7 +216,7 @@ def read_report(path: PathLike) -> Report:
             or inconsistent in itself.
     """
     found = store.read(arguments.path(path, "path"), KINDS)
-    return Report(found.schema, found.plan, found.environment, found.rows)
+    return Report(found.schema, found.plan, found.environment, found.rows, found.beside)
 
 
 def compare(
