@@ -1,4 +1,4 @@
-"""Marks the tests of slow.txt as `slow`: ``FILE`` or ``FILE::FUNCTION``, of more than half a second in all its cases.
+"""Marks the tests of slow.txt as `slow`: ``FILE`` or ``FILE::FUNCTION``, a third of a second in all its cases.
 
 And unloads the integrators that a test loaded from its own folder.
 """

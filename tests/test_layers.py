@@ -2,6 +2,7 @@
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,14 @@ MAY_IMPORT = {
 } | {room: GROUND.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
+
+
 def imports(path: Path) -> set[str]:
     found = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -81,14 +87,14 @@ def test_only_one_file_builds_engines_of_heyoka() -> None:
 
 def test_only_the_command_line_prints() -> None:
     for path in FILES:
-        calls = [n for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Call)]
+        calls = [n for n in ast.walk(parsed(path)) if isinstance(n, ast.Call)]
         if path.parent.name != "cli":
             assert not [c for c in calls if isinstance(c.func, ast.Name) and c.func.id == "print"], path
 
 
 def test_the_name_of_a_kind_stands_in_its_own_file() -> None:
     for path in FILES:
-        tree = ast.parse(path.read_text("utf-8"))
+        tree = parsed(path)
         said = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
         # `audit` and `score` are commands too, and the rows of a score are made by its room
         own = {path.stem} if path.parent.name == "kinds" else set()
@@ -107,7 +113,7 @@ def test_no_files_import_one_another_in_a_circle() -> None:
 
 def used_by(path: Path) -> set[str]:
     """What a file imports, at its head or when it is used; not for types alone."""
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = parsed(path)
     for_types = {
         id(node)
         for block in ast.walk(tree)
@@ -142,7 +148,7 @@ def test_a_public_class_name_has_one_meaning() -> None:
     places = Counter(
         node.name
         for path in SOURCE.rglob("*.py")
-        for node in ast.parse(path.read_text("utf-8")).body
+        for node in parsed(path).body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert {name for name, count in places.items() if count > 1} == TWO_MEANINGS
