@@ -56,7 +56,7 @@ class Precision:
 DOUBLE = Precision("double", 53)
 EXTENDED = Precision("extended", 64)
 DOUBLE_DOUBLE = Precision("double-double", 106)
-"""The sum of two doubles; its numbers are handed over as heyoka's real of 106 bits.  Of ``multiword`` alone."""
+"""The sum of two doubles; its numbers are returned as heyoka's real of 106 bits.  Of ``multiword`` alone."""
 QUAD = Precision("quad", 113)
 FORMATS = DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD
 

@@ -1,4 +1,4 @@
-"""Pictures for a page: axes by matplotlib, handed over as inline SVG that takes its colours and its font from the page.
+"""Pictures for a page: axes by matplotlib, given as inline SVG that takes its colours and its font from the page.
 
 Both axes of a logarithmic plot carry decimal logarithms, because errors such as 1e-997 are no floats.
 """

@@ -93,7 +93,7 @@ class Fault:
     """heyoka in double, and what is wrong with it.
 
     options: those of `engines.compiled` that differ.  top: what is integrated in the place of the one asked for.
-    stepping: how steps are taken.  states: what is handed over in the place of the states.  stops: the part of the
+    stepping: how steps are taken.  states: what is returned in the place of the states.  stops: the part of the
     samples that is reached; silent: the run says nothing of having stopped.  detectable: whether the suite's detectors
     are known to see it.
     """
