@@ -184,6 +184,7 @@ OmegaSpace = Annotated[str | None, typer.Option(help="The same in space axes, wi
 Gamma = Annotated[str | None, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0, body to space.")]
 Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
+AxisAngle = Annotated[str | None, typer.Option(help="Attitude as x,y,z:angle; radians, or 30deg.")]
 Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
 Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
 Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
@@ -225,6 +226,7 @@ def propagate(
     quaternion: Quaternion = None,
     euler: Euler = None,
     matrix: Matrix = None,
+    axis_angle: AxisAngle = None,
     precision: Annotated[
         str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
@@ -265,6 +267,7 @@ def propagate(
         "quaternion": quaternion,
         "euler": euler,
         "matrix": matrix,
+        "axis_angle": axis_angle,
     }
     require_one_output(csv, latex, json)
     top, start, which = _motion(given, case, system, normalize)
@@ -320,6 +323,7 @@ def reference(
     quaternion: Quaternion = None,
     euler: Euler = None,
     matrix: Matrix = None,
+    axis_angle: AxisAngle = None,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
     rotor: Rotor = None,
     system: SystemName = None,
@@ -359,6 +363,7 @@ def reference(
         "quaternion": quaternion,
         "euler": euler,
         "matrix": matrix,
+        "axis_angle": axis_angle,
     }
     require_one_output(csv, latex, json)
     top, start, which = _motion(given, case, system, normalize)
@@ -462,7 +467,7 @@ def _motion(
 
 
 def _value(key: str, text: str | None) -> Any:
-    return text if text is None or key in ("weight", "mass", "gravity", "about", "euler") else numbers(text)
+    return text if text is None or key in ("weight", "mass", "gravity", "about", "euler", "axis_angle") else numbers(text)
 
 
 def _of_case(name: str, system: str | None, others: list[str]) -> Any:

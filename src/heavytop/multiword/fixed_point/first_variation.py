@@ -1,0 +1,303 @@
+"""Taylor coefficients of first variations along a step, on its grid of K words, with a proven bound of what they lack.
+
+Along the polynomial p = Σ b_n τⁿ of a step, with y' = h f(y) and f = Q(y, y) + L y, a column
+
+    v' = h Df(p) v + h G(p),     v(0) = 0 or a unit vector,     G = ∂f/∂θ of a datum θ, or 0,
+
+has the coefficients v_(n+1) = h (Σ_m 2 Q(b_m, v_(n−m)) + L v_n + G_n)/(n + 1).  In the lanes of
+:mod:`heavytop.multiword.codegen.recurrence` the products are Σ L(b_m) ∘ R(v_(n−m)) + L(v_m) ∘ R(b_(n−m)): twice those
+of the motion, in as many words.  G is of the same form as f, and its products are those of the motion: they are summed
+once for all data.  A column ends at the order N of the step.
+
+*What coefficients lack.*  The proof is that of :mod:`heavytop.multiword.fixed_point.certified_series`, with words of L
+and R that bound those of b and of v alike and with T = 2 (n + 1) products in a sum.  Where there is a datum, the field
+has twice the sources; the gathered sums of b err by ε(n + 1) more and are multiplied by at most 1, so that 3 (n + 1)
+products bound both.  Hence, with T = 2 or 3 times n + 1,
+
+    |v_(n+1) − h (…)_n/(n + 1)| ≤ (H (2 ε(T) + ε' + κ) + ½ g)/(n + 1) + ¾ g.
+
+A column need not become smaller from its first orders on, as a motion does: its leading words count as 0 where they
+were 0 in several orders one after another.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ldexp
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    DOUBLES,
+    INT,
+    INT_POINTER,
+    INT_VECTOR,
+    INTEGERS,
+    POINTER,
+    Doubles,
+    Machine,
+    Value,
+    compiled,
+    doubles,
+    function,
+    once,
+    pointer,
+)
+from heavytop.multiword.codegen.recurrence import Coefficients, turned
+from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, carried, component
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, components, whole
+from heavytop.multiword.fixed_point.fixed_point_run import words_of_rows
+from heavytop.multiword.fixed_point.products import WordRows
+from heavytop.multiword.fixed_point.steps import FIRED, SeriesCode, most_orders, raises_of
+from heavytop.top.equations import System
+
+_QUIET = 6
+"""Orders one after another in which words are 0 before they count as 0: as many as the state has components."""
+_UP = 1 + 2.0**-40
+
+
+class _ColumnRows(WordRows):
+    """Those of a column.  places: behind those of a motion, for how many orders the first u + 1 words were 0."""
+
+    def begin(self, y: list[Value], wide: Value) -> Value:
+        for k in range(self.grid.words):
+            self.code.builder.store(self.code.integer(0), self._quiet(k))
+        return WordRows.begin(self, y, wide)
+
+    def _quiet(self, k: int) -> Value:
+        return self.code.address(self.places, self.grid.words + 2 + k)
+
+    def _leading_zeros(self, y: list[Value], before: Value) -> Value:
+        code, b = self.code, self.code.builder
+        count, only = code.integer(0), ir.Constant(ir.IntType(1), 1)
+        for k in range(self.grid.words - 1):
+            nothing = b.fcmp_ordered("==", code.largest(code.absolute(y[k])), ir.Constant(DOUBLE, 0.0))
+            only = b.and_(only, nothing)
+            longer = b.add(b.load(self._quiet(k)), code.integer(1))
+            quiet = b.select(only, longer, code.integer(0))
+            b.store(quiet, self._quiet(k))
+            count = b.select(b.icmp_signed(">=", quiet, code.integer(_QUIET)), code.integer(k + 1), count)
+        return b.select(b.icmp_signed(">", count, before), count, before)
+
+
+@dataclass(slots=True)
+class _ColumnCode(SeriesCode):
+    """Writes ``column(state, constants, inverses, rows, sums, places, seen, factor, raises, result, motion, known,
+    order)`` and ``column_of_data(…, order, gathered, slopes)``.
+
+    As ``series``, for a column from ``state`` on.  motion, known: rows and places of the motion.  order: N.
+    gathered: what ``gather`` gives.  slopes: the words of G, as the constants are those of f.
+    """
+
+    of_data: bool = False
+    kernels: Sequence[Value] = ()
+    n: Value = None
+
+    def write(self) -> Value:
+        """The function; gives the order, or FIRED."""
+        arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER, POINTER, INT_POINTER, INT]
+        if self.of_data:
+            arguments += [POINTER, POINTER]
+        name = "column_of_data" if self.of_data else "column"
+        self.made, self.code = function(self.module, name, INT, arguments)
+        state, _, _, rows, sums, places, seen, _, _, result, motion, known, order = self.made.args[:13]
+        code, b, grid = self.code, self.code.builder, self.grid
+        words, room = grid.words, most_orders(grid) + 2
+        self.rows = _ColumnRows(code, grid, 1, room, rows, sums, places, seen, list(self.kernels))
+        along = WordRows(code, grid, 1, room, motion, sums, known, seen, list(self.kernels))
+        first = [code.load(state, 8 * k) for k in range(words)]
+        code.store(code.zero, seen, 0)
+        wide = self.rows.begin(first, code.zero)
+        values = code.loop(0, order, lambda n, v: self._next(n, v, along), [code.integer(0), wide, *first, *first])
+        bits = b.and_(code.any_bit(b.bitcast(code.load(seen, 0), INT_VECTOR)), code.integer(EXPONENT_BITS))
+        small = b.fcmp_ordered("<", code.largest(values[1]), ir.Constant(DOUBLE, 1.0))
+        total = carried(code, grid, carried(code, grid, values[2 + words :]))
+        for k, word in enumerate(total):
+            code.store(word, result, 8 * k)
+        quiet = b.and_(b.icmp_signed("==", bits, code.integer(0)), small)
+        b.ret(b.select(quiet, order, code.integer(FIRED)))
+        return self.made
+
+    def _next(self, n: Value, values: list[Value], along: WordRows) -> list[Value]:
+        """Zeros, the largest word, v_(n+1) and the sum up to it."""
+        code, words, rows = self.code, self.grid.words, self.rows
+        assert isinstance(rows, WordRows)
+        zeros, wide, y, total = values[0], values[1], values[2 : 2 + words], values[2 + words :]
+        self.n, all_words = n, code.integer(words - 1)
+        rows.begin_sums()
+        rows.add_products(n, (along, all_words), (rows, zeros), 0)
+        rows.add_products(n, (rows, zeros), (along, all_words), 0)
+        rates, wide = self._rates(0, rows.end_sums(), y, wide)
+        raised, wide = self._raised(rates, wide)
+        quotient, wide = self._divided(n, self._times(raised), wide)
+        following, zeros, wide = rows.keep(code.builder.add(n, code.integer(1)), quotient, zeros, wide)
+        return [zeros, wide, *following, *(code.add(a, c) for a, c in zip(total, following, strict=True))]
+
+    def sources(self, vector: int, gathered: list[Value], y: list[Value]) -> list[tuple[list[Value], list[Value]]]:
+        own = SeriesCode.sources(self, vector, gathered, y)
+        if not self.of_data:
+            return own
+        code, words = self.code, self.grid.words
+        at = code.address(self.made.args[13], code.builder.mul(self.n, code.integer(16 * words)))
+        sums, b_n = ([code.load(at, 8 * (words * half + k)) for k in range(words)] for half in range(2))
+        slopes = self.made.args[14]
+        for k, (_, source) in enumerate(SeriesCode.sources(self, vector, sums, b_n)):
+            own.append(([code.load(slopes, 8 * (words * k + i)) for i in range(words)], source))
+        return own
+
+    def write_gather(self) -> None:
+        """Write ``gather(rows, places, sums, seen, order, result)``: the gathered sums of b and b_n, for n < order."""
+        arguments = [POINTER, INT_POINTER, POINTER, POINTER, INT, POINTER]
+        made, self.code = function(self.module, "gather", ir.VoidType(), arguments)
+        rows, places, sums, seen, order, result = made.args
+        code, b, words = self.code, self.code.builder, self.grid.words
+        kept = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, places, seen, list(self.kernels))
+        code.store(code.zero, seen, 0)
+
+        def one(n: Value, _: list[Value]) -> None:
+            products = kept.products(n, code.integer(words - 1), 0)
+            b_n = [component(code, word) for word in kept.stored(n, 0)]
+            at = b.mul(n, code.integer(16 * words))
+            for k, word in enumerate([*self._gathered(carried(code, self.grid, products)), *b_n]):
+                code.store(word, result, b.add(at, code.integer(8 * k)))
+
+        code.loop(0, order, one, [])
+        b.ret_void()
+
+
+@once
+def machine(grid: Grid, system: System, data: bool) -> Machine:
+    """``column``, and for data ``gather`` and ``column_of_data``."""
+    module = ir.Module("first_variation")
+    kernels = WordRows.write_kernels(module, grid, WordRows.size(grid, 1, 1).row, False)
+    pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
+    integer = ctypes.c_int64
+    signature = [*pointers, ctypes.c_double, integer, DOUBLES, DOUBLES, INTEGERS, integer]
+    _ColumnCode(module, grid, system, 1, False, of_data=False, kernels=kernels).write()
+    signatures: dict[str, tuple[Any, Sequence[Any]]] = {"column": (integer, signature)}
+    if data:
+        code = _ColumnCode(module, grid, system, 1, False, of_data=True, kernels=kernels)
+        code.write()
+        code.write_gather()
+        signatures["column_of_data"] = (integer, [*signature, DOUBLES, DOUBLES])
+        signatures["gather"] = (None, [DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer, DOUBLES])
+    return compiled(module, signatures)
+
+
+@dataclass(frozen=True, slots=True)
+class WordColumns:
+    """Φ, and σ of each datum, as polynomials of the order of the step; whole ulps, a list of components each.
+
+    total: Σ v_n.  values: every v_n, where they were asked for.  sizes: upper bounds of |v_n|, shape (columns, N + 1).
+    rounding: bounds of Σ_(n < N) |v_(n+1) − h (…)_n/(n + 1)| in ulps, of any column of Φ and of any of σ.
+    """
+
+    total: list[list[int]]
+    values: list[list[list[int]]] | None
+    sizes: Doubles
+    rounding: tuple[float, float]
+
+    def scaled(self, rate: int) -> Doubles:
+        """Upper bounds of 2^(rate n) |v_n|."""
+        return numpy.ldexp(self.sizes, rate * numpy.arange(self.sizes.shape[1]))
+
+
+class CertifiedColumns:
+    """The columns beside one motion on one grid; any thread may ask.
+
+    slopes: G of each datum over the lanes of the motion, in its units.
+    """
+
+    def __init__(self, certified: CertifiedSeries, slopes: Sequence[Coefficients] = ()) -> None:
+        self.certified, self.data = certified, bool(slopes)
+        problem, grid = certified.problem, certified.grid
+        self.machine = machine(grid, problem.system, self.data)
+        rows = [row for given in slopes for row in given.vectors[0]]
+        words = words_of_rows(rows, grid, Fraction(1, 2**certified.excess)) if rows else doubles(0)
+        size = 8 * grid.words * (1 + len(turned(problem.system)))
+        self._slopes = [words[size * k : size * (k + 1)] for k in range(len(slopes))]
+
+    def columns(self, centre: Sequence[int], halvings: int, values: bool = False) -> WordColumns | None:
+        """Beside the step from ``centre`` with h = 2^-halvings; None where there are none."""
+        certified, words = self.certified, self.certified.grid.words
+        order = certified.computed(centre, halvings)
+        if order < 0:
+            return None
+        own = _Scratch(certified, self.data)
+        widest = own.measured(certified, certified.scratch().pointers[3], order)[1].copy()
+        factor, raises = raises_of(certified.excess - halvings)
+        if self.data:
+            along = certified.scratch().pointers
+            self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, pointer(own.gathered))
+        found, sizes, rounding = [], [], []
+        for group, count in enumerate((6, len(self._slopes))):
+            wide, added = widest.copy(), numpy.zeros((words, 8))
+            for place in range(count):
+                if not self._column(own, group, place, order, (certified.sign * factor, raises)):
+                    return None
+                size, of_words, summed = own.measured(certified, own.pointers[3], order)
+                numpy.maximum(wide, of_words, out=wide)
+                numpy.maximum(added, summed, out=added)
+                sizes.append(size)
+                found.append(own.values(certified, order, values))
+            scale = ldexp(1.0, certified.excess - halvings)
+            bound = certified.bound(wide, added, order, scale, 2 + group, 1 + group) if count else 0.0
+            if bound is None:
+                return None
+            rounding.append(bound)
+        totals, all_values = zip(*found, strict=True)
+        return WordColumns(
+            list(totals), list(all_values) if values else None, numpy.array(sizes), (rounding[0], rounding[1])
+        )
+
+    def _column(self, own: _Scratch, group: int, place: int, order: int, length: tuple[float, int]) -> bool:
+        """Compute one column into its scratch; whether it stands."""
+        certified = self.certified
+        along = certified.scratch().pointers
+        own.state[:] = 0
+        if group == 0:
+            own.state[place] = 1.0
+        arguments = [*own.pointers, *length, pointer(own.result), along[3], along[5], order]
+        if group == 0:
+            return int(self.machine.functions["column"](*arguments)) >= 0
+        arguments += [pointer(own.gathered), pointer(self._slopes[place])]
+        return int(self.machine.functions["column_of_data"](*arguments)) >= 0
+
+
+class _Scratch:
+    """What columns are computed in."""
+
+    def __init__(self, certified: CertifiedSeries, data: bool) -> None:
+        grid, orders = certified.grid, most_orders(certified.grid) + 2
+        room = WordRows.size(grid, 1, orders)
+        self.state, self.result, self.rows = doubles(8 * grid.words), doubles(8 * grid.words), doubles(room.rows)
+        self.gathered = doubles(16 * grid.words * orders if data else 0)
+        places = numpy.zeros(room.places + grid.words, numpy.int64)
+        kept = [self.state, certified.constants, certified.inverses, self.rows, doubles(room.sums), places, doubles(8)]
+        self._kept: list[Any] = kept
+        self.pointers = [pointer(array) for array in kept]
+        self._nearest, self._sizes = doubles(8 * orders), doubles(8 * orders)
+        self._widest, self._added = doubles(16 * grid.words), doubles(8 * grid.words)
+        self._measures = [pointer(each) for each in (self._nearest, self._sizes, self._widest, self._added)]
+
+    def measured(self, certified: CertifiedSeries, rows: Any, order: int) -> tuple[Doubles, Doubles, Doubles]:
+        """Of such rows: upper bounds of |v_n|, the largest words of R and L, and Σ |word k|."""
+        certified.extents(rows, order, *self._measures)
+        sizes = numpy.maximum.reduce(self._sizes[: 8 * (order + 1)].reshape(-1, 8), 1) * _UP
+        words = certified.grid.words
+        return sizes, self._widest.reshape(2, words, 8), self._added.reshape(words, 8)
+
+    def values(self, certified: CertifiedSeries, order: int, values: bool) -> tuple[list[int], list[list[int]] | None]:
+        """Σ v_n of each component, and every v_n where they are asked for."""
+        grid = certified.grid
+        total = whole(self.result.reshape(grid.words, 8).T[:6], grid).tolist()
+        if not values:
+            return total, None
+        left = self.rows[: 16 * grid.words * (order + 1)].reshape(order + 1, 2, grid.words, 8)[:, 1]
+        return total, [whole(each, grid).tolist() for each in components(left)]
