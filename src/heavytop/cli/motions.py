@@ -467,7 +467,8 @@ def _motion(
 
 
 def _value(key: str, text: str | None) -> Any:
-    return text if text is None or key in ("weight", "mass", "gravity", "about", "euler", "axis_angle") else numbers(text)
+    whole = ("weight", "mass", "gravity", "about", "euler", "axis_angle")
+    return text if text is None or key in whole else numbers(text)
 
 
 def _of_case(name: str, system: str | None, others: list[str]) -> Any:
