@@ -47,10 +47,12 @@ def used(known: Validated, words: int, extreme: bool, random: Random) -> tuple[f
     for column, sizes in zip(found.values, found.sizes, strict=True):
         for together, size in zip(zip(*column, strict=True), sizes, strict=True):
             assert max(map(abs, together)) <= Fraction(size) * 2**grid.total
+    more = len(flat[0]) - own.order - 1
+    padded = [[*component, *[0] * more] for component in own.values]
     shares = []
     for count, data, bound in zip((36, 72), ([], tangent.data), found.rounding, strict=True):
         together = derivatives.Together.of(motion.field, [datum.field for datum in data])
-        off = lacking(together, Whole([*own.values, *flat[:count]], grid.total), grid.total, halvings)
+        off = lacking(together, Whole([*padded, *flat[:count]], grid.total), grid.total, halvings)[: own.order]
         shares.append(float(sum(off) / Fraction(bound)))
     return shares[0], shares[1]
 

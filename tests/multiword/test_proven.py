@@ -145,7 +145,8 @@ def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
     each, once = certified_series._error(grid, numpy.zeros(2 * words - 1), orders)
     for scale in (0.0, 2.0**20):
         sums = [
-            Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(certified._of_constants)) for n in range(1, 41)
+            Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(certified._of_constants[0]))
+            for n in range(1, 41)
         ]
         total = sum((part + Fraction(1, 2)) / n + Fraction(3, 4) for n, part in enumerate(sums, 1))
         assert total <= Fraction(certified.bound(widest, added, orders, scale)) <= 2 * total

@@ -35,6 +35,7 @@ from heavytop.exact.enclosure.step import (
     Node,
     Quadratic,
     Step,
+    StepSeries,
     Whole,
     falling,
     horner,
@@ -62,16 +63,17 @@ from heavytop.top.equations import Parameters, System
 #
 #     Φ' = h Df(y) Φ, Φ(0) = 1,     σ' = h Df(y) σ + h G(y), σ(0) = 0,     G = ∂f/∂θ, again of degree two.
 #
-# Their columns are computed along the polynomial p = Σ b_n τⁿ of the step, as polynomials v = Σ v_n τⁿ of the same
-# order N: in words (:mod:`heavytop.multiword.fixed_point.first_variation`) or in exact integers, where the columns and
-# the motion are one field of degree two.  What v lacks is its defect E = v' − h Df(p) v − h G(p).  Below N it is what
-# rounding left, ρ_n; from N on it is known.  With β_n = |b_n|, ν_n = |v_n| and |G(y)| ≤ q_G |y|² + l_G |y|, the
-# integral of |E| is at most
+# Their columns are computed along the polynomial p = Σ b_n τⁿ of the step, as polynomials v = Σ v_n τⁿ of its order N
+# or, where that leaves too much, of a larger one: in words
+# (:mod:`heavytop.multiword.fixed_point.first_variation`) or in exact integers, where the columns and the motion are one
+# field of degree two.  What v lacks is its defect E = v' − h Df(p) v − h G(p).  Below N it is what rounding left, ρ_n;
+# from N on it is known.  With β_n = |b_n|, ν_n = |v_n| and |G(y)| ≤ q_G |y|² + l_G |y|, the integral of |E| is at most
 #
 #     Δ = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (2q Σ_{j+k=n} β_j ν_k + l ν_n + q_G Σ_{j+k=n} β_j β_k + l_G β_n)/(n + 1).      (a)
 #
-# *Theorem.*  A motion y of the step stays within W of p, so that R = Σ β_n + W bounds both, and
-# Λ = h (2q (Σ β_n/(n + 1) + W) + l) the integral of |h Df(y)|.  For the column u along y that v stands for,
+# *Theorem.*  A motion y of the step stays within W of p (integers go on with the b_n until the columns are small too: W
+# is larger by the sum of those), so that R = Σ β_n + W bounds both, and Λ = h (2q (Σ β_n/(n + 1) + W) + l) the integral
+# of |h Df(y)|.  For the column u along y that v stands for,
 #
 #     |u − v| ≤ e^Λ (Δ + h W (2q Σ ν_n + 2 q_G R + l_G)),                                                           (b)
 #
@@ -164,10 +166,16 @@ class Columns(Protocol):
 
 @dataclass(frozen=True)
 class _WholeColumns:
-    """Columns in exact integers, each rounded once."""
+    """Columns in exact integers, each rounded once.
+
+    motion: the polynomial that they were computed along, of their own order.  beyond: Σ |b_n| in ulps of the orders
+    that it has more than the step.
+    """
 
     values: list[list[list[int]]]
     precision: int
+    motion: Whole
+    beyond: float
 
     @property
     def total(self) -> list[list[int]]:
@@ -209,7 +217,7 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
     of_phi, of_sigma, moved = errors
     rounding, ends = 0.0, found.total
     if found.values is not None:
-        rounding = step.order / 2 + 1
+        rounding = len(found.values[0][0]) / 2 + 1
         ends = [[horner(component, tau) for component in column] for column in found.values]
     size = tangent.field.dimension
     bounds = [(of_phi if k < size else of_sigma) + rounding for k in range(tangent.width)]
@@ -227,21 +235,29 @@ def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
     found = coefficients(tangent.together, start, tangent.precision, step.node.halvings)
     if found is None:
         return None
-    length, after = step.order + 1, found[size:]  # they become small later than the motion does
-    columns = [[component[:length] for component in after[k : k + size]] for k in range(0, len(after), size)]
-    return _WholeColumns(columns, tangent.precision)
+    own, after = found[:size], found[size:]
+    beyond = sum(max(map(abs, together)) for together in [*zip(*own, strict=True)][step.order + 1 :])
+    columns = [after[k : k + size] for k in range(0, len(after), size)]
+    return _WholeColumns(columns, tangent.precision, Whole(own, tangent.precision), float(beyond) * _UP)
+
+
+def _along(step: Step, columns: Columns) -> tuple[StepSeries, float]:
+    """The polynomial that columns were computed along, and how far it is from that of the step, in ulps."""
+    return (columns.motion, columns.beyond) if isinstance(columns, _WholeColumns) else (step.series, 0.0)
 
 
 def _errors(tangent: Tangent, step: Step, columns: Columns) -> tuple[float, float, float] | None:
     """(b) for Φ and for σ in ulps, and the bound of |Φ − V|; None where they are not finite."""
     h, q, slope = 2.0**-step.node.halvings, float(tangent.field.q) * _UP, float(tangent.field.l) * _UP
-    beta, size = step.series.sizes, tangent.field.dimension
-    mean = (float(beta @ (1 / np.arange(1.0, len(beta) + 1))) + step.widest) * _UP
+    series, beyond = _along(step, columns)
+    beta, size = series.sizes, tangent.field.dimension
+    wide = (step.widest + _ldexp(beyond, -tangent.precision)) * _UP
+    mean = (float(beta @ (1 / np.arange(1.0, len(beta) + 1))) + wide) * _UP
     growth = h * (2 * q * mean + slope) * _UP
     if not growth < _LARGEST_GROWTH:
         return None
-    factor, reach = exp(growth) * _UP, (float(beta.sum()) + step.widest) * _UP
-    widest = _ldexp(step.widest_ulps, step.node.errors.exponent)
+    factor, reach = exp(growth) * _UP, (float(beta.sum()) + wide) * _UP
+    widest = (_ldexp(step.widest_ulps, step.node.errors.exponent) + beyond) * _UP
     sums = np.add.reduce(columns.sizes, 1)
     off = h * widest * 2 * q * float(sums[:size].max()) * _UP
     of_phi = factor * (_defect(tangent, step, columns, h) + off) * _UP
@@ -266,9 +282,10 @@ def _defect(
 
     β_n and ν_n are multiplied by 2^(rate n), so that binary64 holds them at any precision.
     """
-    size, order, precision = tangent.field.dimension, step.order, tangent.precision
+    size, order, precision = tangent.field.dimension, columns.sizes.shape[1] - 1, tangent.precision
     rate = precision // order
-    beta, sizes = step.series.scaled(rate), columns.scaled(rate)
+    beta, sizes = _along(step, columns)[0].scaled(rate), columns.scaled(rate)
+    beta = np.concatenate([beta, np.zeros(order + 1 - len(beta))])
     nu = (sizes[:size] if slopes is None else sizes[size:]).max(axis=0)
     rates = 2 * float(tangent.field.q) * np.convolve(beta, nu)[order:]
     last = float(tangent.field.l) * float(nu[-1])
@@ -496,8 +513,9 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         own, found = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
         if own is None or found is None or found.values is None:
             continue
-        given = Whole([*own.values, *(component for column in found.values for component in column)], tangent.precision)
-        off = sum(lacking(tangent.together, given, tangent.precision, halvings))
+        after = [0] * (found.sizes.shape[1] - 1 - own.order)
+        values = [*(component + after for component in own.values), *(v for column in found.values for v in column)]
+        off = sum(lacking(tangent.together, Whole(values, tangent.precision), tangent.precision, halvings)[: own.order])
         if off > Fraction(max(own.rounding, *found.rounding)):
             raise Contradiction(
                 f"Machine code in {tangent.precision} bits gives derivatives that are further from the truth than they "

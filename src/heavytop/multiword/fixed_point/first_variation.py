@@ -7,7 +7,8 @@ Along the polynomial p = Σ b_n τⁿ of a step, with y' = h f(y) and f = Q(y, y
 has the coefficients v_(n+1) = h (Σ_m 2 Q(b_m, v_(n−m)) + L v_n + G_n)/(n + 1).  In the lanes of
 :mod:`heavytop.multiword.codegen.recurrence` the products are Σ L(b_m) ∘ R(v_(n−m)) + L(v_m) ∘ R(b_(n−m)): twice those
 of the motion, in as many words.  G is of the same form as f, and its products are those of the motion: they are summed
-once for all data.  A column ends at the order N of the step.
+once for all data.  A column ends at the order N of the step, or later where it is not small there: the further b_n
+are 0.
 
 *What coefficients lack.*  The proof is that of :mod:`heavytop.multiword.fixed_point.certified_series`, with words of L
 and R that bound those of b and of v alike and with T = 2 (n + 1) products in a sum.  Where there is a datum, the field
@@ -59,6 +60,8 @@ from heavytop.top.equations import System
 
 _QUIET = 6
 """Orders one after another in which words are 0 before they count as 0: as many as the state has components."""
+_LARGEST_LAST = 2.0**10
+"""Ulps of a last coefficient beyond which a column goes on after the motion: from near an equilibrium it has to."""
 _UP = 1 + 2.0**-40
 
 
@@ -192,7 +195,7 @@ def machine(grid: Grid, system: System, data: bool) -> Machine:
 
 @dataclass(frozen=True, slots=True)
 class WordColumns:
-    """Φ, and σ of each datum, as polynomials of the order of the step; whole ulps, a list of components each.
+    """Φ, and σ of each datum, as polynomials of one order N; whole ulps, a list of components each.
 
     total: Σ v_n.  values: every v_n, where they were asked for.  sizes: upper bounds of |v_n|, shape (columns, N + 1).
     rounding: bounds of Σ_(n < N) |v_(n+1) − h (…)_n/(n + 1)| in ulps, of any column of Φ and of any of σ.
@@ -225,17 +228,28 @@ class CertifiedColumns:
 
     def columns(self, centre: Sequence[int], halvings: int, values: bool = False) -> WordColumns | None:
         """Beside the step from ``centre`` with h = 2^-halvings; None where there are none."""
-        certified, words = self.certified, self.certified.grid.words
+        certified = self.certified
         order = certified.computed(centre, halvings)
         if order < 0:
             return None
-        own = _Scratch(certified, self.data)
+        own, rows = _Scratch(certified, self.data), certified.scratch().rows
         widest = own.measured(certified, certified.scratch().pointers[3], order)[1].copy()
+        row, most, reached = len(rows) // (most_orders(certified.grid) + 2), most_orders(certified.grid), order
+        while True:
+            rows[row * (order + 1) : row * (reached + 1)] = 0  # what the motion has no coefficients for
+            found = self._of_order(own, widest, reached, halvings, values)
+            if found is None or reached == most or found.sizes[:, -1].max() * 2.0**certified.grid.total < _LARGEST_LAST:
+                return found
+            reached = min(most, reached + reached // 2 + 8)
+
+    def _of_order(self, own: _Scratch, widest: Doubles, order: int, halvings: int, values: bool) -> WordColumns | None:
+        """All columns up to one order; widest: of the words of the motion."""
+        certified, words = self.certified, self.certified.grid.words
         factor, raises = raises_of(certified.excess - halvings)
         if self.data:
             along = certified.scratch().pointers
             self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, pointer(own.gathered))
-        found, sizes, rounding = [], [], []
+        totals, tables, sizes, rounding = [], [], [], [0.0, 0.0]
         for group, count in enumerate((6, len(self._slopes))):
             wide, added = widest.copy(), numpy.zeros((words, 8))
             for place in range(count):
@@ -245,16 +259,15 @@ class CertifiedColumns:
                 numpy.maximum(wide, of_words, out=wide)
                 numpy.maximum(added, summed, out=added)
                 sizes.append(size)
-                found.append(own.values(certified, order, values))
-            scale = ldexp(1.0, certified.excess - halvings)
-            bound = certified.bound(wide, added, order, scale, 2 + group, 1 + group) if count else 0.0
-            if bound is None:
-                return None
-            rounding.append(bound)
-        totals, all_values = zip(*found, strict=True)
-        return WordColumns(
-            list(totals), list(all_values) if values else None, numpy.array(sizes), (rounding[0], rounding[1])
-        )
+                totals.append(own.total(certified))
+                tables.append(own.values(certified, order) if values else [])
+            if count:
+                scale = ldexp(1.0, certified.excess - halvings)
+                bound = certified.bound(wide, added, order, scale, 2 + group, 1 + group)
+                if bound is None:
+                    return None
+                rounding[group] = bound
+        return WordColumns(totals, tables if values else None, numpy.array(sizes), (rounding[0], rounding[1]))
 
     def _column(self, own: _Scratch, group: int, place: int, order: int, length: tuple[float, int]) -> bool:
         """Compute one column into its scratch; whether it stands."""
@@ -293,11 +306,13 @@ class _Scratch:
         words = certified.grid.words
         return sizes, self._widest.reshape(2, words, 8), self._added.reshape(words, 8)
 
-    def values(self, certified: CertifiedSeries, order: int, values: bool) -> tuple[list[int], list[list[int]] | None]:
-        """Σ v_n of each component, and every v_n where they are asked for."""
+    def total(self, certified: CertifiedSeries) -> list[int]:
+        """Σ v_n of each component."""
+        words = self.result.reshape(certified.grid.words, 8).T[:6]
+        return [int(value) for value in whole(words, certified.grid)]
+
+    def values(self, certified: CertifiedSeries, order: int) -> list[list[int]]:
+        """Every v_n of each component."""
         grid = certified.grid
-        total = whole(self.result.reshape(grid.words, 8).T[:6], grid).tolist()
-        if not values:
-            return total, None
         left = self.rows[: 16 * grid.words * (order + 1)].reshape(order + 1, 2, grid.words, 8)[:, 1]
-        return total, [whole(each, grid).tolist() for each in components(left)]
+        return [whole(each, grid).tolist() for each in components(left)]
