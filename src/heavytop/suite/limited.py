@@ -20,7 +20,7 @@ from typing import Any
 
 from heavytop.errors import HeavyTopError, OutOfTime
 from heavytop.integrate.peers.contract import said
-from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
+from heavytop.processes import ChildContext, Guard, end_pool, how_it_ended, lead_group, new_mark
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
@@ -32,6 +32,8 @@ _TIMES = 10.0
 _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
 _MOST_DEATHS = 3
+_FAREWELL = 1.0
+"""Seconds that a process which has broken its pipe has to end."""
 
 
 @dataclass(slots=True)
@@ -92,6 +94,7 @@ class _Worker:
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
         self._mark = self._guest = ""
+        self._process: Any = None
         self._hello: Future[int] | None = None
         self.index = -1
         self.row: Future[Row] | None = None
@@ -118,11 +121,18 @@ class _Worker:
                 1, mp_context=ChildContext(self._mark), initializer=_begin, initargs=tuple(self._kinds.values())
             )
             self._hello = self._pool.submit(os.getpid)
+            (self._process,) = self._pool._processes.values()
         try:
             self.row = self._pool.submit(measure, kind, task, saved)
         except BrokenProcessPool:  # it died between two tasks
             self.end()
             self.submit(index, limit, kind, task, saved)
+
+    @property
+    def ending(self) -> str:
+        """How its process ended by itself; empty where the system does not say."""
+        self._process.join(_FAREWELL)
+        return "" if self._process.exitcode is None else how_it_ended(self._process.exitcode)
 
     def awaited(self) -> list[Future[Any]]:
         """What is to be waited for: the process, then its row."""
@@ -183,6 +193,7 @@ def in_limited_processes(
                 try:
                     row = _ended(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
+                    how = worker.ending
                     worker.end()
                     deaths[index] += 1
                     if deaths[index] < _MOST_DEATHS:
@@ -190,7 +201,7 @@ def in_limited_processes(
                         continue
                     if not tasks[index].is_third_party:
                         raise died(tasks[index], deaths[index]) from None
-                    row = ended_its_process(tasks[index], deaths[index])
+                    row = ended_its_process(tasks[index], deaths[index], how)
                 if row is not None:
                     yield index, row
     finally:
@@ -225,7 +236,7 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
     The child is kept for the next row; it ends with this process.  For one thread at a time.
     """
-    worker, limits = _kept_worker(), RowLimits(limit)
+    worker, limits, how = _kept_worker(), RowLimits(limit), ""
     for _ in range(_MOST_DEATHS):
         worker.submit(0, limit, kind, task, Saved())
         try:
@@ -234,8 +245,9 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
                 worker.greet()
             return row, monotonic() - worker.began
         except BrokenProcessPool:
+            how = worker.ending
             worker.end()
-    return ended_its_process(task, _MOST_DEATHS), 0.0
+    return ended_its_process(task, _MOST_DEATHS, how), 0.0
 
 
 def _wait(pool: Sequence[_Worker]) -> None:
