@@ -10,10 +10,10 @@ Prints a line for each bug: seconds, verdict, its first sentence, and whether th
 
 Of 60: 57 worse and named, 3 undetectable, 0 missed; some 6 s each with one other busy process on the machine.  Of the
 28 places: 23 worse and named, 5 undetectable.  Named are the sign and its equation, the step too many, the late row,
-dense output, an early end; wrong coefficients and lower precision by the order that is observed, or by an error of lower
-order than the method's.  Undetectable are, in dp5, a(1, 0) off by 1e-9 and stage 1 in float32, which move no error of
-the plan by 1 %, and a(4, 0) to a(4, 3) off by 1e-9: these make one error smaller, the drift of |M|^2 by 31 %, and none
-larger by 1 %, which no comparison of errors can distinguish from a repair: they are better.
+dense output, an early end; wrong coefficients and lower precision by the order that is observed, or by an error of
+lower order than the method's.  Undetectable are, in dp5, a(1, 0) off by 1e-9 and stage 1 in float32, which move no
+error of the plan by 1 %, and a(4, 0) to a(4, 3) off by 1e-9: these make one error smaller, the drift of |M|^2 by 31
+%, and none larger by 1 %, which no comparison of errors can distinguish from a repair: they are better.
 """
 
 from __future__ import annotations
