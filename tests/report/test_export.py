@@ -17,7 +17,8 @@ from heavytop.document.names import row_name
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report
-from heavytop.render.export import FORMATS, LOST, export
+from heavytop.render import FORMATS
+from heavytop.render.export import LOST, export
 from support import in_process
 from support.reports import store
 

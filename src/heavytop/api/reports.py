@@ -55,7 +55,7 @@ class Report(Tabular, records.Report):
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
     def export(self, to: str) -> str:
-        """The text of a file for another tool: ``to`` is bencher, github-action-benchmark, asv, junit or csv.
+        """The text of a file for another tool: ``to`` is a name that `heavytop export --help` lists, such as junit.
 
         Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.  Raises
         InputError for another tool.

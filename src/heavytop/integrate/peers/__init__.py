@@ -33,6 +33,7 @@ from heavytop.records import INTEGRATORS as FORMER
 
 GROUP = "heavytop.peers"
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
+_YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs peers`)."
 
 Peer = Callable[..., Trajectory]
 STEP_LIMIT = 10**7
@@ -62,7 +63,7 @@ def peer(which: str | IntegratorSource) -> Peer:
     name = which
     entry = known().get(name)
     if entry is None:
-        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}.")
+        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")
     if entry.lacks:
         raise InputError(f"The integrator {name} needs {entry.lacks}, which is not installed.", _REMEDY)
     try:
