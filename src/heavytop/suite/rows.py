@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import gc
 import math
-import os
 import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from multiprocessing import parent_process
-from threading import Thread
 from typing import Any, ClassVar, Protocol
 
 import msgspec
@@ -405,15 +402,7 @@ def begin_worker(*_kinds: MeasuredKind) -> None:
     With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_the_parent, daemon=True).start()
     gc.freeze()
-
-
-def _end_with_the_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def died(task: Task, times: int) -> HeavyTopError:

@@ -160,14 +160,14 @@ def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
     if isinstance(which, Command) or described(which).own:
         return control(which)
-    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+    context = ChildContext()
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
         try:
             return pool.submit(control, which).result(timeout=_PATIENCE)
         except BrokenProcessPool:
             return ""
         except TimeoutError:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
+            context.kill()
             return ""
 
 
