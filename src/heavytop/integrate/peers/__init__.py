@@ -28,7 +28,6 @@ from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile
 from heavytop.integrate.trajectory import Outcome, Trajectory
-from heavytop.processes import ChildContext
 from heavytop.records import INTEGRATORS as FORMER
 
 GROUP = "heavytop.peers"
@@ -160,6 +159,8 @@ def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
     if isinstance(which, Command) or described(which).own:
         return control(which)
+    from heavytop.processes import ChildContext
+
     context = ChildContext()
     with ProcessPoolExecutor(1, mp_context=context) as pool:
         try:
