@@ -17,11 +17,11 @@ import msgspec
 
 from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
 from heavytop.integrate.peers.contract import said
+from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
 from heavytop.processes import GuardedProcess
@@ -58,7 +58,7 @@ def check(which: str | IntegratorSource) -> list[Checked]:
     A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
     Raises InputError for an unknown integrator.
     """
-    peers.require(which)
+    registry.require(which)
     if isinstance(which, Command):
         limit = min(which.seconds, _PATIENCE)
         try:
@@ -183,14 +183,14 @@ class _Contract:
         sign = -1 if self.backward_only else 1
         asked = [sign * Fraction(time) for time in times]
         about = (top or self.top, start or self.start, asked, precision or self.precision)
-        run = peers.ready(self.which)(*about, system=system or self.system, **more)
+        run = registry.ready(self.which)(*about, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
             raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
         return run
 
     def _starts(self) -> str:
         if self.program is None:
-            peers.peer(self.which)
+            registry.peer(self.which)
             return "It can be called."
         with session(self.program) as program:
             greeting = program.greeting

@@ -14,9 +14,8 @@ import msgspec
 
 from heavytop.cases import Case
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
-from heavytop.integrate.integrator import IntegratorSource, name_of, require_reach
-from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import begin_row
+from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled

@@ -33,8 +33,7 @@ from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"

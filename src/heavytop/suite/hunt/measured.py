@@ -21,20 +21,19 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed
 from heavytop.exact.catalogue import matches
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import Command, begin_row
+from heavytop.integrate.registry import is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.integrator import ChosenIntegrator
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number, real, round_to
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
 from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.suite.sweeps import Random
 from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, dot
 
 # A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
 
@@ -71,9 +70,9 @@ def follow(
 
 
 @lru_cache(maxsize=4)
-def _ready(which: Any) -> peers.Peer:
+def _ready(which: Any) -> registry.Peer:
     """The integrator, looked up once."""
-    return peers.ready(which)
+    return registry.ready(which)
 
 
 class Apart:
