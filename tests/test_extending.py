@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 import pytest
 
 from heavytop.exact import cases
-from heavytop.integrate.integrator import INTEGRATORS
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.kinds import KINDS
 from heavytop.render import FORMATS
 from support import in_process
