@@ -17,8 +17,8 @@ import pytest
 import heavytop as ht
 from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
+from heavytop.guard import how_it_ended
 from heavytop.kinds import KINDS
-from heavytop.processes import how_it_ended
 from heavytop.suite.limited import RowLimits
 from heavytop.suite.plan import read
 from support.helpers import without_progress

@@ -14,6 +14,7 @@ import typer
 from heavytop.cli.app import Json, absolute, cases, command, plans, print_json, require_new, show_on_terminal, writing
 from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
+from heavytop.render import FORMATS
 
 _REPORT_SECONDS = 0.1
 """Expected of reading one."""
@@ -191,7 +192,7 @@ def _print(report: Path, full: bool, json: bool) -> None:
 @command
 def export(
     report: Annotated[Path, typer.Argument(help="Report or its folder.")],
-    to: Annotated[str, typer.Option(help="bencher, github-action-benchmark, asv, junit or csv.")],
+    to: Annotated[str, typer.Option(help=f"One of {', '.join(FORMATS)}.")],
     out: Annotated[Path | None, typer.Option(help="Write it there, not on standard output.")] = None,
 ) -> int:
     """Write a report in the format of another tool.
