@@ -32,9 +32,8 @@ from heavytop.comparison.noise import Policy
 from heavytop.comparison.rows import RowComparison
 from heavytop.document.names import row_name
 from heavytop.errors import Unsupported
-from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.double import Given, Solved, double_peer
-from heavytop.integrate.peers.source import PythonObject, commands_in
+from heavytop.integrate.registry import IntegratorSource, PythonObject, commands_in
 from heavytop.kinds import KINDS, work_precision
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
