@@ -28,7 +28,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ldexp
-from typing import Any
+from threading import local
+from typing import Any, cast
 
 import numpy
 from llvmlite import ir
@@ -224,7 +225,9 @@ class CertifiedColumns:
         rows = [row for given in slopes for row in given.vectors[0]]
         words = words_of_rows(rows, grid, Fraction(1, 2**certified.excess)) if rows else doubles(0)
         size = 8 * grid.words * (1 + len(turned(problem.system)))
-        self._slopes = [words[size * k : size * (k + 1)] for k in range(len(slopes))]
+        self._words = words
+        self._slopes = [pointer(words[size * k : size * (k + 1)]) for k in range(len(slopes))]
+        self._threads = local()
 
     def columns(self, centre: Sequence[int], halvings: int, values: bool = False) -> WordColumns | None:
         """Beside the step from ``centre`` with h = 2^-halvings; None where there are none."""
@@ -232,8 +235,8 @@ class CertifiedColumns:
         order = certified.computed(centre, halvings)
         if order < 0:
             return None
-        own, rows = _Scratch(certified, self.data), certified.scratch().rows
-        widest = own.measured(certified, certified.scratch().pointers[3], order)[1].copy()
+        own, rows = self._scratch(), certified.scratch().rows
+        widest = own.of_motion(certified, order)
         row, most, reached = len(rows) // (most_orders(certified.grid) + 2), most_orders(certified.grid), order
         while True:
             rows[row * (order + 1) : row * (reached + 1)] = 0  # what the motion has no coefficients for
@@ -246,70 +249,74 @@ class CertifiedColumns:
         """All columns up to one order; widest: of the words of the motion."""
         certified, words = self.certified, self.certified.grid.words
         factor, raises = raises_of(certified.excess - halvings)
+        along, count = certified.scratch().pointers, 6 + len(self._slopes)
         if self.data:
-            along = certified.scratch().pointers
-            self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, pointer(own.gathered))
-        totals, tables, sizes, rounding = [], [], [], [0.0, 0.0]
-        for group, count in enumerate((6, len(self._slopes))):
-            wide, added = widest.copy(), numpy.zeros((words, 8))
-            for place in range(count):
-                if not self._column(own, group, place, order, (certified.sign * factor, raises)):
-                    return None
-                size, of_words, summed = own.measured(certified, own.pointers[3], order)
-                numpy.maximum(wide, of_words, out=wide)
-                numpy.maximum(added, summed, out=added)
-                sizes.append(size)
-                totals.append(own.total(certified))
-                tables.append(own.values(certified, order) if values else [])
-            if count:
-                scale = ldexp(1.0, certified.excess - halvings)
-                bound = certified.bound(wide, added, order, scale, 2 + group, 1 + group)
-                if bound is None:
-                    return None
-                rounding[group] = bound
-        return WordColumns(totals, tables if values else None, numpy.array(sizes), (rounding[0], rounding[1]))
+            self.machine.functions["gather"](along[3], along[5], along[4], along[6], order, own.gathered)
+        tables = []
+        for column in range(count):
+            if not self._column(own, column, order, (certified.sign * factor, raises)):
+                return None
+            certified.extents(own.pointers[3], order, *own.measures[column])
+            if values:
+                tables.append(own.values(certified, order))
+        rounding, scale = [0.0, 0.0], ldexp(1.0, certified.excess - halvings)
+        for group, part in enumerate((slice(0, 6), slice(6, count))[: 1 + self.data]):
+            wide = numpy.maximum(widest, own.widest[part].max(axis=0))
+            bound = certified.bound(wide, own.added[part].max(axis=0), order, scale, 2 + group, 1 + group)
+            if bound is None:
+                return None
+            rounding[group] = bound
+        sizes = own.sizes[:count, : order + 1].max(axis=2) * _UP
+        ends = own.results[:count].reshape(count, words, 8).transpose(0, 2, 1)[:, :6]
+        total = whole(ends, certified.grid).tolist()
+        return WordColumns(total, tables if values else None, sizes, (rounding[0], rounding[1]))
 
-    def _column(self, own: _Scratch, group: int, place: int, order: int, length: tuple[float, int]) -> bool:
-        """Compute one column into its scratch; whether it stands."""
-        certified = self.certified
-        along = certified.scratch().pointers
+    def _scratch(self) -> _Scratch:
+        """This thread's."""
+        if not hasattr(self._threads, "scratch"):
+            self._threads.scratch = _Scratch(self.certified, len(self._slopes))
+        return cast("_Scratch", self._threads.scratch)
+
+    def _column(self, own: _Scratch, column: int, order: int, length: tuple[float, int]) -> bool:
+        """Compute one column into the rows; whether it stands."""
+        along = self.certified.scratch().pointers
         own.state[:] = 0
-        if group == 0:
-            own.state[place] = 1.0
-        arguments = [*own.pointers, *length, pointer(own.result), along[3], along[5], order]
-        if group == 0:
+        arguments = [*own.pointers, *length, own.ends[column], along[3], along[5], order]
+        if column < 6:
+            own.state[column] = 1.0
             return int(self.machine.functions["column"](*arguments)) >= 0
-        arguments += [pointer(own.gathered), pointer(self._slopes[place])]
+        arguments += [own.gathered, self._slopes[column - 6]]
         return int(self.machine.functions["column_of_data"](*arguments)) >= 0
 
 
 class _Scratch:
-    """What columns are computed in."""
+    """What one thread computes columns in.
 
-    def __init__(self, certified: CertifiedSeries, data: bool) -> None:
-        grid, orders = certified.grid, most_orders(certified.grid) + 2
+    results: Σ v_n of each.  sizes: Σ_k |word k of v_n|, shape (columns, orders, 8).  widest: the largest words of R and
+    L, and added Σ_n |word k|, of each column.  ends, measures: where these are.
+    """
+
+    def __init__(self, certified: CertifiedSeries, data: int) -> None:
+        grid, orders, count = certified.grid, most_orders(certified.grid) + 2, 6 + data
         room = WordRows.size(grid, 1, orders)
-        self.state, self.result, self.rows = doubles(8 * grid.words), doubles(8 * grid.words), doubles(room.rows)
-        self.gathered = doubles(16 * grid.words * orders if data else 0)
-        places = numpy.zeros(room.places + grid.words, numpy.int64)
+        self.state, self.rows = doubles(8 * grid.words), doubles(room.rows)
+        gathered, places = doubles(16 * grid.words * orders), numpy.zeros(room.places + grid.words, numpy.int64)
         kept = [self.state, certified.constants, certified.inverses, self.rows, doubles(room.sums), places, doubles(8)]
-        self._kept: list[Any] = kept
-        self.pointers = [pointer(array) for array in kept]
-        self._nearest, self._sizes = doubles(8 * orders), doubles(8 * orders)
-        self._widest, self._added = doubles(16 * grid.words), doubles(8 * grid.words)
-        self._measures = [pointer(each) for each in (self._nearest, self._sizes, self._widest, self._added)]
+        self.pointers, self.gathered = [pointer(array) for array in kept], pointer(gathered)
+        nearest = doubles(8 * orders)
+        self._kept: list[Any] = [*kept, gathered, nearest]
+        self.results = doubles(8 * grid.words * count).reshape(count, -1)
+        self.sizes = doubles(8 * orders * count).reshape(count, orders, 8)
+        self.widest = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
+        self.added = doubles(8 * grid.words * count).reshape(count, grid.words, 8)
+        self.ends, near = [pointer(each) for each in self.results], pointer(nearest)
+        arrays = zip(self.sizes, self.widest, self.added, strict=True)
+        self.measures = [[near, *(pointer(each) for each in three)] for three in arrays]
 
-    def measured(self, certified: CertifiedSeries, rows: Any, order: int) -> tuple[Doubles, Doubles, Doubles]:
-        """Of such rows: upper bounds of |v_n|, the largest words of R and L, and Σ |word k|."""
-        certified.extents(rows, order, *self._measures)
-        sizes = numpy.maximum.reduce(self._sizes[: 8 * (order + 1)].reshape(-1, 8), 1) * _UP
-        words = certified.grid.words
-        return sizes, self._widest.reshape(2, words, 8), self._added.reshape(words, 8)
-
-    def total(self, certified: CertifiedSeries) -> list[int]:
-        """Σ v_n of each component."""
-        words = self.result.reshape(certified.grid.words, 8).T[:6]
-        return [int(value) for value in whole(words, certified.grid)]
+    def of_motion(self, certified: CertifiedSeries, order: int) -> Doubles:
+        """The largest words of R and L of the motion."""
+        certified.extents(certified.scratch().pointers[3], order, *self.measures[0])
+        return self.widest[0].copy()
 
     def values(self, certified: CertifiedSeries, order: int) -> list[list[int]]:
         """Every v_n of each component."""
