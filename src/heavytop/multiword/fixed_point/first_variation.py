@@ -305,18 +305,19 @@ class _Scratch:
         self.pointers, self.gathered = [pointer(array) for array in kept], pointer(gathered)
         nearest = doubles(8 * orders)
         self._kept: list[Any] = [*kept, gathered, nearest]
-        self.results = doubles(8 * grid.words * count).reshape(count, -1)
-        self.sizes = doubles(8 * orders * count).reshape(count, orders, 8)
-        self.widest = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
-        self.added = doubles(8 * grid.words * count).reshape(count, grid.words, 8)
-        self.ends, near = [pointer(each) for each in self.results], pointer(nearest)
-        arrays = zip(self.sizes, self.widest, self.added, strict=True)
-        self.measures = [[near, *(pointer(each) for each in three)] for three in arrays]
+        self.results: Doubles = doubles(8 * grid.words * count).reshape(count, -1)
+        self.sizes: Doubles = doubles(8 * orders * count).reshape(count, orders, 8)
+        self.widest: Doubles = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
+        self.added: Doubles = doubles(8 * grid.words * count).reshape(count, grid.words, 8)
+        self.ends = [pointer(self.results[k]) for k in range(count)]
+        arrays, near = (self.sizes, self.widest, self.added), pointer(nearest)
+        self.measures = [[near, *(pointer(array[k]) for array in arrays)] for k in range(count)]
 
     def of_motion(self, certified: CertifiedSeries, order: int) -> Doubles:
         """The largest words of R and L of the motion."""
         certified.extents(certified.scratch().pointers[3], order, *self.measures[0])
-        return self.widest[0].copy()
+        found: Doubles = self.widest[0].copy()
+        return found
 
     def values(self, certified: CertifiedSeries, order: int) -> list[list[int]]:
         """Every v_n of each component."""
