@@ -499,7 +499,7 @@ def _constants(parameters: Any) -> Any:
     given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
 
     def rate(component: int, *axes: int) -> Any:
-        return HEAVY_TOP.field(given, [sum(_UNITS[axis][i] for axis in axes) for i in range(6)])[component]
+        return HEAVY_TOP.field(given, [sum((_UNITS[axis][i] for axis in axes), 0.0) for i in range(6)])[component]
 
     cyclic = [each for each in permutations(range(3)) if each in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
     products = [rate(i, j, k) for i, j, k in cyclic]
