@@ -32,7 +32,6 @@ from heavytop.integrate.peers.contract import Contained, Declared, contained, qu
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
 from heavytop.precision import DOUBLE, FORMATS, Precision, Vector, decimal_text, exact, last_call, log10, parse
-from heavytop.processes import ChildContext
 from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
@@ -45,6 +44,7 @@ STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 Peer = Callable[..., Trajectory]
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
+_YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs peers`)."
 _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
@@ -312,7 +312,7 @@ def peer(which: str | IntegratorSource) -> Peer:
     name = which
     entry = known().get(name)
     if entry is None:
-        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}.")
+        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")
     if entry.lacks:
         raise InputError(f"The integrator {name} needs {entry.lacks}, which is not installed.", _REMEDY)
     try:
@@ -410,14 +410,16 @@ def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
     if isinstance(which, Command) or described(which).own:
         return control(which)
-    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+    from heavytop.processes import ChildContext
+
+    context = ChildContext()
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
         try:
             return pool.submit(control, which).result(timeout=_PATIENCE)
         except BrokenProcessPool:
             return ""
         except TimeoutError:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
+            context.kill()
             return ""
 
 

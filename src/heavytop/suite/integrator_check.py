@@ -6,7 +6,7 @@ Nothing is scored here: that an answer is right to 5 % is all that is asked of i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from fractions import Fraction
@@ -24,7 +24,7 @@ from heavytop.integrate.peers.contract import said
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
-from heavytop.processes import ChildContext, end_pool, lead_group, new_mark
+from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
@@ -65,21 +65,20 @@ def check(which: str | IntegratorSource) -> list[Checked]:
             return list(_Contract(msgspec.structs.replace(which, timeout=str(limit))).checks())
         finally:
             close_all()
-    mark = new_mark()
-    pool = ProcessPoolExecutor(1, mp_context=ChildContext(mark), initializer=lead_group)
+    process = GuardedProcess()
     try:
-        return list(_in_child(pool, which))
+        return list(_in_child(process, which))
     finally:
-        end_pool(pool, None, mark)
+        process.end()
 
 
-def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Iterator[Checked]:
-    """Each part in the process of the pool; where one does not come back, what was found before it stands."""
+def _in_child(process: GuardedProcess, which: str | IntegratorSource) -> Iterator[Checked]:
+    """Each part in the process; where one does not come back, what was found before it stands."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
         seconds = _PATIENCE_OF.get(name, _PATIENCE)
         ended = True
         try:
-            future = pool.submit(_part, which, place)
+            future = process.submit(_part, which, place)
             # an interrupt that comes from the child was raised by the integrator
             error = future.exception(timeout=seconds)
             if error is None:
@@ -90,8 +89,7 @@ def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Itera
                 cause = ": ".join(filter(None, (type(error).__name__, said(error))))
                 found = Checked(name, "violated", f"It left its process by {cause}.")
         except TimeoutError:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
+            process.kill()
             text = f"It does not answer within {seconds} s; its process was ended."
             found = Checked(name, "note" if name == _TOO_FAST else "violated", text)
         except BrokenProcessPool:
