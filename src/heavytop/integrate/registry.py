@@ -25,7 +25,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, quoted
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
@@ -251,7 +251,7 @@ def command_of(table: Any, folder: Path, where: str) -> Command:
         command = msgspec.structs.replace(msgspec.convert(table, Command), folder=str(folder.absolute()))
         _require_possible(command)
     except (msgspec.ValidationError, HeavyTopError) as error:
-        cause = error.cause if isinstance(error, HeavyTopError) else f"{error}."
+        cause = error.cause if isinstance(error, HeavyTopError) else f"{invalid(error)}."
         raise InputError(f"{where}: [[integrator]] is not valid: {cause}", _SHOWN) from None
     return command
 

@@ -23,7 +23,7 @@ from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits, whole_evaluatio
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Precision, decimal_text, exact, number, shown
-from heavytop.top.attitude import attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
+from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
 from heavytop.top.equations import GYROSTAT, gyrostat_energy
 
 MODEL_BITS = 160
@@ -152,7 +152,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
         )
 
 
-def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Any) -> Values:
+def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Library) -> Values:
     """The same motion in the forms that lose no digits, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
     omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))

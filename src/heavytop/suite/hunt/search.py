@@ -20,7 +20,7 @@ import numpy
 from flint import arb
 
 from heavytop.cases import Case
-from heavytop.errors import InputError
+from heavytop.errors import InputError, invalid
 from heavytop.exact.flint.balls import rational, whole_evaluation, working_precision
 from heavytop.files import replace
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -588,7 +588,7 @@ def kept(path: Path) -> tuple[Motion, ...]:
     except FileNotFoundError:
         return ()
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {error}.", _PASTE) from None
+        raise InputError(f"{path} cannot be read: {invalid(error)}.", _PASTE) from None
     if any(case.system is not HEAVY_TOP for case in cases):
         raise InputError(f"{path} holds a top of another system than heavy_top.", "Take it out: heavy tops are hunted.")
     return tuple((case.top, case.start) for case in cases)
