@@ -18,7 +18,7 @@ from heavytop.measure.scorer import SOLUTION_ERROR, Drift, Running, Scorer, para
 from heavytop.measure.truth import Truth, truth_with_attitude
 from heavytop.precision import Vector, dot, exact
 from heavytop.records import Against, Metric, Quantity, Series, by_name
-from heavytop.top.attitude import SEQUENCES, Library, matrix_of_quaternion, rotated, rows_of, rows_of_euler
+from heavytop.top.attitude import SEQUENCES, matrix_of_quaternion, rotated, rows_of, rows_of_euler
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -84,7 +84,7 @@ class Convention:
                 said = ", ".join(value for value in values if value)
                 raise InputError(f"{name} = {quoted(getattr(self, name))} is not known.", f"Use one of {said}.")
 
-    def rotation(self, form: str, values: Sequence[Any], lib: Library) -> list[list[Any]]:
+    def rotation(self, form: str, values: Sequence[Any], lib: Any) -> list[list[Any]]:
         """R of the columns of ``form``, body to space of the file; of a quaternion of any length that of its direction.
 
         values: 4, 9 (row by row) or 3 numbers.  lib: functions of these numbers, with ``pi`` where angles are degrees.

@@ -134,7 +134,7 @@ def _omega_with_rotor(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return y[0], y[1] + p.rotor, y[2]
 
 
-class Field(Protocol):
+class VectorField(Protocol):
     """A function of a state, of as many numbers."""
 
     def __call__(self, p: Parameters, y: Sequence[Scalar], /) -> tuple[Scalar, ...]: ...
@@ -148,8 +148,8 @@ class System:
     """
 
     name: str
-    field: Field
-    angular_velocity: Field
+    field: VectorField
+    angular_velocity: VectorField
     enters: tuple[str, ...] = ("inertia", "moment")
 
     def __reduce__(self) -> tuple[Any, ...]:
