@@ -32,7 +32,7 @@ from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.suite.sweeps import Random
 from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
-from heavytop.top.equations import HEAVY_GYROSTAT, system_of
+from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
 # A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
@@ -189,9 +189,9 @@ def unit(values: Sequence[Fraction]) -> Vector:
 
 def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
     """Number ``index`` of the random motions: every second one of the first 64 and every eighth beyond are plain."""
-    case = Random("random", seed, index + 1, "any" if family == HEAVY_GYROSTAT.name else family).cases()[index]
+    case = Random("random", seed, index + 1, "any" if family == "heavy_gyrostat" else family).cases()[index]
     plain = case.top, case.start
-    if family == HEAVY_GYROSTAT.name:
+    if family == "heavy_gyrostat":
         plain = _rotored(plain, Dice(f"{seed}/rotor/{index}"))
     if is_plain(index):
         return plain
@@ -227,7 +227,7 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
         inertia[1], centre[:2] = inertia[0], [Fraction(0)] * 2
     elif family == "kovalevskaya":
         inertia[:2], centre[2] = [2 * inertia[2]] * 2, Fraction(0)
-    rotor = [*map(_short, top.rotor or (0, 0, 0))] if family == HEAVY_GYROSTAT.name else None
+    rotor = list(map(_short, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
     inertia, centre, omega = (list(map(_short, each)) for each in (inertia, centre, start.omega))
     weight = _short(top.weight)
     if min(inertia) <= 0 or 2 * max(inertia) > sum(inertia) or max(inertia) > _MOST_RATIO * min(inertia):
