@@ -333,7 +333,7 @@ def load(engine: Any, problem: Problem) -> None:
     parameters, engine.state[:] = arrays(problem)
     if len(engine.pars):
         engine.pars[:] = parameters
-    engine.time = number(Fraction(0), problem.precision)
+    engine.time = 0.0 if problem.precision == DOUBLE else number(Fraction(0), problem.precision)
 
 
 @last_call
