@@ -145,6 +145,13 @@ def test_no_bit_is_lost_by_the_falls(monkeypatch):
     assert max(b - a for a, b in zip(kept, fallen, strict=True)) < 0.03
 
 
+def test_the_model_of_the_cost_counts_the_falls(monkeypatch):
+    solution = Validated(TOP, START)
+    falling = solution.cost(Fraction(5000), 104)
+    monkeypatch.setattr(run, "_GUARD", inf)
+    assert 0.5 < falling / solution.cost(Fraction(5000), 104) < 0.8
+
+
 def test_steps_and_falls_depend_on_the_node_alone(early):
     early(4)
     used = Validated(TOP, START)
