@@ -299,11 +299,11 @@ def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_show_writes_a_page(tmp_path: Path) -> None:
-    done = in_process.heavytop("show", RESULTS, "--html", "page.html", cwd=tmp_path)
+    done = in_process.heavytop("show", RESULTS.parent / "long", "--html", "page.html", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "page.html\n"
     assert Page(tmp_path / "page.html").all("svg")
-    refused = in_process.heavytop("show", RESULTS, "--html", "no/page.html", cwd=tmp_path)
+    refused = in_process.heavytop("show", RESULTS.parent / "long", "--html", "no/page.html", cwd=tmp_path)
     assert refused.returncode == 2
     assert "Give a file in a writable folder" in refused.stderr
 
