@@ -57,7 +57,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     baseline, candidate = full_report(), full_report(HOSTILE)
     candidate.rows[5].metrics["solution_error_relative_max"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
-    html.write_report(store.read(RESULTS), folder / "results.html")
+    results = store.read(RESULTS)
+    html.write_report(replace(results, rows=results.rows[::2]), folder / "results.html")
     result = compare(baseline, candidate, Policy())
     (folder / "comparison.html").write_text(html.comparison_page(baseline, candidate, result), "utf-8")
     return {path.stem: Page(path) for path in folder.glob("*.html")}
