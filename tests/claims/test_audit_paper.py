@@ -153,7 +153,7 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     ],
 )
 def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(claim, equation):
-    # what does not hold without the mistake says nothing of it; of the general case the smooth branch, for it takes long
+    # what does not hold without the mistake says nothing of it; the general case takes long: its smooth branch
     rows_without = zip(claim.statements(HEAVY_TOP), report(claim.name).rows, strict=True)
     held = [(statement, row) for statement, row in rows_without if row.holds]
     if isinstance(claim, GeneralClaim):
