@@ -18,7 +18,7 @@ import typer
 import heavytop as ht
 from heavytop.cli import app
 from heavytop.comparison import noise
-from heavytop.integrate.peers.source import commands_in
+from heavytop.integrate.registry import commands_in
 from heavytop.kinds import KINDS
 from heavytop.render.terminal import brief
 from heavytop.suite import plan

@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import exact
 from heavytop.top.equations import HEAVY_GYROSTAT, System
@@ -49,7 +49,7 @@ def start_of(given: dict) -> State:
 
 def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
     """One run of a peer, as the rows of a report make it."""
-    return peers.ready(name, setting)(*problem, **options)
+    return registry.ready(name, setting)(*problem, **options)
 
 
 def distance(one: Trajectory, other: Trajectory) -> Fraction:

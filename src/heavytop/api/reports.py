@@ -20,14 +20,13 @@ from heavytop.document.names import printable, row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
-from heavytop.precision import whole
+from heavytop.precision import ordered, whole
 from heavytop.render import export as exports
 from heavytop.render import history as over
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
 from heavytop.store import store
 from heavytop.store.parquet import COLUMNS, lines
-from heavytop.top.vectors import ordered
 
 if TYPE_CHECKING:
     import pandas

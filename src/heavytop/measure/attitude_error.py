@@ -16,12 +16,11 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, largest, relative_error, root
 from heavytop.measure.scorer import SOLUTION_ERROR, Drift, Running, Scorer, parameter_balls, split
 from heavytop.measure.truth import Truth, truth_with_attitude
-from heavytop.precision import exact
+from heavytop.precision import Vector, dot, exact
 from heavytop.records import Against, Metric, Quantity, Series, by_name
 from heavytop.top.attitude import SEQUENCES, matrix_of_quaternion, rotated, rows_of, rows_of_euler
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, dot
 
 # How a trajectory file speaks of the attitude: order and direction of quaternions, Euler sequence, up, units.
 #

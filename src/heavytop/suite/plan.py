@@ -24,11 +24,9 @@ from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, invalid, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.files import read_whole
-from heavytop.integrate.integrator import IntegratorSource
-from heavytop.integrate.peers import is_third_party
-from heavytop.integrate.peers import known as known_integrators
-from heavytop.integrate.peers import require as require_integrator
-from heavytop.integrate.peers.source import command_of, commands_in, named, seconds_of
+from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
+from heavytop.integrate.registry import known as known_integrators
+from heavytop.integrate.registry import require as require_integrator
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS

@@ -28,13 +28,12 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.guard import Guard
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
-from heavytop.processes import Guard
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
