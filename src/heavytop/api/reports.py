@@ -232,7 +232,7 @@ def compare(
         baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
         policy: a TOML file of what counts as the same (`heavytop docs compare`).
         floor: errors below ``floor`` eps are all the same.
-        loss: bits that an error may grow by.
+        loss: bits that any error may grow by; 2, and a tenth of one of truncation, where it is not given.
 
     Returns:
         A :class:`Comparison`; ``verdict`` is "worse" if anything is, else "incomparable" if anything is missing or
