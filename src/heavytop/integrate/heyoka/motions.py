@@ -25,6 +25,7 @@ from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 
 CHUNK_SECONDS = 0.25
+_NON_FINITE = heyoka.taylor_outcome.err_nf_state
 _ON_A_GRID = ("double", "extended", "quad")
 _MANY, _CLOSE = 256, 20
 """States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
@@ -96,13 +97,13 @@ class Stepper:
         self._before = state, self.engine.dtime, self.steps
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
-        self._covers = True
-        if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
+        self._covers, now = True, self.engine.time
+        if outcome == _NON_FINITE or now - now != 0:  # infinity and nan
             if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
             self.rest = state
             return Outcome.SUCCESS
-        if self.engine.time == before:
+        if now == before:
             return Outcome.STEP_TOO_SMALL
         self._went(1)
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
@@ -115,7 +116,7 @@ class Stepper:
         self._seconds_per_step = (perf_counter() - began) / max(done, 1)
         # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
         self._largest_step = max(self._largest_step, abs(float(largest)))
-        failed = outcome == heyoka.taylor_outcome.err_nf_state
+        failed = outcome == _NON_FINITE
         if failed or self._beyond(target):
             # what has been seen of the steps behind the target says how many lie before it
             self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
