@@ -230,6 +230,14 @@ def test_a_page_links_to_what_is_there(page: Path) -> None:
         assert "://" in link or (page.parent / link).exists(), link
 
 
+def test_every_python_file_that_a_page_names_is_there() -> None:
+    there = {file.relative_to(ROOT).as_posix() for file in (*ROOT.glob("*.py"), *ROOT.glob("[!.]*/**/*.py"))}
+    of_users_and_others = {"heavyTop.py", "mine.py", "NAME.py"}
+    named = {(name(page), file) for page in PAGES for file in re.findall(r"`([\w/]+\.py)`", page.read_text("utf-8"))}
+    known = {(page, file) for page, file in named if any(f"/{each}".endswith(f"/{file}") for each in there)}
+    assert {each for each in named - known if each[1].split("/")[-1] not in of_users_and_others} == set()
+
+
 def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
     environment = folder_like_a_checkout(tmp_path)
     assert run_shell("false # exit code 1: as said\ntrue\n", tmp_path, environment).returncode == 0

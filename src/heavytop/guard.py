@@ -23,6 +23,16 @@ _ROUNDS = 20
 """How often what a process may just have started is looked for."""
 
 
+def how_it_ended(code: int) -> str:
+    """``by SIGSEGV`` or ``with exit code 1``, of the exit code that Python gives of a process."""
+    if code >= 0:
+        return f"with exit code {code}"
+    try:
+        return f"by {signal.Signals(-code).name}"
+    except ValueError:  # a signal of real time has no name
+        return f"by signal {-code}"
+
+
 class Guard:
     """A small process that kills its process group once this process has ended, however that came about.
 

@@ -23,13 +23,15 @@ from loky.backend import resource_tracker as loky_tracker
 from loky.backend.context import LokyContext
 from loky.backend.process import LokyProcess
 
-from heavytop.guard import MARK, Guard, kill_marked
+from heavytop.guard import MARK, Guard, how_it_ended, kill_marked
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Python's own: a file such as random.py in the working directory is not taken for a module."""
+_FAREWELL = 1.0
+"""Seconds that a process which has broken its pipe has to end."""
 _starting = Lock()
 
 
@@ -115,6 +117,13 @@ class ChildContext(LokyContext):  # type: ignore[misc]
         self._children.append(child)
         return child
 
+    @property
+    def ending(self) -> str:
+        """How its last process ended by itself; empty where the system does not say."""
+        child = self._children[-1]
+        child.join(_FAREWELL)
+        return "" if child.exitcode is None else how_it_ended(child.exitcode)
+
     def kill(self) -> None:
         """Kills its processes."""
         for child in self._children:
@@ -162,6 +171,11 @@ class GuardedProcess:
         """The process, by its number, is there: from now on it ends with this one, however that ends."""
         with suppress(OSError):
             self._guard = Guard(process, self._context.mark)
+
+    @property
+    def ending(self) -> str:
+        """How the process ended by itself; empty where the system does not say."""
+        return self._context.ending
 
     def kill(self) -> None:
         """Kills the process; what it started lives until :meth:`end`."""

@@ -54,7 +54,7 @@ class Report(Tabular, records.Report):
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
     def export(self, to: str) -> str:
-        """The text of a file for another tool: ``to`` is bencher, github-action-benchmark, asv, junit or csv.
+        """The text of a file for another tool: ``to`` is a name that `heavytop export --help` lists, such as junit.
 
         Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.  Raises
         InputError for another tool.
@@ -232,7 +232,7 @@ def compare(
         baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
         policy: a TOML file of what counts as the same (`heavytop docs compare`).
         floor: errors below ``floor`` eps are all the same.
-        loss: bits that an error may grow by.
+        loss: bits that any error may grow by; 2, and a tenth of one of truncation, where it is not given.
 
     Returns:
         A :class:`Comparison`; ``verdict`` is "worse" if anything is, else "incomparable" if anything is missing or

@@ -44,6 +44,7 @@ STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 Peer = Callable[..., Trajectory]
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
+_YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs peers`)."
 _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
@@ -311,7 +312,7 @@ def peer(which: str | IntegratorSource) -> Peer:
     name = which
     entry = known().get(name)
     if entry is None:
-        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}.")
+        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")
     if entry.lacks:
         raise InputError(f"The integrator {name} needs {entry.lacks}, which is not installed.", _REMEDY)
     try:

@@ -120,6 +120,11 @@ class _Worker:
             self.end()
             self.submit(index, limit, kind, task, saved)
 
+    @property
+    def ending(self) -> str:
+        """How its process ended by itself."""
+        return "" if self._process is None else self._process.ending
+
     def awaited(self) -> list[Future[Any]]:
         """What is to be waited for: the process, then its row."""
         return [each for each in (self._hello, self.row) if each is not None]
@@ -174,6 +179,7 @@ def in_limited_processes(
                 try:
                     row = _ended(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
+                    how = worker.ending
                     worker.end()
                     deaths[index] += 1
                     if deaths[index] < _MOST_DEATHS:
@@ -181,7 +187,7 @@ def in_limited_processes(
                         continue
                     if not tasks[index].is_third_party:
                         raise died(tasks[index], deaths[index]) from None
-                    row = ended_its_process(tasks[index], deaths[index])
+                    row = ended_its_process(tasks[index], deaths[index], how)
                 if row is not None:
                     yield index, row
     finally:
@@ -216,7 +222,7 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
     The child is kept for the next row; it ends with this process.  For one thread at a time.
     """
-    worker, limits = _kept_worker(), RowLimits(limit)
+    worker, limits, how = _kept_worker(), RowLimits(limit), ""
     for _ in range(_MOST_DEATHS):
         worker.submit(0, limit, kind, task, Saved())
         try:
@@ -225,8 +231,9 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
                 worker.greet()
             return row, monotonic() - worker.began
         except BrokenProcessPool:
+            how = worker.ending
             worker.end()
-    return ended_its_process(task, _MOST_DEATHS), 0.0
+    return ended_its_process(task, _MOST_DEATHS, how), 0.0
 
 
 def _wait(pool: Sequence[_Worker]) -> None:

@@ -38,6 +38,7 @@ from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop
 
+_KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
@@ -145,10 +146,10 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
-        raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
+        raise InputError(f"The plan {name} is nested too deeply.", _KEYS) from None
     except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
         cause = f"The plan {name} is not valid: {invalid(error)}."
-        raise InputError(cause, "The plans that ship show every key.") from None
+        raise InputError(cause, _KEYS) from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 

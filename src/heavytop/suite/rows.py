@@ -390,9 +390,9 @@ def _taken_up(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
     return kind.measure(task, saved)
 
 
-def ended_its_process(task: Task, times: int) -> Row:
-    """The failed row of a task whose third-party integrator ended its process."""
-    return failed(task, f"{task.key.subject.name} ended its process {times} times")
+def ended_its_process(task: Task, times: int, how: str = "") -> Row:
+    """The failed row of a task whose third-party integrator ended its process, ``how`` the last time."""
+    return failed(task, f"{task.key.subject.name} ended its process {times} times{how and ', ' + how}")
 
 
 def begin_worker(*_kinds: MeasuredKind) -> None:

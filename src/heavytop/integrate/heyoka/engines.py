@@ -192,15 +192,19 @@ class Compiled:
 
         Whoever runs meanwhile, another thread or an observer of this very run, has another copy.
         """
-        try:
-            engine = self.spare.pop()
-        except IndexError:
-            with self.copying:
-                engine = deepcopy(self.engine)
+        engine = self.take()
         try:
             yield engine
         finally:
             self.spare.append(engine)
+
+    def take(self) -> Any:
+        """A copy that is to be given back to ``spare``: :meth:`borrowed` for who counts microseconds."""
+        try:
+            return self.spare.pop()
+        except IndexError:
+            with self.copying:
+                return deepcopy(self.engine)
 
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
@@ -338,7 +342,7 @@ def load(engine: Any, problem: Problem) -> None:
     parameters, engine.state[:] = arrays(problem)
     if len(engine.pars):
         engine.pars[:] = parameters
-    engine.time = number(Fraction(0), problem.precision)
+    engine.time = 0.0 if problem.precision == DOUBLE else number(Fraction(0), problem.precision)
 
 
 @last_call

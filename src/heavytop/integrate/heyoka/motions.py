@@ -96,13 +96,13 @@ class Stepper:
         self._before = state, self.engine.dtime, self.steps
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
-        self._covers = True
-        if outcome == self._not_finite or not numpy.isfinite(self.engine.time):
+        self._covers, now = True, self.engine.time
+        if outcome == self._not_finite or now - now != 0:  # infinity and nan
             if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
             self.rest = state
             return Outcome.SUCCESS
-        if self.engine.time == before:
+        if now == before:
             return Outcome.STEP_TOO_SMALL
         self._went(1)
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
