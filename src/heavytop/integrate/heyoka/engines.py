@@ -12,7 +12,6 @@ from threading import Lock, RLock
 from time import perf_counter
 from typing import Any
 
-import heyoka
 import numpy
 
 from heavytop.errors import Contradiction, InputError
@@ -171,9 +170,6 @@ def _require(fine: bool, what: str, precision: Precision) -> None:
         )
 
 
-# A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
-heyoka.llvm_state.set_diskcache_enabled(False)
-
 _XI = ("xi1", "xi2", "xi3")
 
 
@@ -216,12 +212,21 @@ _compiling: dict[tuple[Any, ...], RLock] = {}
 """One lock a key: what one thread compiles, another that needs the same waits for."""
 
 
+def not_finite() -> Any:
+    """The outcome of a step to a state that is not finite."""
+    import heyoka
+
+    return heyoka.taylor_outcome.err_nf_state
+
+
 def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
     """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat; par[6..8]
     = k for the heavy gyrostat.
 
     constants: doubles in the place of all par[i].
     """
+    import heyoka  # when it is used: its loading takes half of a start
+
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
     p = constants or system.taken_in([heyoka.par[i] for i in range(_count(system))])
@@ -279,6 +284,10 @@ def _built(
     constants: Parameters | None,
 ) -> tuple[Any, float]:
     """A new engine, and the seconds that compiling it took."""
+    import heyoka
+
+    # a cache of machine code on disk is not protected against corruption: a flipped bit gives wrong numbers silently
+    heyoka.llvm_state.set_diskcache_enabled(False)
     one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
     size = 9 if attitude else 6
     options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
