@@ -43,7 +43,7 @@ class Picture:
     title: str
     description: str
     name: str
-    axes: Axes
+    axes: Any
     svg: str
     note: str = ""
     wide: bool = False
