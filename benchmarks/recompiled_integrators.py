@@ -33,7 +33,8 @@ from heavytop.comparison.rows import RowComparison
 from heavytop.document.names import row_name
 from heavytop.errors import Unsupported
 from heavytop.integrate.peers.double import Given, Solved, double_peer
-from heavytop.integrate.registry import IntegratorSource, PythonObject, commands_in
+from heavytop.integrate.peers.source import PythonObject
+from heavytop.integrate.registry import IntegratorSource, commands_in
 from heavytop.kinds import KINDS, work_precision
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
