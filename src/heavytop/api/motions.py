@@ -23,7 +23,7 @@ from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
-from heavytop.precision import DOUBLE, LARGEST, Precision, exact, number, numbers, ordered, whole
+from heavytop.precision import DOUBLE, LARGEST, OrderedRing, Precision, exact, number, numbers, ordered, whole
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
@@ -471,13 +471,16 @@ class Integrator:
             raise InputError(f"start = {quoted(start)} is no start.", _SHAPES) from None
         raise InputError(f"start has the shape {given.shape}.", _SHAPES)
 
-    def _one(self, state: State | None, row: Any, targets: Sequence[Any]) -> tuple[Any, Outcome, Any, int]:
+    def _one(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
         """As :func:`heavytop.integrate.heyoka.motions.states_at`."""
         if self._is_plain:
             plain = self._plain(state, row, targets)
             if plain is not None:
-                with self._tool.borrowed() as engine:
+                engine = self._tool.take()
+                try:
                     return states_at(engine, self._numbers, plain, targets, self._limit, self._form)
+                finally:
+                    self._tool.spare.append(engine)
         if state is None:
             state = State(row[:3], row[3:])
         found = propagate(
@@ -492,7 +495,7 @@ class Integrator:
         )
         return found.states, found.outcome, number(found.time_reached, self._form), found.steps
 
-    def _plain(self, state: State | None, row: Any, targets: Sequence[Any]) -> Any:
+    def _plain(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> Any:
         """The start in doubles, checked; None for irrational ones, and where exact numbers tell what is wrong."""
         if state is not None:
             if state.attitude is not None:
@@ -517,7 +520,7 @@ class Integrator:
         return Problem.of(self._top, state, self._form, self._system)
 
     def _together(
-        self, found: list[tuple[Any, Outcome, Any, int]], targets: Sequence[Any], several: bool, is_one: bool
+        self, found: list[tuple[Any, Outcome, Any, int]], targets: Sequence[OrderedRing], several: bool, is_one: bool
     ) -> Propagated:
         blocks = [self._filled(states, len(targets)) for states, *_ in found]
         times = targets[0] if is_one else numpy.array(targets)
@@ -532,6 +535,8 @@ class Integrator:
         """States at all times, ``nan`` where they were not reached."""
         missing = count - len(states)
         if not missing:
+            if count == 1:
+                return states[0].reshape(1, 6)
             return states if isinstance(states, numpy.ndarray) else numpy.array(states)
         nothing = [number(Fraction(0), self._form) * float("nan")] * 6
         return numpy.array([*states, *([nothing] * missing)])

@@ -201,7 +201,7 @@ class StepDerivatives:
     moved: a bound of |Φ − V| as an operator, V the fundamental matrix along the step's own polynomial.
     """
 
-    rows: list[list[Any]]
+    rows: list[list[mpz]]
     errors: list[float]
     moved: float
 
@@ -304,7 +304,7 @@ def _ldexp(value: float, exponent: int) -> float:
     return float(np.ldexp(value, max(-1000, exponent))) + 2.0**-1000
 
 
-def unit_columns(size: int, bits: int, columns: int) -> list[list[Any]]:
+def unit_columns(size: int, bits: int, columns: int) -> list[list[mpz]]:
     """The derivatives at time 0: the unit matrix, and 0 for the data, in ulps of 2^-bits."""
     return [[mpz((i == j) << bits) for j in range(columns)] for i in range(size)]
 
@@ -319,19 +319,22 @@ DATA = ("I1", "I2", "I3", "n1", "n2", "n3")
 """The data that motions are differentiated with respect to: principal moments, and n = P r."""
 
 
+Exact: TypeAlias = int | Fraction | mpq
+
+
 @dataclass(frozen=True, slots=True)
 class Dual:
     """value + slope ε with ε² = 0, over exact numbers."""
 
-    value: Any
-    slope: Any = 0
+    value: Exact
+    slope: Exact = 0
 
     @classmethod
-    def of(cls, number: Any) -> Dual:
+    def of(cls, number: Dual | Exact) -> Dual:
         """A number, as one without slope."""
         return number if isinstance(number, Dual) else cls(number)
 
-    def __add__(self, other: Any) -> Dual:
+    def __add__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value + b.value, self.slope + b.slope)
 
@@ -340,27 +343,27 @@ class Dual:
     def __neg__(self) -> Dual:
         return Dual(-self.value, -self.slope)
 
-    def __sub__(self, other: Any) -> Dual:
+    def __sub__(self, other: Dual | Exact) -> Dual:
         return self + -Dual.of(other)
 
-    def __rsub__(self, other: Any) -> Dual:
+    def __rsub__(self, other: Dual | Exact) -> Dual:
         return Dual.of(other) + -self
 
-    def __mul__(self, other: Any) -> Dual:
+    def __mul__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value * b.value, self.slope * b.value + self.value * b.slope)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Dual:
+    def __truediv__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value / b.value, (self.slope * b.value - self.value * b.slope) / (b.value * b.value))
 
-    def __rtruediv__(self, other: Any) -> Dual:
+    def __rtruediv__(self, other: Dual | Exact) -> Dual:
         return Dual.of(other) / self
 
 
-def moved(p: Parameters, datum: int, by: Any) -> Parameters:
+def moved(p: Parameters, datum: int, by: Dual | Exact) -> Parameters:
     """The parameters with ``by`` added to one of :data:`DATA`."""
     numbers = [*p.inertia, *p.moment]
     numbers[datum] = numbers[datum] + by
@@ -375,6 +378,8 @@ def slope(system: System, p: Parameters, datum: int, unit: Any) -> Callable[[Seq
 
 METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
+Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int]
+"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, and the exponent."""
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
@@ -402,7 +407,7 @@ class EnclosedDerivatives:
 class _Columns:
     """(J, S) at a node: centre in ulps of 2^-bits, a row a component; errors {Q x: |x_i| ≤ radii_i 2^exponent}."""
 
-    rows: list[list[Any]]
+    rows: list[list[mpz]]
     radii: Matrix
     exponent: int
 
@@ -526,7 +531,7 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         return
 
 
-def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Any]]:
+def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
     """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
     node = start_node(motion.field, motion.scaled.state, tangent.precision)
     size = motion.field.dimension
@@ -564,7 +569,7 @@ def _step(tangent: Tangent, node: Node) -> tuple[Step, StepDerivatives] | tuple[
     return None, None
 
 
-def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[Any]]) -> list[list[Any]]:
+def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> list[list[mpz]]:
     """Φ (J, S) + (0, σ), each entry within half an ulp of that of the centres."""
     size, width, bits = len(rows), tangent.width, tangent.precision
     phi = fmpz_mat(size, size, [int(value) for row in own.rows for value in row[:size]])
@@ -601,9 +606,7 @@ def _carried(
     return _Columns(_product(tangent, own, columns.rows), radii, exponent)
 
 
-def _at(
-    tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, tau: Fraction
-) -> tuple[list[list[Any]], Matrix, int]:
+def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, tau: Fraction) -> Centre:
     """(J, S) within a step: the centre, and bounds of the errors in ulps 2^exponent."""
     variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(found.variation))
     frame = found.node.errors.frame

@@ -7,16 +7,18 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import heyoka
 import numpy
 
-from heavytop.integrate.heyoka.engines import Compiled, compiled, load
+from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
-from heavytop.precision import Precision, exact, number, numbers
+from heavytop.precision import OrderedRing, Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
+
+if TYPE_CHECKING:
+    pass
 
 # One run of a compiled integrator, step by step.
 #
@@ -52,8 +54,9 @@ class Stepper:
     _one_by_one: bool = False
     rest: Any = None
     _before: Any = None
+    _not_finite: Any = field(default_factory=not_finite)
 
-    def reach(self, target: Any) -> Outcome:
+    def reach(self, target: OrderedRing) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
         while self.rest is None and not (self._covers and self._beyond(target)):
             if self.step_limit is not None and self.steps >= self.step_limit:
@@ -73,10 +76,10 @@ class Stepper:
         outcome = self.reach(target)
         return outcome, self.sample(target) if outcome is Outcome.SUCCESS else None
 
-    def _beyond(self, target: Any) -> bool:
+    def _beyond(self, target: OrderedRing) -> bool:
         return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
 
-    def _steps_short_of(self, target: Any) -> int:
+    def _steps_short_of(self, target: OrderedRing) -> int:
         """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
         if self._one_by_one or not self._largest_step or self._beyond(target):
             return 1
@@ -96,26 +99,26 @@ class Stepper:
         self._before = state, self.engine.dtime, self.steps
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
-        self._covers = True
-        if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
+        self._covers, now = True, self.engine.time
+        if outcome == self._not_finite or now - now != 0:  # infinity and nan
             if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
             self.rest = state
             return Outcome.SUCCESS
-        if self.engine.time == before:
+        if now == before:
             return Outcome.STEP_TOO_SMALL
         self._went(1)
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
         return Outcome.SUCCESS
 
-    def _several(self, count: int, target: Any) -> Outcome:
+    def _several(self, count: int, target: OrderedRing) -> Outcome:
         state, time = self.engine.state.copy(), self.engine.dtime
         began = perf_counter()
         outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
         self._seconds_per_step = (perf_counter() - began) / max(done, 1)
         # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
         self._largest_step = max(self._largest_step, abs(float(largest)))
-        failed = outcome == heyoka.taylor_outcome.err_nf_state
+        failed = outcome == self._not_finite
         if failed or self._beyond(target):
             # what has been seen of the steps behind the target says how many lie before it
             self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
@@ -153,7 +156,7 @@ class Stepper:
         state, time, steps = self._before
         return Place(samples, tuple(state), time, steps, seconds, flags)
 
-    def sample(self, target: Any) -> Any:
+    def sample(self, target: OrderedRing) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
         if self.rest is not None:
@@ -161,7 +164,7 @@ class Stepper:
         return self.engine.update_d_output(target).copy()
 
 
-def are_many(targets: Sequence[Any], precision: Precision) -> bool:
+def are_many(targets: Sequence[OrderedRing], precision: Precision) -> bool:
     """Whether one call of heyoka may be worth its while."""
     return len(targets) >= _MANY and precision.family in _ON_A_GRID
 
@@ -214,7 +217,7 @@ Observer = Callable[[Fraction, Any], None]
 def propagate(
     top: HeavyTop,
     start: State,
-    times: Sequence[Any],
+    times: Sequence[OrderedRing],
     precision: Precision,
     *,
     system: System = HEAVY_TOP,
