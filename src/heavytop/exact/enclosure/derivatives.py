@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf, lcm
-from typing import Any, Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from flint import arb, fmpz, fmpz_mat
@@ -370,7 +370,7 @@ def moved(p: Parameters, datum: int, by: Dual | Exact) -> Parameters:
     return p._replace(inertia=tuple(numbers[:3]), moment=tuple(numbers[3:]))
 
 
-def slope(system: System, p: Parameters, datum: int, unit: Any) -> Callable[[Sequence[Any]], list[Any]]:
+def slope(system: System, p: Parameters, datum: int, unit: mpq) -> Callable[[Sequence[mpq]], list[mpq]]:
     """``unit`` ∂f/∂θ for one of :data:`DATA`."""
     varied = moved(p, datum, Dual(mpq(0), unit))
     return lambda y: [mpq(Dual.of(rate).slope) for rate in system.field(varied, tuple(y))]
@@ -575,7 +575,7 @@ def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> l
     phi = fmpz_mat(size, size, [int(value) for row in own.rows for value in row[:size]])
     product = (phi * fmpz_mat(size, width, [int(value) for row in rows for value in row])).entries()
     half = fmpz(1) << (bits - 1)
-    lines = [[(value + half) >> bits for value in product[width * i : width * (i + 1)]] for i in range(size)]
+    lines = [[mpz(int((value + half) >> bits)) for value in product[width * i : width * (i + 1)]] for i in range(size)]
     for line, row in zip(lines, own.rows, strict=True):
         line[size:] = [value + int(of) for value, of in zip(line[size:], row[size:], strict=True)]
     return lines
@@ -620,7 +620,7 @@ def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, 
 
 
 @whole_evaluation
-def _in_units(motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]) -> EnclosedDerivatives:
+def _in_units(motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes

@@ -309,7 +309,7 @@ class _Scratch:
         self.sizes: Doubles = doubles(8 * orders * count).reshape(count, orders, 8)
         self.widest: Doubles = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
         self.added: Doubles = doubles(8 * grid.words * count).reshape(count, grid.words, 8)
-        self.ends = [pointer(self.results[k]) for k in range(count)]
+        self.ends = [self.results[k].ctypes.data_as(DOUBLES) for k in range(count)]
         arrays, near = (self.sizes, self.widest, self.added), pointer(nearest)
         self.measures = [[near, *(pointer(array[k]) for array in arrays)] for k in range(count)]
 
