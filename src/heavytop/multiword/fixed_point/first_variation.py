@@ -43,6 +43,7 @@ from heavytop.multiword.codegen.machine_code import (
     INTEGERS,
     POINTER,
     Doubles,
+    Integers,
     Machine,
     Value,
     compiled,
@@ -301,10 +302,11 @@ class _Scratch:
         room = WordRows.size(grid, 1, orders)
         self.state, self.rows = doubles(8 * grid.words), doubles(room.rows)
         gathered, places = doubles(16 * grid.words * orders), numpy.zeros(room.places + grid.words, numpy.int64)
-        kept = [self.state, certified.constants, certified.inverses, self.rows, doubles(room.sums), places, doubles(8)]
+        given, sums = [self.state, certified.constants, certified.inverses, self.rows], doubles(room.sums)
+        kept: list[Doubles | Integers] = [*given, sums, places, doubles(8)]
         self.pointers, self.gathered = [pointer(array) for array in kept], pointer(gathered)
         nearest = doubles(8 * orders)
-        self._kept: list[Any] = [*kept, gathered, nearest]
+        self._kept = [*kept, gathered, nearest]
         self.results: Doubles = doubles(8 * grid.words * count).reshape(count, -1)
         self.sizes: Doubles = doubles(8 * orders * count).reshape(count, orders, 8)
         self.widest: Doubles = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
