@@ -49,7 +49,7 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
 def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     planted = Integrator("planted:rotor", "support.hunted_integrators:rotor")
     monkeypatch.setitem(INTEGRATORS, planted.name, planted)
-    hunt = ht.hunt("planted:rotor", budget=64, horizon=1, family="heavy_gyrostat")
+    hunt = ht.hunt("planted:rotor", budget=10, horizon=1, family="heavy_gyrostat")
     worst = hunt.found[0]
     assert worst["system"] == "heavy_gyrostat"
     assert max(map(digits, [*numbers(worst), *map(exact, worst["rotor"])])) <= 3

@@ -8,13 +8,16 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Flag, auto
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.document.names import short
 from heavytop.document.svg import COLOURS, MARKERS, Picture
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10
 from heavytop.records import Metric, Quantity, Report, Series
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # A part of the page, and what its pictures share: legends, names that can be shown, logarithms of what is measured.
 #
@@ -131,7 +134,7 @@ def numbered(label: str, place: int, old: bool = False) -> Key:
     return Key(clip(label, 50), place % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
 
 
-def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
+def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
     """One curve, or points, as its legend has it.
 
     every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.
