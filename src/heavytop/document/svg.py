@@ -13,7 +13,7 @@ from io import StringIO
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from heavytop.document.names import printable
+from heavytop.display import printable
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
 """Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""

@@ -12,8 +12,7 @@ import msgspec
 from heavytop.document.document import Block, Chart
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
-from heavytop.kinds.base import Kind
-from heavytop.kinds.explained import with_explanation
+from heavytop.kinds.base import Kind, with_explanation
 from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns

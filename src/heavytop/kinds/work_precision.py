@@ -28,8 +28,7 @@ from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate import peers
 from heavytop.integrate.integrator import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.kinds.base import Kind
-from heavytop.kinds.explained import with_explanation
+from heavytop.kinds.base import Kind, with_explanation
 from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer

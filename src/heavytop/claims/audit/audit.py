@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,7 +19,7 @@ from typing import Any
 import msgspec
 
 from heavytop.claims.audit.context import ClaimFile
-from heavytop.claims.audit.guard import AuditEnded, in_time
+from heavytop.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
 from heavytop.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.claims.audit.values import ValueClaim, ValueFile
@@ -300,3 +301,28 @@ def _cache_folder() -> Path:
     with suppress(RuntimeError):
         return (Path(home) if home else Path.home() / ".cache") / "heavytop" / "claims"
     return Path(os.devnull) / "none"
+
+
+# The process in which the claim of a file is audited: :mod:`heavytop.claims.audit.guard` starts it.
+
+
+def child() -> None:
+    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
+    path, system_name, seconds = sys.argv[2:]
+    if hasattr(signal, "alarm"):
+        signal.alarm(int(seconds))
+    limit_memory()
+    try:
+        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
+    except HeavyTopError as error:
+        answer = Answer(error=(_printable(error.cause), error.remedy))
+    except MemoryError:
+        answer = Answer(memory=True)
+    except RecursionError:
+        answer = Answer(depth=True)
+    sys.stdout.buffer.write(msgspec.json.encode(answer))
+
+
+def _printable(text: str) -> str:
+    """Text that JSON can carry: a path may hold bytes that are no characters."""
+    return text.encode(errors="replace").decode()

@@ -23,8 +23,7 @@ _BYTES = 3 << 30
 _GRACE = 2
 # the program of the child: it imports nothing of the caller's script, so that this needs no main guard there
 _CHILD = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from heavytop.claims.audit.audit_process import child; child()"
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from heavytop.claims.audit.audit import child; child()"
 )
 _NO_MEMORY = b"Unable to allocate memory"
 _TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or split the claim."
