@@ -19,11 +19,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import decimal_text, exact, exact_text, physical, round_to
 from heavytop.top.vectors import Vector, cross, dot, ordered, vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Rows = Sequence[Sequence[Any]]
 Number = Callable[[Fraction], Any]
@@ -634,3 +638,52 @@ def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> d
         if any(output.pivot):
             found["pivot"] = [exact_text(value) for value in output.pivot]
     return found
+
+
+class InSpace:
+    """A motion whose attitude is seen in space: arrays in double, one entry a sample.
+
+    Each raises InputError for a motion without attitude.
+    """
+
+    __slots__ = ()
+
+    def _in_double(self, what: Output) -> NDArray[np.float64]:
+        raise NotImplementedError
+
+    def quaternions(self) -> NDArray[np.float64]:
+        """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
+
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
+        Raises InputError for a motion without attitude.
+        """
+        return self._in_double(output("quaternion"))
+
+    def matrices(self) -> NDArray[np.float64]:
+        """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
+
+        Raises InputError for a motion without attitude.
+        """
+        return self._in_double(output("matrix"))
+
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
+
+        point: three exact numbers in body axes; None for the centre of mass.
+        pivot: where the fixed point stands in space; None for the origin.
+        Raises InputError for a motion without attitude.
+        """
+        return self._in_double(output("position", point, pivot))
+
+    def omega_space(self) -> NDArray[np.float64]:
+        """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a motion without attitude."""
+        return self._in_double(output("omega-space"))
+
+    def euler(self, sequence: str) -> NDArray[np.float64]:
+        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
+
+        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
+        lock, where they are not defined: of a computed motion b within 16 eps of an end of its interval.
+        Raises InputError for an unknown sequence and for a motion without attitude.
+        """
+        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))

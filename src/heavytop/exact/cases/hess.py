@@ -24,7 +24,6 @@ Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -36,7 +35,7 @@ from heavytop.exact.cases.hess_transfer import System2, Transfer, plan
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.cases.pendulum import Swing, swing
-from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, constant, kept, sign, tanh_sech
+from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, between, constant, kept, sign, tanh_sech
 from heavytop.exact.flint.balls import (
     Undecided,
     ball,
@@ -348,12 +347,7 @@ class HessPendulum(WithAttitude):
         path, began = _path(self)
         frame, speed = path.at(time)
         size = path.inertia[1] * speed
-
-        def carry(vector: Sequence[Any]) -> list[Any]:
-            parts = [dot(vector, direction) for direction in began]
-            return [sum(part * e[k] for part, e in zip(parts, frame, strict=True)) for k in range(3)]
-
-        return [size * e / i for e, i in zip(frame[0], path.inertia, strict=True)], carry
+        return [size * e / i for e, i in zip(frame[0], path.inertia, strict=True)], between(began, frame)
 
 
 @kept
