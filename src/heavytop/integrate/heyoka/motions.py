@@ -142,8 +142,9 @@ class Stepper:
         return self.engine.tc.copy()
 
     def take_up(self, place: Place, covered: Any) -> None:
-        """Go on from there and take the step again that covers the last sample; raises ValueError for a state of another
-        length.
+        """Go on from there and take the step again that covers the last sample.
+
+        Raises ValueError for a state of another length.
         """
         if len(place.state) != len(self.engine.state):
             raise ValueError(f"a state of {len(place.state)} numbers")
