@@ -485,7 +485,7 @@ def _shown(value: Any, digits: int) -> str:
 Observer = Callable[[Fraction, Any], None]
 
 
-class Sampled(Protocol):
+class SampledRun(Protocol):
     """A run that is advanced to wherever its next sample lies."""
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
@@ -502,7 +502,7 @@ class Sampled(Protocol):
 
 
 def sampled(
-    run: Sampled,
+    run: SampledRun,
     targets: Sequence[Any],
     flags: dict[str, str],
     began: float,
