@@ -98,8 +98,8 @@ def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], win
 
 def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
     """The same in derivatives at 0, not divided by factorials: of u and v, and of the product."""
-    parts = ([value / factorial(n) for n, value in enumerate(each)] for each in (real, imaginary))
-    return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(*parts, winding))]
+    u, v = ([value / factorial(n) for n, value in enumerate(each)] for each in (real, imaginary))
+    return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(u, v, winding))]
 
 
 def initial_xi(gamma: Vector) -> list[arb]:

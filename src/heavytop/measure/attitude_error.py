@@ -321,7 +321,7 @@ def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[
             omega = given["omega"]
         else:
             assert rows is not None
-            omega = space_to_body(rows, said.upright(given["omega_space"]))
+            omega = list(space_to_body(rows, said.upright(given["omega_space"])))
         axes = [[ball(entry) for entry in row] for row in posed.axes]
         return [*space_to_body(axes, omega), *space_to_body(axes, gamma)]
 

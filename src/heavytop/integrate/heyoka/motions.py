@@ -67,7 +67,7 @@ class Stepper:
                 return outcome
         return Outcome.SUCCESS
 
-    def at(self, target: Any, _time: Fraction | None = None) -> tuple[Outcome, Any]:
+    def at(self, target: Any, time: Fraction | None = None) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach` and, where that is success, the state there."""
         if target == 0:
             return Outcome.SUCCESS, self.engine.state.copy()

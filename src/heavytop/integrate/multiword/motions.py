@@ -308,22 +308,22 @@ class _Pace:
                 others[row] = tuple(sum(map(Fraction, column), Fraction(0)) for column in words[row].T.tolist())
         return status, states, others
 
-    def at(self, _native: Any, target: Fraction) -> tuple[Outcome, Any]:
-        """The outcome of :meth:`reach`, and the state at ``target``, rounded; None where it cannot be given."""
+    def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
+        """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""
         import numpy
 
-        outcome, precision = self.reach(target), self.precision
+        outcome, precision = self.reach(time), self.precision
         if outcome is not Outcome.SUCCESS:
             return outcome, None
-        if isinstance(self.run, Floating) and not self.scaled.rest and target != 0:
-            words = self.run.words_at(abs(target) * self.scaled.rate).tolist()
+        if isinstance(self.run, Floating) and not self.scaled.rest and time != 0:
+            words = self.run.words_at(abs(time) * self.scaled.rate).tolist()
             pairs = (
                 (words[at], words[at + 8], power) for at, power in zip(PLACES, self.scaled.exponents, strict=False)
             )
             state = sums_of_two(pairs, precision)
             if state is not None:
                 return Outcome.SUCCESS, numpy.array(state)
-        sample = self.sample(target)
+        sample = self.sample(time)
         if sample is None:
             return Outcome.CAPACITY, None
         rounded = native_state(sample, precision)
