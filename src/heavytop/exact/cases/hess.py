@@ -45,7 +45,7 @@ from heavytop.exact.flint.balls import (
     unit_of_time,
     whole_evaluation,
 )
-from heavytop.exact.separable.abel import REMEDY, Inversion, decide
+from heavytop.exact.separable.abel import REMEDY, decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM, LEVEL_MOMENTUM, ExactRelation
 from heavytop.top.equations import HEAVY_TOP
@@ -242,10 +242,7 @@ class HessMotion:
         return self._state(*self._moving(phase, u * scale, v * scale))
 
     def _phase(self, time: arb) -> tuple[arb, int]:
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
-        return phase, turns
+        return phase_at(self.gap, self.origin + time)
 
     def azimuth(self) -> Azimuth:
         """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
