@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE, exact
 from heavytop.store.store import read
@@ -46,7 +46,7 @@ def test_heyoka_against_the_best_peer(benchmark, case: str) -> None:
     def once(each: str) -> float:
         control, _, text = settings[each]
         time.sleep(0.001)
-        run = peers.ready(each, None if text == "eps" else (control, exact(text)))(*problem)
+        run = registry.ready(each, None if text == "eps" else (control, exact(text)))(*problem)
         return run.seconds["run"]
 
     def repeat() -> None:

@@ -43,7 +43,7 @@ from heavytop.claims.audit import guard
 from heavytop.cli import run_command_line
 from heavytop.errors import HeavyTopError
 from heavytop.files import line
-from heavytop.integrate import integrator
+from heavytop.integrate import registry
 
 SECONDS = 20
 CODES = {0, 1, 2, 3}
@@ -418,7 +418,7 @@ def tried(call: Callable[[], object]) -> str:
 
 def main(count: int = 10_000, seed: int = 1, first: int = 0) -> int:
     guard.in_time.__defaults__ = (SECONDS / 2,)
-    integrator.MOST_STEPS = 10**5
+    registry.MOST_STEPS = 10**5
     found: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     began, longest = perf_counter(), 0.0

@@ -18,7 +18,7 @@ import typer
 import heavytop as ht
 from heavytop.cli import app
 from heavytop.comparison import noise
-from heavytop.integrate.peers.source import commands_in
+from heavytop.integrate.registry import commands_in
 from heavytop.kinds import KINDS
 from heavytop.render.terminal import brief
 from heavytop.suite import plan
@@ -210,6 +210,14 @@ def test_commands_are_found_and_wrong_ones_refused() -> None:
 def test_a_page_links_to_what_is_there(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
         assert "://" in link or (page.parent / link).exists(), link
+
+
+def test_every_python_file_that_a_page_names_is_there() -> None:
+    there = {file.relative_to(ROOT).as_posix() for file in (*ROOT.glob("*.py"), *ROOT.glob("[!.]*/**/*.py"))}
+    of_users_and_others = {"heavyTop.py", "mine.py", "NAME.py"}
+    named = {(name(page), file) for page in PAGES for file in re.findall(r"`([\w/]+\.py)`", page.read_text("utf-8"))}
+    known = {(page, file) for page, file in named if any(f"/{each}".endswith(f"/{file}") for each in there)}
+    assert {each for each in named - known if each[1].split("/")[-1] not in of_users_and_others} == set()
 
 
 def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:

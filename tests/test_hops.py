@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 HOPS = Path(__file__).parents[1] / "benchmarks" / "hops.py"
-MOST = {"drift": 70, "propagate": 17, "compare": 16, "reference": 27}
+MOST = {"drift": 64, "propagate": 10, "compare": 16, "reference": 25}
 
 
 @pytest.mark.parametrize("flow", MOST)

@@ -13,7 +13,7 @@ from heavytop.kinds import KINDS
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {"display", "errors", "files", "precision", "processes", "records", "version", "written_numbers"}
+GROUND = {"display", "errors", "files", "guard", "precision", "processes", "records", "version", "written_numbers"}
 FLOORS = (
     {"top"},
     {"multiword"},
@@ -41,7 +41,8 @@ MAY_IMPORT = {
     "display": set(),
     "files": {"errors"},
     "precision": {"errors"},
-    "processes": set(),
+    "guard": set(),
+    "processes": {"guard"},
     "records": set(),
     "version": set(),
     "written_numbers": {"errors", "precision"},

@@ -11,7 +11,7 @@ from support import in_process
 PROGRAM = """
 import asyncio, importlib, os, pkgutil, select, signal, sys
 import filelock, flint, heyoka, jinja2, llvmlite.binding, matplotlib.pyplot, mpmath, msgspec, numpy, rich.live, sympy
-import multiprocessing.connection, typer.rich_utils
+import loky.backend.process, loky.backend.resource_tracker, multiprocessing.connection, typer.rich_utils
 
 for name in ("fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog", "readline"):
     sys.modules[name] = None

@@ -14,10 +14,10 @@ import pytest
 from heavytop.api.integrators import LANGUAGES, new_integrator
 from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import close_all
-from heavytop.integrate.peers.source import commands_in
+from heavytop.integrate.registry import commands_in
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
 from heavytop.suite.integrator_check import check
@@ -63,7 +63,7 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
         assert (built.returncode, built.stderr) == (0, "")
     try:
         case = CASES["generic"]
-        run = peers.ready(command)(case.top, case.start, [1, 2], DOUBLE)
+        run = registry.ready(command)(case.top, case.start, [1, 2], DOUBLE)
         known = propagate(case.top, case.start, [1, 2], DOUBLE)
         assert abs(run.to_numpy() - known.to_numpy()).max() < 1e-9
         assert {each.check for each in check(command) if each.verdict != "kept"} == {"huge"}

@@ -6,209 +6,188 @@ start over in each of them.  The children of this program need nothing of the sc
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
-import subprocess
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from glob import glob
-from multiprocessing import current_process, resource_tracker, spawn
-from multiprocessing.context import SpawnContext, SpawnProcess
-from pathlib import Path
-from threading import Lock, get_ident
-from typing import Any
+from multiprocessing import current_process, resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.queues import SimpleQueue
+from threading import Lock, Thread
+from typing import Any, ParamSpec, TypeVar
 from uuid import uuid4
 
-MARK = "HEAVYTOP_GUARD"
-"""The variable of the environment by which a guard finds what left its process group."""
+from loky.backend import resource_tracker as loky_tracker
+from loky.backend.context import LokyContext
+from loky.backend.process import LokyProcess
+
+from heavytop.guard import MARK, Guard, how_it_ended, kill_marked
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
 SAFE_PATH = "PYTHONSAFEPATH"
 """Python's own: a file such as random.py in the working directory is not taken for a module."""
-_KILL_ALL = f"""read -r _
-for file in $(grep -ls "{MARK}=$1" /proc/[0-9]*/environ); do
-  process=${{file#/proc/}}
-  kill -KILL "${{process%/environ}}"
-done
-kill -KILL 0"""
-"""What the shell of a guard does once its input has ended."""
-_ROUNDS = 20
-"""How often what a process may just have started is looked for."""
+_FAREWELL = 1.0
+"""Seconds that a process which has broken its pipe has to end."""
 _starting = Lock()
 
 
-class _Child(SpawnProcess):
-    """A spawned process that is told nothing of the caller's script.
+class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
+    """A process that begins with :data:`SAFE_PATH`, and goes on without it where this process has none.
 
-    A daemon of multiprocessing, such as the worker of Dask, may start one: it ends with its parent, however that ends.
+    It ends with its parent, however that ends, so that a daemon of multiprocessing may start one, such as the worker of
+    Dask.
 
-    mark: what its environment holds from the beginning, for :func:`kill_marked`; nothing where that is empty.
-    own_path: whether :data:`SAFE_PATH` is set while it begins alone.
+    parent: the end of a pipe whose other end the parent alone holds.
     """
 
-    mark = ""
+    parent: Connection
     own_path = False
 
     def run(self) -> None:
         """In the process: what it starts in turn finds modules as usual."""
+        Thread(target=_end_with, args=(self.parent,), daemon=True).start()
         if self.own_path:
             os.environ.pop(SAFE_PATH, None)
         super().run()
 
     def start(self) -> None:
-        config = current_process()._config  # type: ignore[attr-defined]
-        daemon = config.pop("daemon", None)
-        try:
-            super().start()
-        finally:
-            if daemon is not None:
-                config["daemon"] = daemon
-
-    @staticmethod
-    def _Popen(process_obj: Any) -> Any:  # noqa: N802 - the hook of multiprocessing
-        caller = get_ident()
         with _starting:
-            prepare = spawn.get_preparation_data
-
-            def without_script(name: str) -> dict[str, Any]:
-                data: dict[str, Any] = dict(prepare(name))
-                if get_ident() == caller:  # other threads may be starting processes of their own
-                    for key in ("init_main_from_name", "init_main_from_path"):
-                        data.pop(key, None)
-                return data
-
-            spawn.get_preparation_data = without_script
-            process_obj.own_path = SAFE_PATH not in os.environ
+            here = current_process()
+            daemon, here.daemon = here.daemon, False
             try:
-                with _environment({SAFE_PATH: os.environ.get(SAFE_PATH, "1")}):
-                    resource_tracker.ensure_running()  # which outlives the child, and so has no mark
-                    with _environment({MARK: process_obj.mark} if process_obj.mark else {}):
-                        return SpawnProcess._Popen(process_obj)
+                super().start()
             finally:
-                spawn.get_preparation_data = prepare
+                here.daemon = daemon
+
+    def kill(self) -> None:
+        """At once, where the system can; nothing where it has ended."""
+        if self.pid is not None and self.exitcode is None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(self.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
 @contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """What is started meanwhile has these: a process shows the environment that it began with, forked ones too."""
-    former = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
+def _safe_path() -> Iterator[None]:
+    """What is started meanwhile begins with :data:`SAFE_PATH`."""
+    own = SAFE_PATH in os.environ
+    os.environ.setdefault(SAFE_PATH, "1")
     try:
         yield
     finally:
-        for name, value in former.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        if not own:
+            os.environ.pop(SAFE_PATH, None)
 
 
-class ChildContext(SpawnContext):
-    """In the place of ``multiprocessing.get_context("spawn")``: spawned, as a forked child would share the state of
-    heyoka's compiler and threads, and without the caller's script.
+def _end_with(parent: Connection) -> None:
+    parent.poll(None)  # nothing is ever sent: it has an end
+    os._exit(1)
 
-    mark: what the environment of its processes holds, for :func:`kill_marked`.
+
+class ChildContext(LokyContext):  # type: ignore[misc]
+    """In the place of ``multiprocessing.get_context("spawn")``: a forked child would share the state of heyoka's
+    compiler and threads, a spawned one would import the caller's script.
+
+    mark: what the environment of its processes holds, for :func:`kill_marked`; nothing where that is empty.
     """
 
     def __init__(self, mark: str = "") -> None:
         super().__init__()
-        self._mark = mark
-        with _starting, _environment({SAFE_PATH: os.environ.get(SAFE_PATH, "1")}):
-            resource_tracker.ensure_running()  # the first lock of a pool would start it, from the working directory
+        self.mark = mark
+        self._parent, self._lifeline = multiprocessing.Pipe(duplex=False)
+        self._children: list[_Child] = []
+        with _starting, _safe_path():  # the first lock of a pool would start them, from the working directory
+            if os.name == "posix":
+                resource_tracker.ensure_running()
+            loky_tracker.ensure_running()
 
-    def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
+    def SimpleQueue(self) -> SimpleQueue[Any]:  # noqa: N802
+        """Python's own: that of loky needs more modules, which an integrator may have torn down."""
+        return SimpleQueue(ctx=self)
+
+    def Process(self, *arguments: Any, **options: Any) -> _Child:  # noqa: N802 - the name in multiprocessing
         """A process that is not yet started."""
-        child = _Child(*arguments, **options)
-        child.mark = self._mark
+        marked = {MARK: self.mark} if self.mark else {}
+        child = _Child(*arguments, **options, env={SAFE_PATH: os.environ.get(SAFE_PATH, "1"), **marked})
+        child.parent = self._parent
+        child.own_path = SAFE_PATH not in os.environ
+        self._children.append(child)
         return child
 
+    @property
+    def ending(self) -> str:
+        """How its last process ended by itself; empty where the system does not say."""
+        child = self._children[-1]
+        child.join(_FAREWELL)
+        return "" if child.exitcode is None else how_it_ended(child.exitcode)
 
-def new_mark() -> str:
-    """What no other process has in its environment."""
-    return uuid4().hex
+    def kill(self) -> None:
+        """Kills its processes."""
+        for child in self._children:
+            child.kill()
+
+    def kill_groups(self) -> None:
+        """Kills the process groups that its processes lead."""
+        for child in self._children:
+            if child.pid is not None:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(child.pid, signal.SIGKILL)
+        self.kill()
+
+    def terminate(self) -> None:
+        """Asks its processes to end."""
+        for child in self._children:
+            if child.is_alive():
+                child.terminate()
 
 
-def lead_group() -> None:
-    """In a new process: it leads a process group of its own."""
+def _lead_group(initializer: Callable[..., object] | None, initargs: tuple[Any, ...]) -> None:
     os.setpgid(0, 0)
+    if initializer is not None:
+        initializer(*initargs)
 
 
-class Guard:
-    """A small process that kills its process group once this process has ended, however that came about.
+class GuardedProcess:
+    """A process for one call at a time, the leader of a process group; it ends with whatever it started.
 
-    What is started with :attr:`environment` is killed too where it has left the group, as a program does that calls
-    ``setsid`` or becomes a daemon: what a process starts inherits its environment.  That takes a Linux /proc; elsewhere
-    the group alone is killed.
-
-    group: the process group that it joins; a new one where that is 0.  mark: of :class:`ChildContext`; else a new one.
+    initializer: called in it first with ``initargs``, in its group.
     """
 
-    def __init__(self, group: int = 0, mark: str = "") -> None:
-        self._mark = mark or new_mark()
-        reading, self._lifeline = os.pipe()
-        try:
-            # what it reads ends with this process, which alone holds the other end
-            self._shell = subprocess.Popen(
-                ["/bin/sh", "-c", _KILL_ALL, "sh", self._mark],
-                stdin=reading,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                process_group=group,
-                # a guard inside what another guards is to do its work when that is killed
-                env={name: value for name, value in os.environ.items() if name != MARK},
-            )
-        except BaseException:
-            os.close(self._lifeline)
-            raise
-        finally:
-            os.close(reading)
-        self.group = group or self._shell.pid
+    def __init__(self, initializer: Callable[..., object] | None = None, initargs: tuple[Any, ...] = ()) -> None:
+        self._context = ChildContext(uuid4().hex)
+        self._pool = ProcessPoolExecutor(
+            1, mp_context=self._context, initializer=_lead_group, initargs=(initializer, initargs)
+        )
+        self._guard: Guard | None = None
+
+    def submit(self, call: Callable[P, T], *arguments: P.args, **options: P.kwargs) -> Future[T]:
+        """The call, in the process.  Raises BrokenProcessPool where it died before."""
+        return self._pool.submit(call, *arguments, **options)
+
+    def guard(self, process: int) -> None:
+        """The process, by its number, is there: from now on it ends with this one, however that ends."""
+        with suppress(OSError):
+            self._guard = Guard(process, self._context.mark)
 
     @property
-    def environment(self) -> dict[str, str]:
-        """The variable that marks a process, and all that it starts, as this guard's."""
-        return {MARK: self._mark}
+    def ending(self) -> str:
+        """How the process ended by itself; empty where the system does not say."""
+        return self._context.ending
+
+    def kill(self) -> None:
+        """Kills the process; what it started lives until :meth:`end`."""
+        self._context.kill()
 
     def end(self) -> None:
-        """Kills every process of the group, the guard too, and those that left it."""
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.group, signal.SIGKILL)
-        kill_marked(self._mark)
-        self._shell.wait()
-        with suppress(OSError):
-            os.close(self._lifeline)
+        """Kills the process and whatever it started, however that left it.
 
-
-def kill_marked(mark: str) -> None:
-    """Kills every process that has this mark, also where it has left its group or lost its parent."""
-    for _ in range(_ROUNDS):
-        if not (left := _marked(mark)):
-            break
-        for process in left:
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(process, signal.SIGKILL)
-
-
-def end_pool(pool: ProcessPoolExecutor, guard: Guard | None, mark: str) -> None:
-    """Kills the processes of a pool, each the leader of a group, and whatever they started, however it left them.
-
-    Only then its threads end: they wait for pipes that a forked process holds too.
-    """
-    for process in list((pool._processes or {}).values()):
-        if process.pid is not None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        process.kill()
-    if guard is not None:
-        guard.end()
-    kill_marked(mark)
-    pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _marked(mark: str) -> list[int]:
-    """The processes whose environment has this mark; none where the system does not show environments."""
-    found, wanted = [], f"{MARK}={mark}".encode()
-    for file in glob("/proc/[0-9]*/environ"):
-        with suppress(OSError):  # it has ended, or is somebody else's; that of a zombie is empty
-            if wanted in Path(file).read_bytes():
-                found.append(int(file.split("/")[2]))
-    return found
+        Only then the threads of its pool end: they wait for pipes that a forked process holds too.
+        """
+        self._context.kill_groups()
+        if self._guard is not None:
+            self._guard.end()
+        kill_marked(self._context.mark)
+        self._pool.shutdown(wait=True, cancel_futures=True)

@@ -126,7 +126,7 @@ def test_no_class_is_tried_whose_conditions_fail(monkeypatch):
 
 def test_the_table_of_the_classes_is_readable():
     lines = table()
-    assert len({line[:2] for line in lines}) == len(lines) == 23
+    assert len({line[:2] for line in lines}) == len(lines) >= 23
     body = "I1 = I2 = 2 I3; P c = 0; P r != 0"
     assert ("heavy_top", "Kovalevskaya", body, "gamma != 0; xi != 0") in lines
     assert ("heavy_top", "Delone", body, "xi = 0") in lines

@@ -18,10 +18,10 @@ from heavytop.exact.cases.lagrange import Lagrange
 from heavytop.exact.elliptic.weierstrass import DegenerateLattice, Lattice
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
+from heavytop.precision import cross, dot
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 from support.elliptic_helpers import (
     assert_same,
     assert_solves_its_equations,

@@ -19,9 +19,9 @@ from heavytop.exact.cases.staude import (
     staude_stability,
 )
 from heavytop.exact.catalogue import find
+from heavytop.precision import cross, dot
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 

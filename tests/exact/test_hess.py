@@ -15,9 +15,9 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
 from heavytop.measure.reference import reference
+from heavytop.precision import dot
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction

@@ -12,8 +12,8 @@ from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, start_of
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.precision import cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 from support.proofs import assert_attitude, assert_meets, positive, rational, triple
 
 F = Fraction

@@ -12,8 +12,8 @@ from heavytop.exact.cases.lagrange import Lagrange, SphericalTop
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.catalogue import find, matches
 from heavytop.exact.enclosure.run import Validated
+from heavytop.precision import cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction

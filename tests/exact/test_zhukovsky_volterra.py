@@ -14,9 +14,9 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
+from heavytop.precision import dot
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction

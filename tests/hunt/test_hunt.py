@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
-from heavytop.integrate.integrator import INTEGRATORS, Integrator
+from heavytop.integrate.registry import INTEGRATORS, Integrator
 from heavytop.kinds import KINDS
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact

@@ -18,11 +18,11 @@ import pytest
 import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import command as commands
 from heavytop.integrate.peers.command import Command, Session, number_text
-from heavytop.integrate.peers.source import commands_in, named
+from heavytop.integrate.registry import commands_in, named
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.suite.integrator_check import check
@@ -132,7 +132,7 @@ def _nothing_is_left() -> Iterator[None]:
 def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str) -> None:
     given = program(fault, timeout=SLOW if fault in SILENT else "60")
     began = monotonic()
-    integrate = peers.ready(given, ("step", Fraction(1, 4)))
+    integrate = registry.ready(given, ("step", Fraction(1, 4)))
     with pytest.raises(PeerFailed) as caught:
         [integrate(CASE.top, CASE.start, TIMES, DOUBLE) for _ in range(2)]
     assert caught.value.cause.startswith("rk4 ")
@@ -162,7 +162,7 @@ def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
 
 @pytest.mark.parametrize("fault", ["", "forks", "becomes a daemon", "chatty errors", "counts none"])
 def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
-    run = peers.ready(program(fault), ("step", Fraction(1, 50)))(CASE.top, CASE.start, TIMES, DOUBLE)
+    run = registry.ready(program(fault), ("step", Fraction(1, 50)))(CASE.top, CASE.start, TIMES, DOUBLE)
     known = propagate(CASE.top, CASE.start, TIMES, DOUBLE)
     assert run.times == known.times
     assert np.abs(run.to_numpy() - known.to_numpy()).max() < 1e-7
@@ -175,7 +175,7 @@ def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
 
 def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_one() -> None:
     given, texts = program(), []
-    integrate = peers.ready(given)
+    integrate = registry.ready(given)
     first = commands._idle.get(given, [])
     assert not first
     for _ in range(3):
@@ -201,7 +201,7 @@ def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_
 
 def test_what_a_program_declares_that_it_cannot_do_is_never_sent() -> None:
     forward = program("dies at the start", directions=("forward",), precisions=("double", "real:BITS"))
-    integrate = peers.ready(forward)
+    integrate = registry.ready(forward)
     for options, what in (
         (([Fraction(-1)], DOUBLE), "direction backward"),
         (([Fraction(1)], QUAD), "format quad"),
@@ -262,13 +262,13 @@ def test_states_come_back_as_decimal_hexadecimal_fortran_or_fraction() -> None:
 
 
 def test_the_seconds_of_a_request_are_of_this_clock_and_not_what_the_program_says() -> None:
-    run = peers.ready(program(), ("step", Fraction(1, 200)))(CASE.top, CASE.start, [Fraction(10)], DOUBLE)
+    run = registry.ready(program(), ("step", Fraction(1, 200)))(CASE.top, CASE.start, [Fraction(10)], DOUBLE)
     assert run.seconds["program"] == 0.001
     assert 0.01 < run.seconds["run"] < 5
     # what it takes for a request without times is its own affair: no more than 1 ms of that is taken off
-    napping = peers.ready(program("naps"))(CASE.top, CASE.start, TIMES, DOUBLE)
+    napping = registry.ready(program("naps"))(CASE.top, CASE.start, TIMES, DOUBLE)
     assert napping.seconds["run"] > 0.029
-    trivial = peers.ready(program())
+    trivial = registry.ready(program())
     found = [trivial(CASE.top, CASE.start, [Fraction(1, 100)], DOUBLE).seconds["run"] for _ in range(50)]
     assert min(found) > 1e-6
 
@@ -338,7 +338,7 @@ def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, li
     toml(tmp_path)
     given = msgspec.structs.replace(program(), command=tuple(line), folder=str(tmp_path))
     with pytest.raises(PeerFailed, match=r"there is no program|is not executable"):
-        peers.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
+        registry.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ import pytest
 from heavytop.cases import CASES, Case
 from heavytop.errors import InputError, PeerFailed
 from heavytop.exact.enclosure.run import Validated
-from heavytop.integrate import integrator, peers, registry
+from heavytop.integrate import registry
 from heavytop.integrate.broken import FAULTS, Fault
-from heavytop.integrate.integrator import INTEGRATORS, load
+from heavytop.integrate.registry import INTEGRATORS, load
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
 from heavytop.top.equations import HEAVY_TOP, System
@@ -52,7 +52,7 @@ def test_capabilities_are_those_of_the_functions(name: str) -> None:
     each = INTEGRATORS[name]
     if each.lacks:
         return
-    taken = set(inspect.signature(peers.peer(name)).parameters)
+    taken = set(inspect.signature(registry.peer(name)).parameters)
     assert each.control in taken
     assert {"step": "tolerance", "tolerance": "step"}[each.control] not in taken
     assert each.streams == ({"observer", "step_limit", "place", "mark"} <= taken)
@@ -69,7 +69,7 @@ def test_capabilities_are_those_of_the_functions(name: str) -> None:
 def test_an_integrator_added_as_the_manual_says_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     """An entry point, and a line of the table."""
     entry = EntryPoint("mine:own", "heavytop.integrate.peers.splitting:order2", "heavytop.peers")
-    monkeypatch.setattr(peers, "entry_points", lambda group: [entry])
+    monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
     monkeypatch.setitem(INTEGRATORS, "new", replace(INTEGRATORS["splitting:2"], name="new"))
     shown = heavytop("list", "--json")
     assert shown.returncode == 0
@@ -262,7 +262,7 @@ def need(name: str) -> None:
 @pytest.fixture(autouse=True)
 def everything_in_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """The guard stands before the integrators: here they are tried themselves."""
-    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)
+    monkeypatch.setattr(registry, "MOST_STEPS", 10**400)
 
 
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)

@@ -24,13 +24,12 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import orientation, permuted, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, working_precision
-from heavytop.integrate import integrator
+from heavytop.integrate import registry
 from heavytop.integrate.peers.command import Request
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.precision import DOUBLE, exact, parse
+from heavytop.precision import DOUBLE, cross, exact, parse
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross
 from support.helpers import unit_vector, vector
 
 F = Fraction
@@ -310,7 +309,7 @@ def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> Non
     """1e13 turns: the rotor's rate counts, though Ω is small."""
     top = HeavyTop((1, 1, 2), 0, (0, 0, 0), ("1e13", 0, 0))
     problem = Problem.of(top, State((0, "1e-3", 0), (0, 0, 1)), DOUBLE, HEAVY_GYROSTAT)
-    assert integrator.expected_steps(problem, F(1)) > 10**12
+    assert registry.expected_steps(problem, F(1)) > 10**12
     with pytest.raises(ht.OutOfReach):
         ht.propagate(top, State((0, "1e-3", 0), (0, 0, 1)), [1])
 

@@ -17,8 +17,7 @@ from heavytop.integrate.multiword import motions as multiword_motions
 from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import RoundedTimes, check_times
+from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 CASE = CASES["kovalevskaya"]
 INTEGRATORS = {"heyoka": propagate, "multiword": propagate_words}

@@ -15,7 +15,7 @@ import pytest
 from heavytop.cases import CASES
 from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError, PeerFailed
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.peers import contract
 from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, QUAD
@@ -62,7 +62,7 @@ rude, mute, refuses = raises(Rude("stop")), raises(Mute()), raises(InputError("N
 told = raises(ValueError("two\\nlines \\x1b[31m" + 5000 * "x"))
 deep = lambda *a, **k: deep(*a, **k)
 leaves = lambda *_, **__: sys.exit("goodbye")
-dies = lambda *_, **__: os._exit(9)
+dies = lambda *_, **__: os.kill(os.getpid(), 11)
 
 
 def changed(**changes):
@@ -240,7 +240,7 @@ def plan(folder: Path, *names: str) -> Path:
 
 @pytest.mark.parametrize("name", FAILURES)
 def test_a_peer_that_fails_says_what_it_did(package: Path, name: str, capfd) -> None:
-    peer = peers.ready(f"mine:{name}")
+    peer = registry.ready(f"mine:{name}")
     with pytest.raises(PeerFailed) as caught:
         peer(CASE.top, CASE.start, TIMES, DOUBLE)
     assert caught.value.cause.startswith(f"mine:{name} ") or name.startswith("double")
@@ -261,7 +261,7 @@ def test_a_peer_that_is_only_rude_is_measured_like_a_polite_one(package: Path, n
         return np.geterr(), sys.stdout, (CASE.top, CASE.start), DOUBLE.bits, Path.cwd(), handlers
 
     before = state()
-    found = peers.ready(f"mine:{name}")(CASE.top, CASE.start, TIMES, DOUBLE)
+    found = registry.ready(f"mine:{name}")(CASE.top, CASE.start, TIMES, DOUBLE)
     assert state() == before
     ours = run_peer("heyoka", CASE.top, CASE.start, TIMES, DOUBLE)
     assert found.times == ours.times
@@ -312,7 +312,8 @@ def test_a_peer_that_ends_its_process_fails_its_own_row_alone(package: Path) -> 
     assert (done.returncode, without_progress(done.stderr)) == (3, "")
     document = json.loads((package / "out" / "report.json").read_text("utf-8"))
     assert [row["outcome"] for row in document["rows"]] == ["failed", "success"]
-    assert document["rows"][0]["against"] == "nothing: mine:dies ended its process 3 times in euler/T=2 tolerance=1e-9"
+    said = "nothing: mine:dies ended its process 3 times, by SIGSEGV in euler/T=2 tolerance=1e-9"
+    assert document["rows"][0]["against"] == said
 
 
 def test_what_is_a_mistake_of_the_plan_stays_an_error(package: Path) -> None:
@@ -320,9 +321,9 @@ def test_what_is_a_mistake_of_the_plan_stays_an_error(package: Path) -> None:
         with pytest.raises(InputError, match="Unknown integrator"):
             expand(load(str(plan(package, name)))[0])
     with pytest.raises(InputError, match="has no quad"):
-        peers.ready("scipy:DOP853")(CASE.top, CASE.start, TIMES, QUAD)
+        registry.ready("scipy:DOP853")(CASE.top, CASE.start, TIMES, QUAD)
     with pytest.raises(PeerFailed, match="mine:honest has no step"):
-        peers.ready("mine:honest", ("step", Fraction(1, 2)))
+        registry.ready("mine:honest", ("step", Fraction(1, 2)))
 
 
 def test_an_interrupt_passes(package: Path) -> None:
@@ -338,7 +339,7 @@ def test_peers_in_many_threads_leave_standard_output_as_it_was(package: Path) ->
     before, found = (sys.stdout, sys.stderr), []
 
     def work() -> None:
-        found.append(peers.ready("mine:chatty")(CASE.top, CASE.start, TIMES, DOUBLE).states[-1])
+        found.append(registry.ready("mine:chatty")(CASE.top, CASE.start, TIMES, DOUBLE).states[-1])
 
     threads = [threading.Thread(target=work) for _ in range(8)]
     for thread in threads:
@@ -353,7 +354,7 @@ def test_peers_in_many_threads_leave_standard_output_as_it_was(package: Path) ->
 @pytest.mark.parametrize("precision", [DOUBLE, QUAD], ids=lambda p: p.name)
 def test_the_states_that_pass_are_the_bits_that_were_returned(precision) -> None:
     kept = run_peer("heyoka", CASE.top, CASE.start, TIMES, precision)
-    raw = peers.peer("heyoka")(CASE.top, CASE.start, TIMES, precision)
+    raw = registry.peer("heyoka")(CASE.top, CASE.start, TIMES, precision)
     assert kept.texts() == raw.texts()
     assert (kept.times, kept.steps, kept.flags, kept.outcome) == (raw.times, raw.steps, raw.flags, raw.outcome)
 

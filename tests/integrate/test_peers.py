@@ -12,11 +12,11 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.peers.double import Solved, count, double_peer, rates
 from heavytop.integrate.peers.mpmath_taylor import odefun
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
@@ -205,7 +205,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("package")
 def test_another_package_adds_peers_and_replaces_none() -> None:
     case = CASES["generic"]
-    assert peers.available()["mine:midpoint"] is None
+    assert registry.available()["mine:midpoint"] is None
     coarse, fine = (
         run_peer("mine:midpoint", case.top, case.start, TIMES, setting=("step", Fraction(1, n))) for n in (50, 100)
     )
@@ -225,9 +225,9 @@ def test_another_package_adds_peers_and_replaces_none() -> None:
 )
 def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
     with pytest.raises(InputError, match=cause) as caught:
-        peers.peer(name)
+        registry.peer(name)
     assert "repair or remove that package" in caught.value.remedy
-    assert cause in str(peers.available()[name])
+    assert cause in str(registry.available()[name])
 
 
 @pytest.mark.parametrize(
@@ -243,15 +243,15 @@ def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
 def test_a_peer_that_is_not_installed_says_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch, module: str, names: set[str]
 ) -> None:
-    before = {name for name, reason in peers.available().items() if reason is None}
+    before = {name for name, reason in registry.available().items() if reason is None}
     monkeypatch.setitem(sys.modules, module, None)
-    after = {name for name, reason in peers.available().items() if reason is None}
+    after = {name for name, reason in registry.available().items() if reason is None}
     assert before - after == names
     for name in names:
         with pytest.raises(InputError, match=f"needs {module}, which is not installed") as caught:
-            peers.require(name)
+            registry.require(name)
         assert "pip install 'heavytop[peers]'" in caught.value.remedy
-        assert "pip install 'heavytop[peers]'" in str(peers.available()[name])
+        assert "pip install 'heavytop[peers]'" in str(registry.available()[name])
 
 
 def test_without_numba_the_field_is_evaluated_in_python() -> None:
@@ -259,11 +259,11 @@ def test_without_numba_the_field_is_evaluated_in_python() -> None:
 import sys
 sys.modules["numba"] = None
 from fractions import Fraction
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.cases import CASES
 case = CASES["generic"]
 for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
-    run = peers.ready(name, (control, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
+    run = registry.ready(name, (control, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
     print(run.flags["field"], *run.states[-1])
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -277,7 +277,7 @@ for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4
 
 def test_nothing_is_imported_before_it_is_used() -> None:
     code = (
-        "import sys, heavytop.integrate.peers as p; p.known();"
+        "import sys, heavytop.integrate.registry as p; p.known();"
         "print([m for m in ('numba', 'jax', 'scipy', 'CyRK', 'sksundae', 'heyoka') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.cli import app
-from heavytop.integrate.integrator import INTEGRATORS, MOST_STEPS, require_reach
+from heavytop.integrate.registry import INTEGRATORS, MOST_STEPS, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.top.amplification import square_of_rate
+from heavytop.top.equations import square_of_rate
 from support.reports import expand, load, rows
 
 TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

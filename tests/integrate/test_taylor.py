@@ -10,12 +10,10 @@ from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
-from heavytop.top.vectors import dot
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 from support.helpers import VECTORS, start_of, top_of
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

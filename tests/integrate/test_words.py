@@ -21,11 +21,10 @@ from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.multiword.codegen import recurrence
 from heavytop.multiword.codegen.machine_code import once
 from heavytop.multiword.double_double import double_double_run, steps
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 from support.helpers import VECTORS, start_of, top_of, unit_vector
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

@@ -11,7 +11,7 @@ from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.heyoka.motions import first_steps, propagate
-from heavytop.integrate.integrator import INTEGRATORS
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.local_error import LocalError, single_calls

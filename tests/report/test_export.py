@@ -17,7 +17,8 @@ from heavytop.document.document import row_name
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report
-from heavytop.render.export import FORMATS, LOST, export
+from heavytop.render import FORMATS
+from heavytop.render.export import LOST, export
 from support import in_process
 from support.reports import store
 
@@ -124,8 +125,8 @@ def test_the_command_writes_a_file_or_standard_output_and_refuses_another_format
     assert (tmp_path / "rows.csv").stat().st_size > 1000
     refused = heavytop("--to", "excel")
     assert refused.returncode == 2
-    assert "bencher, github-action-benchmark, asv, junit, csv" in refused.stderr
+    assert ", ".join(FORMATS) in refused.stderr
     with pytest.raises(InputError):
         export(Report("heavytop-report/2", {}, {}, []), "", KINDS)
     assert json.loads(export(Report("heavytop-report/2", {}, {}, []), "bencher", KINDS))
-    assert len(FORMATS) == 5
+    assert {"bencher", "github-action-benchmark", "asv", "junit", "csv"} <= FORMATS.keys()

@@ -21,6 +21,7 @@ from heavytop.comparison.noise import (
 from heavytop.kinds import KINDS
 from heavytop.measure.rounding_noise import some_of
 from heavytop.records import Against, Data, Metric, Quantity, Row, Series
+from heavytop.suite.rows import computed
 from heavytop.top.amplification import amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support import degraded_integrators as degraded
@@ -164,20 +165,65 @@ def test_reruns_within_what_step_control_does_are_reproducible_and_excuse_no_mor
 @pytest.mark.parametrize(
     ("value", "changes", "expected"),
     [
-        ("3e-8", {}, "same"),  # within the loss
-        ("5e-8", {}, "worse"),  # beyond it, by no rounding of these steps
+        ("1.09e-8", {}, "same"),  # a tenth
+        ("1.11e-8", {}, "worse"),  # beyond it, by no rounding of these steps
+        ("9.2e-9", {}, "same"),
+        ("9.0e-9", {}, "better"),
         ("5e-8", {"evaluations": 6401}, "same"),  # a step was tried again: what step control does
         ("2e-7", {"evaluations": 6401}, "worse"),  # and no more
     ],
 )
-def test_where_every_step_is_the_same_one_no_step_control_is_allowed_for(value, changes, expected) -> None:
-    def third_party(value: str, **changes) -> Row:
-        same = {"measure": "work_precision", "integrator": "mine:rk4", "data": FREE, "evaluations": 6400}
-        return one(value, None, "drift_energy_max", **same | changes)
-
+def test_where_every_step_is_the_same_one_an_error_may_grow_by_a_tenth(value, changes, expected) -> None:
     assert judged(third_party("1e-8"), third_party(value, **changes))[0] == expected
     # two errors that the roundings of the steps bring apart
     assert judged(third_party("1e-12"), third_party("8e-12"))[0] == "same"
+
+
+def third_party(value: str, name: str = "drift_energy_max", **changes) -> Row:
+    same = {"measure": "work_precision", "integrator": "mine:rk4", "data": FREE, "evaluations": 6400}
+    return one(value, None, name, **same | changes)
+
+
+def test_a_loss_that_a_policy_gives_is_that_of_truncation_too() -> None:
+    for given in ({"loss_bits": 2}, {"loss_digits": "0.6"}, {"rule": (Rule(metric="drift_*", loss_bits=2),)}):
+        assert judged(third_party("1e-8"), third_party("3e-8"), **given)[0] == "same"
+        assert judged(third_party("1e-8"), third_party("5e-8"), **given)[0] == "worse"
+    assert judged(third_party("1e-8"), third_party("1.07e-8"), loss_bits="0.05")[0] == "worse"
+
+
+def test_of_a_fixed_step_nothing_need_be_counted_and_of_others_reruns_tell() -> None:
+    def stepped(value: str) -> Row:
+        subject = computed("mine:rk4", step="1/100")
+        return replace(third_party(value, evaluations=None), key=replace(third_party(value).key, subject=subject))
+
+    assert judged(stepped("1e-8"), stepped("1.11e-8"))[0] == "worse"
+    uncounted = [third_party(value, evaluations=None) for value in ("1e-8", "1.11e-8")]
+    assert judged(*uncounted)[0] == "same"
+    # reruns that are 1 % apart, and such that are a third
+    assert judged(one("1e-6", 0.003), one("1.11e-6", 0.003))[0] == "worse"
+    assert judged(one("1e-6", 0.1), one("1.11e-6", 0.1))[0] == "same"
+
+
+def test_slight_losses_are_no_loss_where_the_integrator_gained_more() -> None:
+    names = "drift_energy_max", "drift_area_max"
+
+    def two(first: str, second: str, case: str) -> Row:
+        metrics = {
+            name: third_party(value, name).metrics[name] for name, value in zip(names, (first, second), strict=True)
+        }
+        return replace(third_party(first, case=case), metrics=metrics)
+
+    faulty = report(two("1e-8", "5e-8", "euler"), two("1e-8", "1e-8", "lagrange"))
+    mended = report(two("1e-8", "2e-8", "euler"), two("1.5e-8", "1e-8", "lagrange"))
+    better, worse = compare(faulty, mended, Policy()), compare(mended, faulty, Policy())
+    assert (better.verdict, worse.verdict) == ("better", "worse")
+    assert [finding.verdict.value for finding in better.changed] == ["better"]
+    assert [change.identity.case for change in better.rows] == ["euler"]
+    assert not any("lagrange" in sentence for sentence in better.sentences)
+    # a loss beyond what any error is allowed, or beyond a limit, is one whatever was gained
+    spoiled = report(two("1e-8", "1e-9", "euler"), two("5e-8", "1e-8", "lagrange"))
+    assert compare(faulty, spoiled, Policy()).verdict == "worse"
+    assert compare(faulty, mended, Policy(rule=(Rule(case="lagrange", limit="1.2e-8"),))).verdict == "worse"
 
 
 def test_an_escape_whose_reruns_part_excuses_nothing() -> None:

@@ -16,8 +16,8 @@ from heavytop.api.run_folder import prepare
 from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.files import line, verified
-from heavytop.integrate import peers
-from heavytop.integrate.peers.source import command_of, named
+from heavytop.integrate import registry
+from heavytop.integrate.registry import command_of, named
 from heavytop.store.store import DIGEST, FILE
 from heavytop.suite.plan import former
 from support import in_process
@@ -133,9 +133,9 @@ def test_python_takes_both_names_and_says_the_one_of_now() -> None:
 
 
 def test_the_name_of_before_is_nobody_elses(tmp_path: Path) -> None:
-    assert "multiword" in peers.known()
-    assert "words" not in peers.known()
-    assert not peers.is_third_party("words")
+    assert "multiword" in registry.known()
+    assert "words" not in registry.known()
+    assert not registry.is_third_party("words")
     assert named("words") == "multiword"
     with pytest.raises(InputError, match="built-in"):
         command_of({"name": "words", "command": ["x"], "setting": "step"}, tmp_path, "here")

@@ -14,19 +14,18 @@ from heavytop.cases import CASES
 from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
-from heavytop.integrate import integrator
+from heavytop.integrate import registry
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import growth
 from heavytop.measure import truth
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.truth import reference
-from heavytop.precision import DOUBLE
+from heavytop.precision import DOUBLE, cross
 from heavytop.records import Report
 from heavytop.suite.case_text import ensemble_of
 from heavytop.suite.checkpoint import Saved
 from heavytop.top.equations import GYROSTAT, holding
-from heavytop.top.vectors import cross
 from support.reports import compare, expand, load, measure, summary
 
 CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
@@ -183,7 +182,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
         return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
 
     plain = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
-    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
     monkeypatch.setattr(growth, "ensemble_of", with_a_wild_one)
     found = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
     assert plain.metrics["starts_failed"].value == "0"

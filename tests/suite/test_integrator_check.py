@@ -7,7 +7,7 @@ from time import monotonic, sleep
 
 import pytest
 
-from heavytop.integrate.peers.source import named
+from heavytop.integrate.registry import named
 from heavytop.suite import integrator_check
 from heavytop.suite.integrator_check import check
 

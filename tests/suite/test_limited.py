@@ -17,6 +17,7 @@ import pytest
 import heavytop as ht
 from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
+from heavytop.guard import how_it_ended
 from heavytop.kinds import KINDS
 from heavytop.suite.limited import RowLimits
 from heavytop.suite.plan import read
@@ -171,6 +172,11 @@ def replace_outcome(row, outcome: str):
     import msgspec
 
     return msgspec.structs.replace(row, outcome=outcome)
+
+
+def test_an_end_is_named_by_its_signal_or_its_exit_code() -> None:
+    said = {0: "with exit code 0", 3: "with exit code 3", -11: "by SIGSEGV", -9: "by SIGKILL", -40: "by signal 40"}
+    assert {code: how_it_ended(code) for code in said} == said
 
 
 def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: Path) -> None:

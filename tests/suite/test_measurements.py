@@ -7,7 +7,7 @@ from fractions import Fraction
 import msgspec
 import pytest
 
-from heavytop.integrate import integrator
+from heavytop.integrate import registry
 from heavytop.kinds.break_away_law import break_away_law
 from heavytop.precision import time_text
 from heavytop.suite.rows import Task
@@ -71,7 +71,7 @@ def test_the_verdict_on_the_claim_is_a_row() -> None:
 
 
 def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
     given = task("drift lagrange double")
     assert given.case is not None
     wild = replace(given.case.start, omega=(Fraction(10) ** 140, Fraction(10) ** 140, Fraction(1)))

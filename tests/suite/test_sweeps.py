@@ -10,8 +10,8 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.kinds import KINDS
+from heavytop.precision import dot
 from heavytop.suite.sweeps import Random
-from heavytop.top.vectors import dot
 from support.reports import expand, load, rows
 
 GRID = """[[sweep]]

@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.top.equations import HEAVY_GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -48,7 +48,7 @@ def start_of(given: dict) -> State:
 
 def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
     """One run of a peer, as the rows of a report make it."""
-    return peers.ready(name, setting)(*problem, **options)
+    return registry.ready(name, setting)(*problem, **options)
 
 
 def without_progress(errors: str) -> str:

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
+from heavytop.precision import cross, dot
 from heavytop.top.attitude import (
     attitude_from_angles,
     euler_angles,
@@ -16,7 +17,6 @@ from heavytop.top.attitude import (
     rotation_angle,
     unwrap,
 )
-from heavytop.top.vectors import cross, dot
 from support.helpers import unit_vector
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
+from heavytop.precision import cross, dot
 from heavytop.top.attitude import (
     SEQUENCES,
     Attitude,
@@ -25,7 +26,6 @@ from heavytop.top.attitude import (
     rows_of_euler,
     transposed,
 )
-from heavytop.top.vectors import cross, dot
 
 IDENTITY = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))
 

@@ -10,9 +10,9 @@ from flint import arb, fmpq
 
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.engines import expressions
+from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross
 from support.helpers import fraction, positive, unit_vector, vector
 
 

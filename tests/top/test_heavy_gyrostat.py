@@ -9,7 +9,8 @@ from flint import fmpq, fmpq_mpoly_ctx
 
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import orientation, renamed_state, renamed_top
-from heavytop.top.amplification import rate, square_of_rate
+from heavytop.precision import cross, dot
+from heavytop.top.amplification import rate
 from heavytop.top.equations import (
     GYROSTAT,
     HEAVY_GYROSTAT,
@@ -22,12 +23,12 @@ from heavytop.top.equations import (
     holding,
     kovalevskaya_yehia,
     largest,
+    square_of_rate,
     sretensky,
     system,
     system_of,
 )
 from heavytop.top.heavy_top import HeavyTop, State, data_texts, require_physical
-from heavytop.top.vectors import cross, dot
 from support.helpers import fraction, positive, unit_vector, vector
 
 STARTS = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

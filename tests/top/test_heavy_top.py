@@ -6,9 +6,9 @@ from random import Random
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.precision import dot
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
-from heavytop.top.vectors import dot
 from support.helpers import unit_vector, vector
 
 

@@ -7,10 +7,10 @@ from random import Random
 import pytest
 from flint import fmpq, fmpq_poly
 
+from heavytop.precision import cross, dot
 from heavytop.top import equations
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 from support.helpers import fraction, positive, unit_vector, vector
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError
-from heavytop.top.times import DoubleTimes, TimeText, check_times
+from heavytop.top.heavy_top import DoubleTimes, TimeText, check_times
 
 TOP = ht.HeavyTop((2, 2, 1), 1, (0, 0, "1/2"))
 START = ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7"))

@@ -13,19 +13,21 @@ from heavytop.errors import InputError, quoted
 from heavytop.precision import (
     DOUBLE,
     Precision,
+    dot,
     exact,
     last_call,
+    ordered,
     parse,
     physical,
     require,
     shown,
     usable_tolerance,
+    vector,
     whole,
 )
 from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
-from heavytop.top.vectors import dot, ordered, vector
 
 Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
 """A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""

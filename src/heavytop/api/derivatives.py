@@ -15,12 +15,11 @@ from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.derivatives import PARAMETERS, STARTS, Derivatives, known_derivatives
 from heavytop.measure.scalar import digits_of, digits_text
-from heavytop.precision import decimal_text, exact, log10, shown
+from heavytop.precision import decimal_text, exact, log10, ordered, shown
 from heavytop.suite.score import required
 from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import ordered
 from heavytop.trajectories.observed import MOST, bits_of, component
 
 _SHAPE = "Give an array of shape (n, 6, 6) with [i, j] = ∂y_i(t)/∂y_j(0), y = (Ω1, Ω2, Ω3, γ1, γ2, γ3)."

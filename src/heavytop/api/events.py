@@ -26,8 +26,7 @@ from heavytop.event_times.proven import proven_events
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
-from heavytop.integrate.peers.source import named
-from heavytop.measure.motion import Setup
+from heavytop.integrate.registry import Setup, named
 from heavytop.measure.reference import DIGITS, Ball
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
 from heavytop.top.amplification import amplification

@@ -11,10 +11,9 @@ from typing import Any
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, quoted
-from heavytop.integrate import peers
-from heavytop.integrate.integrator import IntegratorSource
+from heavytop.integrate import registry
 from heavytop.integrate.peers.command import close_all
-from heavytop.integrate.peers.source import named
+from heavytop.integrate.registry import IntegratorSource, named
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, physical, time_text, whole
 from heavytop.render.hunt import hunt_text
@@ -105,10 +104,10 @@ def asked_for(
     seed: int,
 ) -> Asked:
     """The search, checked; raises InputError as :func:`hunt` does."""
-    peers.require(which)
+    registry.require(which)
     other = None if against is None else named(against)
     if other is not None:
-        peers.require(other)
+        registry.require(other)
     if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")

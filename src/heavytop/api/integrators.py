@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.files import replace
-from heavytop.integrate.peers.source import named
+from heavytop.integrate.registry import named
 from heavytop.suite.integrator_check import Checked, check
 from heavytop.version import commit
 

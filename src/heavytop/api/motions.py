@@ -17,21 +17,17 @@ from heavytop.exact.catalogue import find
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
-from heavytop.integrate.integrator import described, require_reach
-from heavytop.integrate.peers.source import named
+from heavytop.integrate.registry import Setup, described, named, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.derivatives import which_derivatives
-from heavytop.measure.motion import Motion, Setup, compute
+from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
-from heavytop.precision import DOUBLE, LARGEST, Precision, exact, number, numbers, whole
-from heavytop.top.amplification import square_of_rate
+from heavytop.precision import DOUBLE, LARGEST, Precision, exact, number, numbers, ordered, whole
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
-from heavytop.top.equations import GYROSTAT, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import TimeText, check_times
-from heavytop.top.vectors import ordered
+from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
+from heavytop.top.heavy_top import HeavyTop, State, TimeText, check_times
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

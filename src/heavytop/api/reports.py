@@ -20,14 +20,13 @@ from heavytop.document.document import row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
-from heavytop.precision import whole
+from heavytop.precision import ordered, whole
 from heavytop.render import export as exports
 from heavytop.render import history as over
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
 from heavytop.store import store
 from heavytop.store.parquet import COLUMNS, lines
-from heavytop.top.vectors import ordered
 
 if TYPE_CHECKING:
     import pandas
@@ -55,7 +54,7 @@ class Report(Tabular, records.Report):
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
     def export(self, to: str) -> str:
-        """The text of a file for another tool: ``to`` is bencher, github-action-benchmark, asv, junit or csv.
+        """The text of a file for another tool: ``to`` is a name that `heavytop export --help` lists, such as junit.
 
         Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.  Raises
         InputError for another tool.
@@ -233,7 +232,7 @@ def compare(
         baseline, candidate: reports, or the folders or files of two; of these the motions of surveys are joined.
         policy: a TOML file of what counts as the same (`heavytop docs compare`).
         floor: errors below ``floor`` eps are all the same.
-        loss: bits that an error may grow by.
+        loss: bits that any error may grow by; 2, and a tenth of one of truncation, where it is not given.
 
     Returns:
         A :class:`Comparison`; ``verdict`` is "worse" if anything is, else "incomparable" if anything is missing or

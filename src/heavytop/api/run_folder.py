@@ -17,10 +17,10 @@ from heavytop.api import arguments
 from heavytop.display import printable
 from heavytop.document.document import row_name
 from heavytop.errors import InputError, quoted
-from heavytop.integrate.integrator import name_of
 from heavytop.integrate.peers.command import Command, greeting
-from heavytop.integrate.peers.source import named, seconds_of
+from heavytop.integrate.registry import name_of, named, seconds_of
 from heavytop.kinds import KINDS
+from heavytop.precision import ordered
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.render import page, text
 from heavytop.render.terminal import brief
@@ -35,7 +35,6 @@ from heavytop.suite.run import Progress, unheard
 from heavytop.suite.run import run as run_tasks
 from heavytop.suite.survey import gathered as survey
 from heavytop.suite.survey.gathered import COLUMNS, FILE, contents, gathered
-from heavytop.top.vectors import ordered
 
 PAGE = "report.html"
 _ANOTHER = "Give another --out."

@@ -16,16 +16,14 @@ from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR, WIDTHS, Convention
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Drift
-from heavytop.precision import Precision
+from heavytop.precision import Precision, ordered, vector
 from heavytop.records import Metric, Peer, Row
 from heavytop.render.score import diagnosis_text
 from heavytop.suite.score import Assessment, assess, passed, required
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
-from heavytop.top.vectors import ordered, vector
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.trajectories.observed import GivenTrajectory, of_arrays, of_observed_arrays, raw_start, require_system
 
 # Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.

@@ -149,13 +149,13 @@ def _lines(notes: dict[str, str], indent: int = 0) -> None:
 
 def _everything() -> dict[str, Any]:
     from heavytop.cases import CASES, named_bodies
-    from heavytop.integrate import peers
+    from heavytop.integrate import registry
     from heavytop.precision import FORMATS, available
     from heavytop.suite.plan import BUILT_IN
     from heavytop.top.equations import SYSTEMS
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    known, reasons = peers.known(), peers.available()
+    known, reasons = registry.known(), registry.available()
     integrators = {
         name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
         for name, each in sorted(known.items(), key=lambda item: not item[1].streams)

@@ -14,6 +14,7 @@ import typer
 from heavytop.cli.app import Json, absolute, cases, command, plans, print_json, require_new, show_on_terminal, writing
 from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
+from heavytop.render import FORMATS
 
 _REPORT_SECONDS = 0.1
 """Expected of reading one."""
@@ -27,7 +28,7 @@ def compare(
         Path | None, typer.Option(help="TOML file of what counts as the same: `heavytop docs compare`.")
     ] = None,
     floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps are all the same: 4.")] = None,
-    loss: Annotated[str | None, typer.Option(help="Bits that an error may grow by: 2.")] = None,
+    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by: 2; of truncation a tenth.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
@@ -191,7 +192,7 @@ def _print(report: Path, full: bool, json: bool) -> None:
 @command
 def export(
     report: Annotated[Path, typer.Argument(help="Report or its folder.")],
-    to: Annotated[str, typer.Option(help="bencher, github-action-benchmark, asv, junit or csv.")],
+    to: Annotated[str, typer.Option(help=f"One of {', '.join(FORMATS)}.")],
     out: Annotated[Path | None, typer.Option(help="Write it there, not on standard output.")] = None,
 ) -> int:
     """Write a report in the format of another tool.

@@ -271,6 +271,8 @@ def compare(
         if (match := others.take_elsewhere(row.identity)) is not None:
             found[place] = rows.compare(row, match)[:1]
         changes.add(row, match, found[place])
+    if mended := changes.mended():
+        found = [[each.set_off(mended) for each in findings] for findings in found]
     for row in others.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)

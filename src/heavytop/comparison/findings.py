@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, groupby, pairwise
@@ -36,8 +36,10 @@ _ENDS_AS_BEFORE = 0.5
 """Decades by which the error of the last state may have grown where the dense output alone is worse."""
 _STEPS_MOVED = 0.02
 """Decades: a step size control that rounds otherwise moves the steps by less."""
+_LESS = 0.5
+"""Of the decades that the finest setting lost, what a coarser one may have lost where an error of lower order came."""
 _LOWER_ORDER = (
-    "; coarser settings are the same: the new error is of lower order than the method's, as of a coefficient or a "
+    "; coarser settings {}: the new error is of lower order than the method's, as of a coefficient or a "
     "stage in lower precision"
 )
 _MOST_KEPT = 20_000
@@ -92,6 +94,10 @@ class Change(NamedTuple):
             return self.digits[0] - self.digits[1]
         return max((moved for each in self.findings if (moved := self.decades(each)) is not None), default=0.0)
 
+    def set_off(self, mended: Collection[tuple[str, str]]) -> Change:
+        """Without the slight losses of those integrators."""
+        return self._replace(findings=[each for each in self.findings if each.set_off(mended) is each])
+
     def decades(self, finding: Finding) -> float | None:
         """Decades by which the error of a finding grew; None for what is no error, or not a number in both rows."""
         return self.decades_of(finding.metric)
@@ -107,6 +113,17 @@ class Change(NamedTuple):
     def metric(row: Row | None, name: str) -> Metric | None:
         """The metric of that name, if the row is there and has it."""
         return None if row is None else row.metrics.get(name)
+
+    @property
+    def log_steps(self) -> float:
+        """log10 of the steps of the baseline; -inf where it counts none."""
+        return math.log10(self.old.steps) if self.old is not None and self.old.steps else -math.inf
+
+    @property
+    def largest_loss(self) -> float:
+        """Decades of the largest loss of an error."""
+        worse = (self.decades(each) for each in self.findings if each.verdict is Verdict.WORSE)
+        return max((moved for moved in worse if moved is not None), default=0.0)
 
     def about(self, finding: Finding) -> Quantity | None:
         """The quantity that a metric or series is about, without its statistic; None for laws, seconds, whole rows."""
@@ -156,20 +173,40 @@ class Changes:
             key = _curve(old.identity)
             self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
 
-    def at_finest_alone(self, change: Change) -> bool:
-        """Whether of all settings of an integrator on a case the finest alone has changed, in as many steps.
+    def mended(self) -> set[tuple[str, str]]:
+        """The integrators that gained more than their slight losses, which are the same then and left out.
 
-        What it has changed by then falls more slowly than the method's own error, which is larger at the others.
+        Of two methods of which each is slightly better somewhere, that with the largest loss is worse.
         """
-        row = change.identity
-        points = self.points.get(_curve(row), [])
-        if change.old is None or change.new is None or not change.old.steps or not change.new.steps:
-            return False
-        if abs(_steps(change)) > _STEPS_MOVED:
-            return False
-        finest = max((point.steps[0] for point in points), default=0.0)
-        changed = [each.identity for each in self.rows if _curve(each.identity) == _curve(row)]
-        return len(points) > 1 and changed == [row] and math.log10(change.old.steps) == finest
+        gained: dict[tuple[str, str], float] = {}
+        lost: dict[tuple[str, str], float] = {}
+        for change in self.rows:
+            for each in change.findings:
+                if each.slight or (each.verdict is Verdict.BETTER and not each.of):
+                    side, moved = (lost if each.slight else gained), change.decades(each)
+                    side[each.method] = max(side.get(each.method, 0.0), math.inf if moved is None else abs(moved))
+        found = {method for method, most in lost.items() if gained.get(method, 0.0) > most}
+        if found:
+            left = (change.set_off(found) for change in self.rows)
+            self.rows = [change for change in left if change.findings]
+        return found
+
+    def coarser(self, change: Change) -> str:
+        """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
+        steps; else empty.
+
+        What it has lost by then falls more slowly than the method's own error, which is larger at the others.
+        """
+        curve = _curve(change.identity)
+        points, changed = self.points.get(curve, []), [each for each in self.rows if _curve(each.identity) == curve]
+        if len(points) < 2 or not all(each.old and each.old.steps and each.new and each.new.steps for each in changed):
+            return ""
+        finest = max(point.steps[0] for point in points)
+        lost = {each.log_steps: each.largest_loss for each in changed}
+        if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
+            return ""
+        most = lost.pop(finest)
+        return "" if any(each > _LESS * most for each in lost.values()) else "lost less" if lost else "are the same"
 
     @property
     def worst_first(self) -> list[Change]:
@@ -518,9 +555,8 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        below = (
-            _LOWER_ORDER if Verdict.WORSE in verdicts and all(changes.at_finest_alone(c) for _, c, _ in cases) else ""
-        )
+        coarser = {changes.coarser(c) for _, c, _ in cases} if Verdict.WORSE in verdicts else {""}
+        below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
 
 

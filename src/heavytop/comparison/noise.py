@@ -36,6 +36,10 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 BITS = math.log10(2)
 """Decades in one bit."""
+_LOSS = 2 * BITS
+"""By how much an error may grow where the policy does not say."""
+_TENTH = math.log10(1.1)
+"""The same of an error that is truncation, which every machine makes the same."""
 _REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
@@ -43,7 +47,8 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What one metric may do.  Numbers are exact text or TOML numbers; unset ones are taken from the whole policy.
 
     floor: errors below floor·eps of the row's format are all the same.
-    loss_bits or loss_digits: an error may grow by that much.
+    loss_bits or loss_digits: an error may grow by that much; where neither is given by 2 bits, one of truncation by a
+    tenth.
     noise: and by that many times its noise band, where the rows hold one; 0 for no band.
     duration: a duration may shrink by that fraction.  value: a value that must agree may be off by that fraction.
     """
@@ -123,12 +128,13 @@ class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """The numbers that decide about one metric, in decades: log10 of the floor in eps, allowed loss, factor of the
-    band; fractions of durations and values; log10 of the limit; ignored or not.
+    """The numbers that decide about one metric, in decades: log10 of the floor in eps, allowed loss, the same of an
+    error that is truncation, factor of the band; fractions of durations and values; log10 of the limit; ignored or not.
     """
 
     floor: float
     loss: float
+    truncation: float
     noise: float
     duration: float
     value: float
@@ -193,14 +199,18 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
     digits, bits = rule.loss_digits, rule.loss_bits
     if digits is None and bits is None:
         digits, bits = policy.loss_digits, policy.loss_bits
-    if digits is None and bits is None:
-        bits = 2
-    loss = float(exact(digits)) if digits is not None else float(exact(bits)) * BITS
+    if digits is not None:
+        loss = truncation = float(exact(digits))
+    elif bits is not None:
+        loss = truncation = float(exact(bits)) * BITS
+    else:
+        loss, truncation = _LOSS, _TENTH
     floor = log10(exact(policy.floor if rule.floor is None else rule.floor))
     limit = None if rule.limit is None else log10(exact(rule.limit))
     return Limits(
         -math.inf if floor is None else floor,
         loss,
+        truncation,
         number("noise"),
         number("duration"),
         number("value"),

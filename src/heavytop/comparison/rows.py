@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from statistics import median
 from typing import Any, Literal
@@ -222,7 +222,7 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
     """One metric of one row: verdict, the two values as text, and why.
 
     name: of the metric, "" for a whole row.  of: "" for a metric, series, growth for the law of one, seconds for a
-    timing.
+    timing.  slight: a loss of truncation that is allowed of other errors.
     """
 
     row: Identity
@@ -232,11 +232,23 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
     candidate: str | None
     reason: str = ""
     of: Literal["", "series", "growth", "seconds"] = ""
+    slight: bool = False
 
     @property
     def metric(self) -> str:
         """What policies and other programs call it: ``drift_energy_max``, ``growth drift_energy``."""
         return f"{self.of} {self.name}".lstrip()
+
+    @property
+    def method(self) -> tuple[str, str]:
+        """Whose it is: the integrator and its format."""
+        return self.row.key.subject.name, self.row.precision
+
+    def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
+        """The finding; where it is slight and its integrator gained more than that, the same."""
+        if not self.slight or self.method not in mended:
+            return self
+        return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
 
     @property
     def timing(self) -> bool:
@@ -346,7 +358,7 @@ class RowComparison:
                     yield Finding(key, name, judged[0], None, metric.value, judged[1])
 
     def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
-        loss = self.lookup.metric((), "").loss
+        loss = self.lookup.metric((), "").truncation
         found = []
         for name, metric in old.metrics.items():
             match = new.metrics.get(name)
@@ -371,7 +383,8 @@ class RowComparison:
                     found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
                 verdict, why = self._metric(metric, match, limits, old, new)
-                found.append(Finding(key, name, verdict, metric.value, match.value, why))
+                slight = verdict is Verdict.WORSE and self._is_slight(metric, match, limits, old, new)
+                found.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
         if new.metrics.keys() != old.metrics.keys():
             found += [
                 Finding(key, name, Verdict.NEW, None, metric.value)
@@ -392,11 +405,14 @@ class RowComparison:
         if why := irreproducible(metric, least_of[0], bound):
             return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
         known, found = of_starts(metric, old), of_starts(match, new)
-        noise = self._assumed(metric, match, old, new) if metric.band is None else kind.least_band(old.starts)
+        truncated = self._is_truncation(metric, match, old, new)
+        assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
+        noise = assumed if metric.band is None else kind.least_band(old.starts)
         if noise > (known.band or 0.0):
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
-        judged = judge(known, found, limits, eps, self.policy.suspicious_digits, least_of, bound)
+        allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
+        judged = judge(known, found, allowed, eps, self.policy.suspicious_digits, least_of, bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
         if changed and self._is_by_rounding(metric, match, old):
             return SAME
@@ -535,20 +551,29 @@ class RowComparison:
         largest = max(size(metric), size(match))
         return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
 
-    def _assumed(self, metric: Metric, match: Metric, old: Row, new: Row) -> float:
-        """Decades of the noise of a row without bands; none where the steps are the same ones, whose truncation step
-        control has not changed, and the two errors further apart than roundings of these steps bring them.
+    def _is_truncation(self, metric: Metric, match: Metric, old: Row, new: Row) -> bool:
+        """Whether two errors differ by truncation: of the same steps, further apart than roundings bring them.
+
+        Where no step is asked for, and reruns have not told what roundings do, evaluations tell that the steps are the
+        same ones: those that step control rejects are counted in them.
         """
-        kind = kind_of(old, self.kinds)
-        noise = kind.assumed_band(old.key.subject)
-        counted = bool(old.steps and old.evaluations)
-        if not noise or not counted or (old.steps, old.evaluations) != (new.steps, new.evaluations):
-            return noise
-        low, high = sorted((size(metric), size(match)))
-        if metric.kind != "error" or math.isinf(low):
-            return noise
-        by_rounding = RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
-        return noise if by_rounding else 0.0
+        kind, subject = kind_of(old, self.kinds), old.key.subject
+        reruns = metric.band is not None and kind.noise_is_reruns(metric)
+        steps = subject.step or (old.steps and (old.evaluations or reruns))
+        if not steps or (old.steps, old.evaluations) != (new.steps, new.evaluations):
+            return False
+        if metric.kind != "error" or metric.log10 is None or match.log10 is None:
+            return False
+        if not (reruns or kind.assumed_band(subject)):
+            return False
+        low, high = sorted((metric.log10, match.log10))
+        return not RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
+
+    def _is_slight(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> bool:
+        """Whether a loss counts as one of truncation alone."""
+        lost = size(match) - size(metric)
+        allowed = lost <= limits.loss and beyond_limit(match, limits) is None
+        return allowed and lost > limits.truncation and self._is_truncation(metric, match, old, new)
 
     def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
         """The same of what a series is largest."""

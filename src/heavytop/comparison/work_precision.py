@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from heavytop.document.document import In, Table
-from heavytop.integrate.integrator import INTEGRATORS
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
 

@@ -31,10 +31,9 @@ from heavytop.diagnose.samples import (
     notable,
 )
 from heavytop.errors import InputError
-from heavytop.precision import decimal_text
+from heavytop.precision import cross, decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross
 
 # Columns that mean something else than Ω and γ in body axes: axes renamed or reversed, γ down, M in place of Ω.
 

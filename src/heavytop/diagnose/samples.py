@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, decimal_text, log10
+from heavytop.precision import DOUBLE, decimal_text, dot, log10
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 
 Array = NDArray[numpy.float64]
 

@@ -19,11 +19,11 @@ from heavytop.errors import OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
 from heavytop.integrate.heyoka.engines import load
 from heavytop.integrate.heyoka.motions import Stepper
-from heavytop.integrate.integrator import expected_steps, name_of
 from heavytop.integrate.multiword.engines import choose
 from heavytop.integrate.multiword.engines import compiled as compile_words
 from heavytop.integrate.multiword.motions import OUTCOMES
 from heavytop.integrate.peers.contract import said
+from heavytop.integrate.registry import expected_steps, name_of
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status

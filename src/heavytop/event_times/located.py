@@ -29,9 +29,8 @@ from heavytop.event_times.functions import (
 )
 from heavytop.integrate.multiword.motions import native_state
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import Precision, number
+from heavytop.precision import Precision, Vector, number
 from heavytop.top.attitude import rotated
-from heavytop.top.vectors import Vector
 
 Axes = tuple[Vector, Vector, Vector]
 

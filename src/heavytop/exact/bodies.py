@@ -39,13 +39,12 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.exact.solution import ExactSolution
-from heavytop.precision import round_to
+from heavytop.precision import Vector, cross, dot, round_to
 from heavytop.top.amplification import amplification
 from heavytop.top.attitude import Attitude, Rows, perpendicular, rotated, transposed
 from heavytop.top.bodies import IDENTITY, Body, PrincipalAxes
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
 _DATA_BITS = 256

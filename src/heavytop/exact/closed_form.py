@@ -33,10 +33,10 @@ from heavytop.exact.flint.balls import (
     to_bits,
 )
 from heavytop.exact.solution import Conditions, ExactSolution, require
+from heavytop.precision import Vector, cross, dot, rational_root
 from heavytop.top.attitude import attitude_from_angles, perpendicular
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot, rational_root
 
 # What the elliptic motions share: working precision, exact Taylor coefficients at the start, rotation in space.
 

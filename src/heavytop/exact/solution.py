@@ -10,10 +10,9 @@ from typing import Protocol
 from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
-from heavytop.precision import shown
+from heavytop.precision import dot, shown
 from heavytop.top.equations import HEAVY_TOP, System, kovalevskaya_xi
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 
 
 class ExactSolution(Protocol):

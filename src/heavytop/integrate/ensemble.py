@@ -19,7 +19,7 @@ from heavytop.integrate.heyoka.lanes import Lanes, Work
 from heavytop.integrate.heyoka.motions import follow
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, exact, number
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import check_times
 
 Observer = Callable[[int, Fraction, Any], None]
 Finished = Callable[[int, Trajectory], None]

@@ -14,7 +14,19 @@ from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, last_call, native, native_text, number, rounded
+from heavytop.precision import (
+    DOUBLE,
+    Precision,
+    Vector,
+    cross,
+    decimal_text,
+    exact,
+    last_call,
+    native,
+    native_text,
+    number,
+    rounded,
+)
 from heavytop.top.attitude import (
     InSpace,
     Output,
@@ -31,7 +43,6 @@ from heavytop.top.attitude import (
 from heavytop.top.bodies import Frame
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Integral, Parameters, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross
 
 if TYPE_CHECKING:
     import numpy as np

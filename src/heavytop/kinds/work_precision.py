@@ -25,8 +25,8 @@ from heavytop.document.document import Block, Chart, In, Note
 from heavytop.document.document import Table as Cells
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import midpoint, radius
-from heavytop.integrate import peers
-from heavytop.integrate.integrator import IntegratorSource, name_of
+from heavytop.integrate import registry
+from heavytop.integrate.registry import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind, with_explanation
 from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
@@ -115,7 +115,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
         """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
-        control = peers.control_apart(which) if DOUBLE.name in formats else ""
+        control = registry.control_apart(which) if DOUBLE.name in formats else ""
         ladders = [
             Curve(integrator, name, **{"steps" if control == "step" else "tolerances": _RUNGS[control]})
             if name == DOUBLE.name
@@ -154,7 +154,7 @@ class WorkPrecision(Kind):
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # found before the runs: looking through the installed packages empties the caches of the processor
-        peer = peers.ready(task.integrator.which, _setting(task.key.subject))
+        peer = registry.ready(task.integrator.which, _setting(task.key.subject))
 
         def integrate(times: Any, start: State = case.start) -> Trajectory:
             top = case.top if start is case.start else problem.top

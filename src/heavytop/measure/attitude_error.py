@@ -26,12 +26,11 @@ from heavytop.measure.scorer import (
     split,
 )
 from heavytop.measure.truth import Truth, truth_with_attitude
-from heavytop.precision import exact
+from heavytop.precision import Vector, cross, dot, exact
 from heavytop.records import Metric, Quantity, Series
 from heavytop.top.attitude import SEQUENCES, Rows, matrix_of_quaternion, rotated, rows_of, rows_of_euler, transposed
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 # How a trajectory file speaks of the attitude: order and direction of quaternions, Euler sequence, up, units.
 #

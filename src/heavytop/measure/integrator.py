@@ -15,14 +15,14 @@ import numpy
 from flint import arb
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
-from heavytop.integrate import peers, registry
+from heavytop.integrate import registry
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
-from heavytop.integrate.integrator import Integrator, IntegratorSource, described, load
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.peers.contract import require_equal
+from heavytop.integrate.registry import Integrator, IntegratorSource, described, load
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
@@ -94,7 +94,7 @@ class ChosenIntegrator:
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
-            peer = peers.ready(self.which, self.setting)
+            peer = registry.ready(self.which, self.setting)
             run = peer(top, start, times, precision, system=system)
             if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
                 require_equal(self.name, run, peer(top, start, times, precision, system=system))

@@ -20,7 +20,7 @@ from flint import arb
 from heavytop.errors import PeerFailed, Unsupported
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
@@ -163,7 +163,7 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = peers.control(integrator.which) == "step"
+    fixed = registry.control(integrator.which) == "step"
     length = until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:

@@ -11,100 +11,18 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from heavytop.errors import InputError
-from heavytop.exact.bodies import resolve
 from heavytop.exact.flint.balls import FUNCTIONS, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.integrator import IntegratorSource, described, expected_steps
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
+from heavytop.integrate.registry import IntegratorSource, Setup, described, expected_steps
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
 from heavytop.measure.scorer import Drift
-from heavytop.precision import Precision, decimal_text, exact, exact_text, number
+from heavytop.precision import Precision, cross, decimal_text, dot, exact, exact_text, number
 from heavytop.records import Metric
-from heavytop.top.attitude import Output, document_of, euler_angles, perpendicular, rotated, transposed, unwrap
-from heavytop.top.bodies import PIVOT, Body, Frame
+from heavytop.top.attitude import Output, document_of, euler_angles, perpendicular, unwrap
+from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, Integral, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
-
-# A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
-
-
-_SPARE_BITS = 160
-"""Irrational data of a run are rounded to so many bits more than its format has, of what it is told itself."""
-
-Observer = Callable[[Fraction, Any], object]
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """A motion in principal axes.
-
-    top, start: exact, of irrational data to many bits more than the format has.
-    carried: ξ at t = 0, where the data say it.
-    frame: the axes given; None where they are the principal ones.
-    """
-
-    top: HeavyTop
-    start: State
-    carried: Vector | None
-    system: System
-    precision: Precision
-    frame: Frame | None
-
-    @property
-    def xi(self) -> Vector:
-        """ξ at t = 0: of the attitude, else :func:`heavytop.top.attitude.perpendicular` of γ."""
-        return perpendicular(self.start.gamma) if self.carried is None else self.carried
-
-    @classmethod
-    def of(cls, body: HeavyTop | Body, start: State, precision: Precision, system: System) -> Setup:
-        """The motion of a body from ``start``."""
-        if isinstance(body, HeavyTop) and start.attitude is None:
-            return cls(body, start, None, system, precision, None)
-        found = resolve(body, start, precision.bits + _SPARE_BITS)
-        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.turned:
-            return cls(found.top, found.start, xi, system, precision, None)
-        if system is GYROSTAT:
-            raise InputError(
-                "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
-                "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
-            )
-        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
-        return cls(found.top, found.start, xi, system, precision, frame)
-
-    def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
-        """A vector of the axes given, in principal axes."""
-        if vector is None or self.frame is None:
-            return vector
-        return rotated(transposed(self.frame.axes), vector)
-
-    @property
-    def problem(self) -> Problem:
-        """What an ensemble is made of."""
-        return Problem.of(self.top, self.start, self.precision, self.system)
-
-    def turned(self, state: Any) -> Any:
-        """A state of an observer in the axes given."""
-        return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
-
-    def turned_exactly(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
-        """Vectors in principal axes, in the axes given, in exact rationals."""
-        if self.frame is None:
-            return state
-        axes = self.frame.axes
-        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
-
-    def watched(self, observer: Observer | None) -> Observer | None:
-        """An observer that is given the states in the axes given."""
-        if observer is None or self.frame is None or not callable(observer):
-            return observer
-        return lambda time, state: observer(time, self.turned(state))
-
-    def given(self, run: Trajectory) -> Trajectory:
-        """The run in the axes given."""
-        return run if self.frame is None else framed(run, self.frame)
 
 
 def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, Any]:

@@ -31,13 +31,11 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.measure.motion import motion_texts, xi_texts
-from heavytop.precision import decimal_text, exact, shown
+from heavytop.precision import Vector, decimal_text, dot, exact, shown, vector
 from heavytop.top.attitude import InSpace, Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import TimeText
-from heavytop.top.vectors import Vector, dot, vector
+from heavytop.top.heavy_top import HeavyTop, State, TimeText
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,10 +13,9 @@ from heavytop.exact.flint.balls import ball, ball_from, ball_text, rational, who
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_ball
 from heavytop.measure.truth import Truth
-from heavytop.precision import log10
+from heavytop.precision import dot, log10
 from heavytop.records import Against, Metric, Quantity, Series, by_name
 from heavytop.top.equations import Integral, Parameters
-from heavytop.top.vectors import dot
 
 # Drift of first integrals along a computed motion, in one pass and constant memory.
 

@@ -31,12 +31,11 @@ from heavytop.integrate.multiword.motions import follow
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import Precision, decimal_text, exact, number, real, shown, time_text
+from heavytop.precision import Precision, Vector, cross, decimal_text, dot, exact, number, real, shown, time_text
 from heavytop.records import Against, Certified
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
-from heavytop.top.times import check_times
-from heavytop.top.vectors import Vector, cross, dot
+from heavytop.top.heavy_top import check_times
 
 # A reference where no proof is at hand: two runs in words of different length, trusted as far as they agree.
 #

@@ -12,8 +12,9 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
@@ -26,6 +27,7 @@ from heavytop.document.kind import Kinds, document, headlines, kind_of
 from heavytop.errors import InputError, quoted
 from heavytop.measure.scalar import digits_kept
 from heavytop.records import UNSUPPORTED, Quantity, Report, Row
+from heavytop.render import FORMATS
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
 from heavytop.store.parquet import COLUMNS, lines
@@ -76,7 +78,7 @@ def export(report: Report, to: str, kinds: Kinds) -> str:
     """The text of the file for that tool; raises InputError for another."""
     if to not in FORMATS:
         raise InputError(f"There is no export to {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
-    return FORMATS[to](report, kinds)
+    return str(resolve_name(FORMATS[to])(report, kinds))
 
 
 def _named(report: Report, kinds: Kinds) -> Iterator[tuple[str, Row | None, list[Measure]]]:
@@ -95,7 +97,7 @@ def _is_lost(row: Row, kinds: Kinds) -> bool:
     return failed(row, kinds) or overflowed
 
 
-def _bencher(report: Report, kinds: Kinds) -> str:
+def bencher(report: Report, kinds: Kinds) -> str:
     """Bencher Metric Format: benchmark -> measure -> value with its limits."""
     found: dict[str, dict[str, dict[str, float]]] = {}
     for name, _, numbers in _named(report, kinds):
@@ -106,7 +108,7 @@ def _bencher(report: Report, kinds: Kinds) -> str:
     return _json(found)
 
 
-def _github(report: Report, kinds: Kinds) -> str:
+def github_action_benchmark(report: Report, kinds: Kinds) -> str:
     """`customSmallerIsBetter` of github-action-benchmark: a list of name, unit, value."""
     found = []
     for name, row, numbers in _named(report, kinds):
@@ -118,7 +120,7 @@ def _github(report: Report, kinds: Kinds) -> str:
     return _json(found)
 
 
-def _asv(report: Report, kinds: Kinds) -> str:
+def asv(report: Report, kinds: Kinds) -> str:
     """The results file of airspeed velocity, version 2: `results/MACHINE/COMMIT-ENVIRONMENT.json`."""
     about = report.environment
     machine = {
@@ -149,7 +151,7 @@ def _asv(report: Report, kinds: Kinds) -> str:
     )
 
 
-def _junit(report: Report, kinds: Kinds) -> str:
+def junit(report: Report, kinds: Kinds) -> str:
     """A test case a row: one that failed is an error, one that is not supported is skipped."""
     bad = sum(_is_lost(row, kinds) for row in report.rows)
     skipped = sum(row.outcome == UNSUPPORTED for row in report.rows)
@@ -170,7 +172,7 @@ def _junit(report: Report, kinds: Kinds) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
 
 
-def _csv(report: Report, kinds: Kinds) -> str:
+def metrics_csv(report: Report, kinds: Kinds) -> str:
     """A line for each metric and growth law, with the columns of `--parquet`."""
     made = io.StringIO()
     writer = csv.writer(made, lineterminator="\n")
@@ -181,15 +183,6 @@ def _csv(report: Report, kinds: Kinds) -> str:
 
 def _json(document: Any) -> str:
     return json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-FORMATS: dict[str, Callable[[Report, Kinds], str]] = {
-    "bencher": _bencher,
-    "github-action-benchmark": _github,
-    "asv": _asv,
-    "junit": _junit,
-    "csv": _csv,
-}
 
 
 # A comparison as JUnit XML: one test case a metric, for the test pages of CI systems.

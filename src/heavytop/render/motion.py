@@ -20,10 +20,9 @@ from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import PARAMETERS, STARTS, DerivativeBall, Derivatives
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
-from heavytop.precision import REAL_BITS, decimal_text, exact, exact_text
+from heavytop.precision import REAL_BITS, decimal_text, dot, exact, exact_text
 from heavytop.top.attitude import Output, perpendicular, rows_of
 from heavytop.top.equations import NAMES, VARIABLES
-from heavytop.top.vectors import dot
 
 # The table of one motion, computed or known: what a terminal, a CSV file and a LaTeX table show of it.
 

@@ -14,9 +14,9 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.rounding_noise import FACTORS, factor, scaled
+from heavytop.precision import dot
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
-from heavytop.top.vectors import dot
 from heavytop.trajectories.files import COLUMNS
 
 _TIMES = ("1", "5", "10")

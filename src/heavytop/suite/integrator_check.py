@@ -6,7 +6,7 @@ Nothing is scored here: that an answer is right to 5 % is all that is asked of i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,14 +17,14 @@ import msgspec
 
 from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.integrator import IntegratorSource
 from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
 from heavytop.integrate.peers.contract import said
+from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
-from heavytop.processes import ChildContext, end_pool, lead_group, new_mark
+from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
@@ -58,28 +58,27 @@ def check(which: str | IntegratorSource) -> list[Checked]:
     A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
     Raises InputError for an unknown integrator.
     """
-    peers.require(which)
+    registry.require(which)
     if isinstance(which, Command):
         limit = min(which.seconds, _PATIENCE)
         try:
             return list(_Contract(msgspec.structs.replace(which, timeout=str(limit))).checks())
         finally:
             close_all()
-    mark = new_mark()
-    pool = ProcessPoolExecutor(1, mp_context=ChildContext(mark), initializer=lead_group)
+    process = GuardedProcess()
     try:
-        return list(_in_child(pool, which))
+        return list(_in_child(process, which))
     finally:
-        end_pool(pool, None, mark)
+        process.end()
 
 
-def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Iterator[Checked]:
-    """Each part in the process of the pool; where one does not come back, what was found before it stands."""
+def _in_child(process: GuardedProcess, which: str | IntegratorSource) -> Iterator[Checked]:
+    """Each part in the process; where one does not come back, what was found before it stands."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
         seconds = _PATIENCE_OF.get(name, _PATIENCE)
         ended = True
         try:
-            future = pool.submit(_part, which, place)
+            future = process.submit(_part, which, place)
             # an interrupt that comes from the child was raised by the integrator
             error = future.exception(timeout=seconds)
             if error is None:
@@ -90,8 +89,7 @@ def _in_child(pool: ProcessPoolExecutor, which: str | IntegratorSource) -> Itera
                 cause = ": ".join(filter(None, (type(error).__name__, said(error))))
                 found = Checked(name, "violated", f"It left its process by {cause}.")
         except TimeoutError:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
+            process.kill()
             text = f"It does not answer within {seconds} s; its process was ended."
             found = Checked(name, "note" if name == _TOO_FAST else "violated", text)
         except BrokenProcessPool:
@@ -185,14 +183,14 @@ class _Contract:
         sign = -1 if self.backward_only else 1
         asked = [sign * Fraction(time) for time in times]
         about = (top or self.top, start or self.start, asked, precision or self.precision)
-        run = peers.ready(self.which)(*about, system=system or self.system, **more)
+        run = registry.ready(self.which)(*about, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
             raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
         return run
 
     def _starts(self) -> str:
         if self.program is None:
-            peers.peer(self.which)
+            registry.peer(self.which)
             return "It can be called."
         with session(self.program) as program:
             greeting = program.greeting

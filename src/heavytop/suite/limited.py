@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ from typing import Any
 
 from heavytop.errors import HeavyTopError, OutOfTime
 from heavytop.integrate.peers.contract import said
-from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
+from heavytop.processes import GuardedProcess
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
@@ -89,9 +89,8 @@ class _Worker:
 
     def __init__(self, kinds: Kinds) -> None:
         self._kinds = kinds
-        self._pool: ProcessPoolExecutor | None = None
-        self._guard: Guard | None = None
-        self._mark = self._guest = ""
+        self._process: GuardedProcess | None = None
+        self._guest = ""
         self._hello: Future[int] | None = None
         self.index = -1
         self.row: Future[Row] | None = None
@@ -101,7 +100,7 @@ class _Worker:
     @property
     def left(self) -> float | None:
         """Seconds until its task is to be ended; None for no limit, or where the process is not yet there."""
-        if self.limit is None or self._guard is None:
+        if self.limit is None or self._process is None or self._hello is not None:
             return None
         return self.began + self.limit - monotonic()
 
@@ -112,17 +111,19 @@ class _Worker:
             self.end()
         self._guest = guest
         self.index, self.limit, self.began = index, limit, monotonic()
-        if self._pool is None:
-            self._mark = new_mark()
-            self._pool = ProcessPoolExecutor(
-                1, mp_context=ChildContext(self._mark), initializer=_begin, initargs=tuple(self._kinds.values())
-            )
-            self._hello = self._pool.submit(os.getpid)
+        if self._process is None:
+            self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
+            self._hello = self._process.submit(os.getpid)
         try:
-            self.row = self._pool.submit(measure, kind, task, saved)
+            self.row = self._process.submit(measure, kind, task, saved)
         except BrokenProcessPool:  # it died between two tasks
             self.end()
             self.submit(index, limit, kind, task, saved)
+
+    @property
+    def ending(self) -> str:
+        """How its process ended by itself."""
+        return "" if self._process is None else self._process.ending
 
     def awaited(self) -> list[Future[Any]]:
         """What is to be waited for: the process, then its row."""
@@ -130,22 +131,17 @@ class _Worker:
 
     def greet(self) -> None:
         """Puts a guard into the group of a process that has just begun, and starts its clock."""
-        if self._hello is not None and self._hello.done():
-            with suppress(BrokenProcessPool, OSError):  # a process that is gone is noticed with its row
-                self._guard = Guard(self._hello.result(), self._mark)
+        if self._process is not None and self._hello is not None and self._hello.done():
+            with suppress(BrokenProcessPool):  # a process that is gone is noticed with its row
+                self._process.guard(self._hello.result())
             self._hello, self.began = None, monotonic()
 
     def end(self) -> None:
         """Kills the process and whatever it started."""
-        if self._pool is not None:
-            end_pool(self._pool, self._guard, self._mark)
-        self._pool = self._guard = self._hello = self.row = None
+        if self._process is not None:
+            self._process.end()
+        self._process = self._hello = self.row = None
         self._guest = ""
-
-
-def _begin(*kinds: MeasuredKind) -> None:
-    lead_group()
-    begin_worker(*kinds)
 
 
 def in_limited_processes(
@@ -183,6 +179,7 @@ def in_limited_processes(
                 try:
                     row = _ended(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
+                    how = worker.ending
                     worker.end()
                     deaths[index] += 1
                     if deaths[index] < _MOST_DEATHS:
@@ -190,7 +187,7 @@ def in_limited_processes(
                         continue
                     if not tasks[index].is_third_party:
                         raise died(tasks[index], deaths[index]) from None
-                    row = ended_its_process(tasks[index], deaths[index])
+                    row = ended_its_process(tasks[index], deaths[index], how)
                 if row is not None:
                     yield index, row
     finally:
@@ -225,7 +222,7 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
     The child is kept for the next row; it ends with this process.  For one thread at a time.
     """
-    worker, limits = _kept_worker(), RowLimits(limit)
+    worker, limits, how = _kept_worker(), RowLimits(limit), ""
     for _ in range(_MOST_DEATHS):
         worker.submit(0, limit, kind, task, Saved())
         try:
@@ -234,8 +231,9 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
                 worker.greet()
             return row, monotonic() - worker.began
         except BrokenProcessPool:
+            how = worker.ending
             worker.end()
-    return ended_its_process(task, _MOST_DEATHS), 0.0
+    return ended_its_process(task, _MOST_DEATHS, how), 0.0
 
 
 def _wait(pool: Sequence[_Worker]) -> None:

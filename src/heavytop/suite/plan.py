@@ -24,11 +24,9 @@ from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, invalid, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.files import read_whole
-from heavytop.integrate.integrator import IntegratorSource
-from heavytop.integrate.peers import is_third_party
-from heavytop.integrate.peers import known as known_integrators
-from heavytop.integrate.peers import require as require_integrator
-from heavytop.integrate.peers.source import command_of, commands_in, named, seconds_of
+from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
+from heavytop.integrate.registry import known as known_integrators
+from heavytop.integrate.registry import require as require_integrator
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
@@ -40,6 +38,7 @@ from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop
 
+_KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
@@ -147,10 +146,10 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
-        raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
+        raise InputError(f"The plan {name} is nested too deeply.", _KEYS) from None
     except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
         cause = f"The plan {name} is not valid: {invalid(error)}."
-        raise InputError(cause, "The plans that ship show every key.") from None
+        raise InputError(cause, _KEYS) from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 

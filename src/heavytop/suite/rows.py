@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import gc
 import math
-import os
 import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from multiprocessing import parent_process
-from threading import Thread
 from typing import Any, ClassVar, Protocol
 
 import msgspec
 
 from heavytop.cases import Case
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
-from heavytop.integrate.integrator import IntegratorSource, name_of, require_reach
-from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import begin_row
+from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
@@ -394,9 +390,9 @@ def _taken_up(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
     return kind.measure(task, saved)
 
 
-def ended_its_process(task: Task, times: int) -> Row:
-    """The failed row of a task whose third-party integrator ended its process."""
-    return failed(task, f"{task.key.subject.name} ended its process {times} times")
+def ended_its_process(task: Task, times: int, how: str = "") -> Row:
+    """The failed row of a task whose third-party integrator ended its process, ``how`` the last time."""
+    return failed(task, f"{task.key.subject.name} ended its process {times} times{how and ', ' + how}")
 
 
 def begin_worker(*_kinds: MeasuredKind) -> None:
@@ -405,15 +401,7 @@ def begin_worker(*_kinds: MeasuredKind) -> None:
     With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_the_parent, daemon=True).start()
     gc.freeze()
-
-
-def _end_with_the_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def died(task: Task, times: int) -> HeavyTopError:

@@ -230,18 +230,17 @@ def _measure_as(expected: Versions, kind: MeasuredKind, task: Task, limit: float
 
 @contextmanager
 def _pool(workers: int, kinds: Kinds) -> Iterator[ProcessPoolExecutor]:
+    context = ChildContext()
     with ProcessPoolExecutor(
-        workers, mp_context=ChildContext(), initializer=begin_worker, initargs=tuple(kinds.values())
+        workers, mp_context=context, initializer=begin_worker, initargs=tuple(kinds.values())
     ) as pool:
         try:
             yield pool
         except BrokenProcessPool:
             raise  # the pool ends its own processes then
         except BaseException:  # Ctrl-C, SIGTERM or an error: else the tasks under way are waited for, hours perhaps
-            processes = list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
-            for process in processes:
-                process.terminate()
+            context.terminate()
             raise
 
 

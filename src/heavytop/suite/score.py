@@ -33,11 +33,10 @@ from heavytop.measure.scalar import (
 )
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
 from heavytop.measure.truth import Truth, truth, truth_with_attitude
-from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, exact, physical, round_to, shown, time_text
+from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, physical, round_to, shown, time_text
 from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
 from heavytop.suite.plan import log_spaced
 from heavytop.suite.rows import Task, computed_row, data_of, seconds_a_step
-from heavytop.top.vectors import dot
 from heavytop.trajectories.observed import GivenTrajectory, Observed
 
 # Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.

@@ -14,10 +14,9 @@ import numpy
 
 from heavytop.cases import Case, require_possible
 from heavytop.errors import InputError
-from heavytop.precision import exact, shown
+from heavytop.precision import exact, shown, vector
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system, system_of
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import vector
 
 _MOST = 1_000_000
 _AXES = ("inertia", "weight", "centre", "omega", "gamma", "rotor")

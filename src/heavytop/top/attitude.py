@@ -22,8 +22,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import decimal_text, exact, exact_text, physical, round_to
-from heavytop.top.vectors import Vector, cross, dot, ordered, vector
+from heavytop.precision import Vector, cross, decimal_text, dot, exact, exact_text, ordered, physical, round_to, vector
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,10 +10,9 @@ from math import isqrt, lcm
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import exact, exact_text, round_to, shown
+from heavytop.precision import Vector, cross, dot, exact, exact_text, ordered, rational_root, round_to, shown, vector
 from heavytop.top.attitude import Attitude, Rows, multiplied, perpendicular, rotated, rotation_of, transposed
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot, ordered, rational_root, vector
 
 # Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation all but theirs.
 #

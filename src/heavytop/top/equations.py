@@ -15,9 +15,8 @@ from itertools import permutations
 from typing import Any, NamedTuple, Protocol
 
 from heavytop.errors import InputError
-from heavytop.precision import shown
+from heavytop.precision import Vector, cross, dot, shown
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
 NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
@@ -491,3 +490,31 @@ def _of_heavy_gyrostat(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
         if p.inertia[i] == 4 * p.inertia[k] and area_with_rotor(p, y) == 0:
             condition = f"Sretensky about axis {k + 1}, on M·gamma = 0"
             yield Integral("sretensky", partial(sretensky, axes=axes), condition)
+
+
+# How fast a motion changes, from its parameters and start, in exact rationals.
+
+
+_AXES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+
+
+def square_of_rate(system: System, p: Parameters, y: tuple[Any, ...]) -> Any:
+    """The square of the largest rate at which the motion through ``y`` changes, in 1/time unit².
+
+    The rates are those of the rotation, |Ω_k| and |λ| or |k_k|/√(I_i I_j); of the precession of Ω about axis k,
+    Ω_k² (I_k − I_i)(I_k − I_j)/(I_i I_j); and of the pendulum about axis i that the weight drives, with the parts of
+    P r and γ across that axis: |P r||γ|/I_i.  Largest components stand for lengths.  Rational for rational data; of
+    doubles a double.
+    """
+    inertia, omega, gamma = p.inertia, y[:3], y[3:6]
+    by_rotor = () if system is HEAVY_GYROSTAT else p.rotors
+    found = [max(map(abs, (*omega, *by_rotor))) ** 2]
+    for i, j, k in _AXES:
+        apart = (inertia[i] - inertia[j]) * (inertia[i] - inertia[k])
+        found.append(abs(omega[i] ** 2 * apart / (inertia[j] * inertia[k])))
+        if system is HEAVY_GYROSTAT:
+            found.append(p.rotor[k] ** 2 / (inertia[i] * inertia[j]))
+        if system is not GYROSTAT:
+            across = [max(abs(vector[j]), abs(vector[k])) for vector in (p.moment, gamma)]
+            found.append(across[0] * across[1] / inertia[i])
+    return max(found)

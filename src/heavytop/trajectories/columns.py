@@ -12,8 +12,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.errors import InputError, quoted
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
-from heavytop.precision import exact
-from heavytop.top.vectors import Vector, vector
+from heavytop.precision import Vector, exact, vector
 from heavytop.trajectories.observed import RawStart
 
 REMEDY = "`heavytop docs score` lists the columns that are understood."

@@ -22,8 +22,7 @@ from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, 
 from heavytop.top.attitude import SHAPES, key_of
 from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
-from heavytop.top.heavy_top import HeavyTop, State, require_physical
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physical
 from heavytop.trajectories import columns as observed_columns
 from heavytop.trajectories import columns as observed_file
 from heavytop.trajectories.observed import (

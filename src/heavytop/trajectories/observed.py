@@ -16,12 +16,24 @@ from heavytop.diagnose.readings import BodyData, GivenStart, Reading, Seen
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, number, round_to, shown
+from heavytop.precision import (
+    DOUBLE,
+    EXTENDED,
+    QUAD,
+    Precision,
+    Vector,
+    cross,
+    decimal_text,
+    dot,
+    exact,
+    number,
+    round_to,
+    shown,
+)
 from heavytop.top.attitude import Angle, Attitude, perpendicular
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
-from heavytop.top.vectors import Vector, cross, dot
 
 # Bodies of trajectory files: rounded to a format, in principal axes, and in double.
 #

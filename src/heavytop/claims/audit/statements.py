@@ -14,6 +14,7 @@ import sympy
 from heavytop.claims.algebra.conditions import Need
 from heavytop.claims.algebra.statement import Domain, Formulas, Statement
 from heavytop.claims.audit.judge import ExplanationStep
+from heavytop.precision import cross, dot
 from heavytop.top.attitude import gamma_from_angles, omega_from_angles
 from heavytop.top.equations import (
     GYROSTAT,
@@ -29,7 +30,6 @@ from heavytop.top.equations import (
     momentum,
     momentum_squared,
 )
-from heavytop.top.vectors import cross, dot
 
 SYMBOLIC = SimpleNamespace(
     sqrt=sympy.sqrt,

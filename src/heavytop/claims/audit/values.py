@@ -30,11 +30,10 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
-from heavytop.precision import decimal_text, exact, round_to
+from heavytop.precision import decimal_text, dot, exact, round_to
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import motion_of
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import dot
 
 if TYPE_CHECKING:
     from heavytop.exact.bodies import BodyMotion

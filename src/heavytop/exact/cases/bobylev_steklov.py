@@ -42,10 +42,9 @@ from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticM
 from heavytop.exact.elliptic.weierstrass import Winding
 from heavytop.exact.flint.balls import ball, coefficient, series_length, to_bits
 from heavytop.exact.solution import ON_AXIS_1, ExactRelation
-from heavytop.precision import shown
+from heavytop.precision import Vector, cross, dot, shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 # Attitude of the Bobylev-Steklov motions: axis 3 in space is a function of the second kind.
 #

@@ -40,10 +40,9 @@ from heavytop.exact.solution import (
     ExactRelation,
     positive,
 )
-from heavytop.precision import exact, round_to, shown
+from heavytop.precision import Vector, dot, exact, rational_root, round_to, shown, vector
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, dot, rational_root, vector
 
 _TERMS = 1 << 14
 _REMEDY = "`dokshevich_motion` builds a top with such a motion."

@@ -35,7 +35,7 @@ from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wav
 from heavytop.exact.elliptic.weierstrass import imag, real
 from heavytop.exact.flint.balls import ball
 from heavytop.exact.solution import NO_TORQUE
-from heavytop.top.vectors import cross, dot
+from heavytop.precision import cross, dot
 
 _EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 

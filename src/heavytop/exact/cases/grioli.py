@@ -22,8 +22,8 @@ from heavytop.errors import InputError
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, between, half_angle
 from heavytop.exact.flint.balls import ball
 from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, ExactRelation
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 
 def _section(top: HeavyTop, _start: State) -> tuple[Fraction]:

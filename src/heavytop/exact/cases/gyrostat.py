@@ -31,9 +31,9 @@ from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, kept, rota
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
 from heavytop.exact.flint.balls import ball, current_length, to_bits
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import GYROSTAT, Parameters, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _UNITS: tuple[Vector, ...] = ((_ONE, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO), (_ZERO, _ZERO, _ONE))

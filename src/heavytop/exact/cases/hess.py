@@ -48,9 +48,9 @@ from heavytop.exact.flint.balls import (
 from heavytop.exact.separable.abel import REMEDY, decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM, LEVEL_MOMENTUM, ExactRelation
+from heavytop.precision import cross, dot
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import cross, dot
 
 # The exact data of a motion of Hess' top: the conditions of the class, and the cubic of the height.
 #

@@ -52,9 +52,9 @@ from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticM
 from heavytop.exact.elliptic.weierstrass import Winding, imag, real
 from heavytop.exact.flint.balls import ball, coefficient, current_length, exponent, rational, series_length, to_bits
 from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 

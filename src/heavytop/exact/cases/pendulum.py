@@ -29,8 +29,8 @@ from heavytop.exact.closed_form import Carry, WithAttitude, about, kept, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import ball, whole
 from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot
 
 _REMEDY = "It turns about a principal axis, with P r and gamma across it."
 

@@ -24,10 +24,9 @@ from heavytop.errors import InputError, NotInClass
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
 from heavytop.exact.flint.balls import ball, rational, to_bits
 from heavytop.exact.solution import equilibrium, require
-from heavytop.precision import shown
+from heavytop.precision import Vector, cross, dot, rational_root, shown, vector
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, cross, dot, rational_root, vector
 
 
 @dataclass(frozen=True, slots=True)

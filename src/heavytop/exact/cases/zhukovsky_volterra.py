@@ -48,8 +48,8 @@ from heavytop.exact.elliptic.weierstrass import (
 )
 from heavytop.exact.flint.balls import ball, current_length, rational, to_bits, unit_of_time
 from heavytop.exact.solution import NO_TORQUE
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.vectors import Vector, cross, dot
 
 _POLE, _LAST = 5, 5
 """D and D Mi have a pole of that order at t = 0, and are compared up to that power of t."""

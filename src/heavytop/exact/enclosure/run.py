@@ -55,11 +55,10 @@ from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
 from heavytop.multiword.problem import Scaled
-from heavytop.precision import decimal_text
+from heavytop.precision import Vector, decimal_text
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector
 
 # Steps of an enclosure one after another, and the pilot that tells how many bits a motion loses.
 

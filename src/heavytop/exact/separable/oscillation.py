@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from heavytop.errors import OutOfReach
 from heavytop.exact.closed_form import Evaluated, constant, kept, tanh_sech
 from heavytop.exact.flint.balls import current_precision, to_bits, working_precision
-from heavytop.top.vectors import cross, dot
+from heavytop.precision import cross, dot
 
 MOST_TERMS = 1 << 17
 _WIDTH, _FARTHEST, _BOUND_BITS = 0.9, 100, 64

@@ -16,8 +16,7 @@ from heavytop.integrate.heyoka.engines import Compiled, compiled, load
 from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, TaylorStep, Trajectory, sampled
 from heavytop.precision import Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import RoundedTimes, check_times
+from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 # One run of a compiled integrator, step by step.
 #

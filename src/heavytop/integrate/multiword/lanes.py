@@ -32,7 +32,7 @@ from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
 from heavytop.multiword.problem import Scaled
 from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import check_times
 
 _FIRST_CHUNK = 64
 _RISE = 2

@@ -19,8 +19,7 @@ from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import RoundedTimes, check_times
+from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16

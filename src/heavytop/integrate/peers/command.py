@@ -12,7 +12,6 @@ import os
 import re
 import select
 import shutil
-import signal
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -28,13 +27,12 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
-from heavytop.processes import Guard
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
@@ -585,7 +583,7 @@ class Session:
     def _end(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             code = self.process.wait(_FAREWELL)
-            return f"ended with exit code {code}" if code >= 0 else f"was ended by {signal.Signals(-code).name}"
+            return f"{'ended' if code >= 0 else 'was ended'} {how_it_ended(code)}"
         return "closed its output"
 
     def _failed(self, what: str) -> PeerFailed:

@@ -12,14 +12,13 @@ from typing import Any, TypeVar
 
 import numpy
 
+from heavytop import precision as vectors
 from heavytop.errors import InputError, PeerFailed, quoted
 from heavytop.integrate.peers.contract import Declared, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
-from heavytop.top import vectors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import HeavyTop, State, check_times
 
 FINEST = Fraction(1, 10**15)
 """The tolerance of a peer where none is asked for: below about 4 eps most refuse."""

@@ -13,7 +13,7 @@ from heavytop.errors import InputError
 from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import exact, number
-from heavytop.top.times import check_times
+from heavytop.top.heavy_top import check_times
 
 
 @with_tolerance

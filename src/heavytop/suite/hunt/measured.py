@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -22,20 +21,19 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed
 from heavytop.exact.catalogue import matches
-from heavytop.integrate import peers
+from heavytop.integrate import registry
 from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import Command, begin_row
+from heavytop.integrate.registry import is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.integrator import ChosenIntegrator
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number, real, round_to
-from heavytop.processes import ChildContext, Guard, end_pool, lead_group, new_mark
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
+from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.suite.sweeps import Random
 from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector, dot
 
 # A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
 
@@ -72,9 +70,9 @@ def follow(
 
 
 @lru_cache(maxsize=4)
-def _ready(which: Any) -> peers.Peer:
+def _ready(which: Any) -> registry.Peer:
     """The integrator, looked up once."""
-    return peers.ready(which)
+    return registry.ready(which)
 
 
 class Apart:
@@ -84,17 +82,14 @@ class Apart:
     """
 
     def __init__(self, integrator: ChosenIntegrator, seconds: float = SECONDS) -> None:
-        self._integrator, self._seconds, self._mark = integrator, seconds, ""
-        self._pool: ProcessPoolExecutor | None = None
-        self._guard: Guard | None = None
+        self._integrator, self._seconds = integrator, seconds
+        self._process: GuardedProcess | None = None
 
     def follow(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> IntegratedRun:
         """One motion; one that ends its process or takes too long is an outcome."""
         try:
-            if self._pool is None:
-                self._begin()
-            assert self._pool is not None
-            asked = self._pool.submit(follow, self._integrator, top, start, times, precision)
+            process = self._process or self._begin()
+            asked = process.submit(follow, self._integrator, top, start, times, precision)
             if isinstance(
                 asked.exception(timeout=self._seconds), KeyboardInterrupt
             ):  # of the integrator, not of a user
@@ -107,22 +102,20 @@ class Apart:
             self.end()
             return IntegratedRun(FAILED, (), f"{self._integrator.name} ended its whole process")
 
-    def _begin(self) -> None:
-        self._mark = new_mark()
-        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(self._mark), initializer=lead_group)
+    def _begin(self) -> GuardedProcess:
+        self._process = process = GuardedProcess()
         try:
-            process = self._pool.submit(_hello, self._integrator).result(timeout=_BEGIN)
+            process.guard(process.submit(_hello, self._integrator).result(timeout=_BEGIN))
         except TimeoutError:
             self.end()
             raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
-        with suppress(OSError):
-            self._guard = Guard(process, self._mark)
+        return process
 
     def end(self) -> None:
         """Kill the process and whatever it started."""
-        pool, guard, self._pool, self._guard = self._pool, self._guard, None, None
-        if pool is not None:
-            end_pool(pool, guard, self._mark)
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
 
 
 def _hello(integrator: ChosenIntegrator) -> int:
