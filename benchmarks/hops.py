@@ -2,8 +2,8 @@
 
 ``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order
 of their first call, and how many of them are not the mathematics (`top/`, `multiword/`, `exact/`).  What runs while a
-module is imported counts for nothing: all modules are imported before.  Each flow is a process of its own, so that
-nothing is cached.
+module is imported counts for nothing: all modules are imported before.  Each flow is a process of its own, forked
+behind that, so that nothing is cached.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Callable
+from multiprocessing import get_context
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -87,18 +87,24 @@ def files(flow: Callable[[], object]) -> list[str]:
 
 
 def main() -> None:
-    """All flows, or the one that is named."""
-    if len(sys.argv) == 1:
-        for name in FLOWS:
-            subprocess.run([sys.executable, __file__, name], check=True)
-        return
+    """All flows, or those that are named; exit code 1 where one failed."""
     for module in pkgutil.walk_packages([str(PACKAGE)], "heavytop."):
         if "peers." not in module.name and "__main__" not in module.name:
             importlib.import_module(module.name)
+    for name in sys.argv[1:] or FLOWS:
+        child = get_context("fork").Process(target=show, args=(name,))
+        child.start()
+        child.join()
+        if child.exitcode:
+            sys.exit(1)
+
+
+def show(name: str) -> None:
+    """Goes through a flow and prints its files."""
     with tempfile.TemporaryDirectory() as folder:
-        found = files(FLOWS[sys.argv[1]](Path(folder)))
+        found = files(FLOWS[name](Path(folder)))
     passed_on = [file for file in found if not file.startswith(MATHEMATICS)]
-    print(f"{sys.argv[1]}: {len(found)} files, {len(passed_on)} without the mathematics\n  " + ", ".join(found))
+    print(f"{name}: {len(found)} files, {len(passed_on)} without the mathematics\n  " + ", ".join(found))
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import ast
 from collections import Counter
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -49,19 +50,37 @@ MAY_IMPORT = {
 } | {room: GROUND.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
+class Read(NamedTuple):
+    """What the tests here ask of a file; its tree is not kept."""
+
+    imports: set[str]
+    used: set[str]
+    """What it imports, at its head or when it is used; not for types alone."""
+    calls: set[str]
+    said: set[str]
+    classes: list[str]
+
+
 @cache
-def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text("utf-8"))
-
-
-def imports(path: Path) -> set[str]:
-    found = set()
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+def read(path: Path) -> Read:
+    tree = ast.parse(path.read_text("utf-8"))
+    found = Read(set(), set(), set(), set(), [n.name for n in tree.body if isinstance(n, ast.ClassDef)])
+    for_types: set[int] = set()
+    for node in ast.walk(tree):  # a block before what it holds
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            for_types |= {id(each) for each in ast.walk(node)}
+        elif isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+            found.imports.update(names)
+            found.used.update(names if id(node) not in for_types else ())
         elif isinstance(node, ast.ImportFrom):
-            found.add(node.module)
-            found |= {f"{node.module}.{alias.name}" for alias in node.names if node.module == "heavytop"}
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found.imports.update({node.module} | (names if node.module == "heavytop" else set()))
+            found.used.update({node.module, *names} if id(node) not in for_types else ())
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found.calls.add(node.func.id)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found.said.add(node.value)
     return found
 
 
@@ -76,7 +95,7 @@ FILES = sorted(SOURCE.rglob("*.py"))
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
 def test_a_room_imports_only_from_rooms_below_it(path: Path) -> None:
     own = room(path)
-    used = {name.split(".")[1] for name in imports(path) if name.startswith("heavytop.")}
+    used = {name.split(".")[1] for name in read(path).imports if name.startswith("heavytop.")}
     assert used - {own} <= MAY_IMPORT[own]
 
 
@@ -88,48 +107,25 @@ def test_only_one_file_builds_engines_of_heyoka() -> None:
 
 def test_only_the_command_line_prints() -> None:
     for path in FILES:
-        calls = [n for n in ast.walk(parsed(path)) if isinstance(n, ast.Call)]
         if path.parent.name != "cli":
-            assert not [c for c in calls if isinstance(c.func, ast.Name) and c.func.id == "print"], path
+            assert "print" not in read(path).calls, path
 
 
 def test_the_name_of_a_kind_stands_in_its_own_file() -> None:
     for path in FILES:
-        tree = parsed(path)
-        said = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
         # `audit` and `score` are commands too, and the rows of a score are made by its room
         own = {path.stem} if path.parent.name == "kinds" else set()
         if path.stem not in ("score", "audit", "__init__", "growth_laws"):
-            assert not said & KINDS.keys() - own - ALSO_WORDS, path
+            assert not read(path).said & KINDS.keys() - own - ALSO_WORDS, path
 
 
 def test_no_files_import_one_another_in_a_circle() -> None:
     names = {path: ".".join(("heavytop", *path.relative_to(SOURCE).with_suffix("").parts)) for path in FILES}
     modules = {name.removesuffix(".__init__"): path for path, name in names.items()}
-    graph = {name: {each for each in used_by(path) if each in modules} - {name} for name, path in modules.items()}
+    graph = {name: {each for each in read(path).used if each in modules} - {name} for name, path in modules.items()}
     while leaves := {name for name, used in graph.items() if not used & graph.keys()}:
         graph = {name: used for name, used in graph.items() if name not in leaves}
     assert not graph
-
-
-def used_by(path: Path) -> set[str]:
-    """What a file imports, at its head or when it is used; not for types alone."""
-    tree = parsed(path)
-    for_types = {
-        id(node)
-        for block in ast.walk(tree)
-        if isinstance(block, ast.If) and "TYPE_CHECKING" in ast.dump(block.test)
-        for node in ast.walk(block)
-    }
-    found = set()
-    for node in ast.walk(tree):
-        if id(node) in for_types:
-            continue
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return found
 
 
 def test_no_file_is_longer_than_anyone_reads() -> None:
@@ -146,10 +142,5 @@ TWO_MEANINGS = {"Integrator", "Report", "Section"}
 
 
 def test_a_public_class_name_has_one_meaning() -> None:
-    places = Counter(
-        node.name
-        for path in SOURCE.rglob("*.py")
-        for node in parsed(path).body
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-    )
+    places = Counter(name for path in FILES for name in read(path).classes if not name.startswith("_"))
     assert {name for name, count in places.items() if count > 1} == TWO_MEANINGS

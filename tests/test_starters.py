@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
 from heavytop.suite.integrator_check import check
 from heavytop.suite.plan import read
+from support import in_process
 
 COMPILERS = {"python": "python3", "c": "cc", "cpp": "g++", "rust": "rustc", "julia": "julia", "fortran": "gfortran"}
 
@@ -85,8 +85,7 @@ def test_a_folder_that_holds_anything_and_an_unknown_language_are_refused(tmp_pa
 
 def test_from_nothing_to_a_gate_on_the_command_line(tmp_path: Path) -> None:
     def heavytop(*words: str) -> int:
-        line = [sys.executable, "-m", "heavytop", *words]
-        return subprocess.run(line, cwd=tmp_path, capture_output=True, check=False, timeout=200).returncode
+        return in_process.heavytop(*words, cwd=tmp_path).returncode
 
     assert heavytop("new", "mine", "--language", "python") == 0
     assert heavytop("new", "mine", "--language", "python") == 2

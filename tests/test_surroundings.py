@@ -234,7 +234,7 @@ def test_threads_and_jumps_of_the_clock_under_strict_and_stripped_python(options
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-@pytest.mark.parametrize("options", [("-W", "error"), ("-O",)], ids=" ".join)
+@pytest.mark.parametrize("options", [("-W", "error"), ("-OO",)], ids=" ".join)
 def test_the_command_line_under_strict_and_stripped_python(options: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
     run = ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]

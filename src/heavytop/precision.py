@@ -112,7 +112,7 @@ def available() -> dict[str, str | None]:
 
 def require(precision: Precision) -> Precision:
     """``precision`` itself; raises InputError if this platform lacks it."""
-    reason = available()[precision.family]
+    reason = None if precision.family == "double" else available()[precision.family]
     if reason:
         raise InputError(
             f"Precision {precision.name} is not available: {reason}.", "`heavytop list` shows what is there."

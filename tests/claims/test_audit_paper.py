@@ -153,14 +153,20 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     ],
 )
 def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(claim, equation):
-    found = Audit(claim.name, "heavy_top", "", judge(claim.statements(HEAVY_TOP), claim.setting))
-    clean = report(claim.name)
-    broken = {
-        row.equation for row, before in zip(found.rows, clean.rows, strict=True) if before.holds and not row.holds
-    }
+    # what does not hold without the mistake says nothing of it; the general case takes long: its smooth branch
+    rows_without = zip(claim.statements(HEAVY_TOP), report(claim.name).rows, strict=True)
+    held = [(statement, row) for statement, row in rows_without if row.holds]
+    if isinstance(claim, GeneralClaim):
+        held = [(statement, row) for statement, row in held if row.branch == "smooth"]
+    found = judge([statement for statement, _ in held], claim.setting)
+    broken = {before.equation for row, (_, before) in zip(found, held, strict=True) if not row.holds}
+    assert all(row.equation == before.equation for row, (_, before) in zip(found, held, strict=True))
     assert equation in broken
     assert broken <= {equation, "1.1", "1.2", "1.3", "3.1"} | ({"4.5", "4.6"} if equation == "4.4" else set())
-    assert all(row.holds is False for row in found.rows if row.equation == equation and row.equation in ("2.4", "4.4"))
+    if equation in ("2.4", "4.4"):
+        of_equation = [row for row in report(claim.name).rows if row.equation == equation]
+        assert all(row.holds for row in of_equation), "or the next line would not see them all"
+        assert all(row.holds is False for row in found if row.equation == equation)
 
 
 def test_samples_of_the_general_case_lie_where_both_roots_are_real():

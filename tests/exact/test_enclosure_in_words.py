@@ -50,7 +50,7 @@ def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, momen
 def test_balls_hold_what_exact_integers_find(system, unit, monkeypatch):
     size = Fraction(10) ** unit
     # Ω is absolute below 1: what is so slow has its own bits
-    bits, times = (360, (-25,)) if unit < 0 else (120, (Fraction(37, 3), -11))
+    bits, times = (360, (-12,)) if unit < 0 else (120, (Fraction(37, 6), -5))
     for time in (t / size for t in times):
         one, other = (solved(system, size) for _ in range(2))
         balls = one.state(time, bits)

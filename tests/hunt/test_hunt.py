@@ -13,7 +13,7 @@ from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, possible, turns
-from heavytop.suite.hunt.search import digits
+from heavytop.suite.hunt.search import digits, keep, kept
 from heavytop.suite.plan import expand, load
 from support.in_process import heavytop
 
@@ -44,6 +44,22 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
         assert worst["outcome"] == "failed"
     assert worst["toml"].startswith("[[top]]\n")
     assert "What is special" in str(hunt)
+
+
+def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    planted = Integrator("planted:rotor", "support.hunted_integrators:rotor")
+    monkeypatch.setitem(INTEGRATORS, planted.name, planted)
+    hunt = ht.hunt("planted:rotor", budget=10, horizon=1, family="heavy_gyrostat")
+    worst = hunt.found[0]
+    assert worst["system"] == "heavy_gyrostat"
+    assert max(map(digits, [*numbers(worst), *map(exact, worst["rotor"])])) <= 3
+    assert exact(worst["rotor"][2]) < 0
+    assert exact(worst["omega"][0]) < 0
+    assert "--rotor" in worst["command"]
+    assert hunt.hunted.proofs[0].proven
+    keep(tmp_path / "found.toml", [m.motion for m in hunt.hunted.found])
+    assert kept(tmp_path / "found.toml") == tuple(m.motion for m in hunt.hunted.found)
+    assert not ht.hunt(budget=8, horizon=1, family="heavy_gyrostat").found
 
 
 def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:

@@ -1,4 +1,8 @@
-"""Integrators of another package that cheat: what they say of themselves is measured, and their row fails with why."""
+"""Integrators of another package that cheat: what they say of themselves is measured, and their row fails with why.
+
+Their rows are measured in this process, as the process of a row measures them; that each has one of its own is tested
+in tests/suite/test_limited.py.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,8 @@ import pytest
 from heavytop.cases import CASES
 from heavytop.kinds import KINDS, work_precision
 from heavytop.records import Row
-from heavytop.suite.run import rows as measured
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.rows import measure
 from support.reports import expand, load
 
 MODULE = '''
@@ -258,7 +263,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def rows(folder: Path, *names: str, case: str = "euler", kind: str = "") -> list[Row]:
     (folder / "plan.toml").write_text(f'name = "p"\n{kind or work(case, *names)}', "utf-8")
     tasks = expand(load(str(folder / "plan.toml"))[0])
-    return [row for _, row in sorted(measured(tasks, KINDS, 1, None), key=lambda found: found[0])]
+    return [measure(KINDS[task.key.kind], task, Saved()) for task in tasks]
 
 
 def work(case: str, *names: str) -> str:

@@ -1,12 +1,15 @@
 """Rows of drift with the attitude: its error and that of the centre of mass, and bands of tops with a rotor."""
 
+from collections.abc import Callable
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import heavytop as ht
+from support.reports import expand, load, measure
 
 PLAN = """name = "bodies"
 [[top]]
@@ -37,16 +40,30 @@ runs = [{{ precision = "{precision}", horizon = "2", samples = 20 }}]
 """
 
 
-def rows(folder: Path, *tables: dict[str, Any]) -> dict[tuple[str, str], Any]:
-    text = PLAN + "".join(TABLE.format(**table) for table in tables)
-    (folder / "plan.toml").write_text(text, "utf-8")
-    found = ht.run(folder / "plan.toml", out=folder / "out", workers=1).rows
-    return {(row.case, f"{row.key.subject.name} {row.precision}"): row for row in found}
+def plan(folder: Path, **table: str) -> Path:
+    (folder / "plan.toml").write_text(PLAN + TABLE.format(**table), "utf-8")
+    return folder / "plan.toml"
 
 
-def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(tmp_path: Path) -> None:
-    tables = [{"integrator": name, "precision": "double", "attitude": "true"} for name in ("heyoka", "multiword")]
-    for (case, _), row in rows(tmp_path, *tables).items():
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
+    """The row of each case with an integrator, in double; each measured once."""
+
+    @cache
+    def measured(integrator: str, attitude: str) -> dict[str, Any]:
+        table = {"integrator": integrator, "precision": "double", "attitude": attitude}
+        tasks = expand(load(str(plan(tmp_path_factory.mktemp("rows"), **table)))[0])
+        return {task.key.case: measure(task) for task in tasks}
+
+    return measured
+
+
+@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
+def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(
+    rows: Callable[..., dict[str, Any]], integrator: str
+) -> None:
+    assert rows(integrator, "true").keys() == {"tilted", "spinner"}
+    for case, row in rows(integrator, "true").items():
         assert row.outcome == "success"
         for name in ("attitude_error", *(["position_error"] if case == "tilted" else [])):
             assert 0 < float(row.metrics[f"{name}_max"].value) < 500 * 2.0**-52
@@ -54,11 +71,9 @@ def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(tmp
         assert len(row.series["attitude_error"].values) > 3
 
 
-def test_the_states_are_those_of_a_run_without_attitude_to_rounding(tmp_path: Path) -> None:
-    both = [{"integrator": "heyoka", "precision": "double", "attitude": flag} for flag in ("true", "false")]
-    (tmp_path / "one").mkdir()
-    (tmp_path / "other").mkdir()
-    with_it, without = (rows(tmp_path / name, table) for name, table in zip(("one", "other"), both, strict=True))
+def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callable[..., dict[str, Any]]) -> None:
+    with_it, without = (rows("heyoka", flag) for flag in ("true", "false"))
+    assert without.keys() == {"tilted", "spinner"}
     for key, row in without.items():
         assert "attitude_error_max" not in row.metrics
         assert set(row.metrics) < set(with_it[key].metrics)
@@ -66,8 +81,10 @@ def test_the_states_are_those_of_a_run_without_attitude_to_rounding(tmp_path: Pa
 
 def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
     """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
-    found = rows(tmp_path, {"integrator": "heyoka", "precision": "double", "attitude": "true"})
-    row = found["spinner", "heyoka double"]
+    report = ht.run(
+        plan(tmp_path, integrator="heyoka", precision="double", attitude="true"), out=tmp_path / "out", workers=1
+    )
+    (row,) = (each for each in report.rows if each.case == "spinner")
     bands = [
         metric.band for name, metric in row.metrics.items() if name.startswith(("drift", "solution")) and metric.band
     ]

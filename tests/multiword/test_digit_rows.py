@@ -189,9 +189,11 @@ MOTIONS = {
 }
 
 
-@pytest.mark.parametrize("words", [8, 13])
-@pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize("forwards", [True, False])
+@pytest.mark.parametrize(
+    ("words", "name", "forwards"),
+    [(words, name, forwards) for words, forwards in ((8, True), (8, False), (13, True)) for name in MOTIONS]
+    + [(13, name, False) for name in ("generic", "with an attitude")],
+)
 def test_steps_are_those_of_whole_numbers(words: int, name: str, forwards: bool) -> None:
     given, grid, span = MOTIONS[name], grid_of(words), Fraction(2)
     assert rows_of(grid) is DigitRows

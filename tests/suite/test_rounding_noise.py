@@ -40,7 +40,7 @@ PLAN = plan_of(
 
 @pytest.fixture(scope="module")
 def reports() -> list[Report]:
-    return [Report(SCHEMA, {"name": "tiny"}, {}, [measure(t) for t in expand(PLAN, seed)]) for seed in range(4)]
+    return [Report(SCHEMA, {"name": "tiny"}, {}, [measure(t) for t in expand(PLAN, seed)]) for seed in range(3)]
 
 
 def test_every_error_and_break_away_has_a_band(reports: list[Report]) -> None:

@@ -78,9 +78,9 @@ def test_degenerate_trajectories_are_scored(rows: int) -> None:
 def test_centres_on_an_axis_and_constant_gamma_leave_nothing_to_fit() -> None:
     for centre in ((0, 0, 1), (0, 0, 0)):
         top, start = HeavyTop((2, 2, 1), 1, centre), State((Fraction(1, 10), 0, 3), (0, 0, 1))
-        y = motion(top, start, HEAVY_TOP, TIMES)
-        for states in (np.hstack([y[:, :3], np.tile([0, 0, 1.0], (20, 1))]), y * OMEGA, y * [0, 0, 1, 0, 0, 1]):
-            scored(states, top=top, start=start)
+        y = motion(top, start, HEAVY_TOP, TIMES[:8])
+        for states in (np.hstack([y[:, :3], np.tile([0, 0, 1.0], (8, 1))]), y * OMEGA, y * [0, 0, 1, 0, 0, 1]):
+            scored(states, TIMES[:8], top=top, start=start)
 
 
 @pytest.mark.parametrize("row", [0, 41, 98, 99])

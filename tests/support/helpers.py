@@ -12,6 +12,7 @@ from typing import Any
 
 from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.precision import exact
 from heavytop.top.equations import HEAVY_GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -49,6 +50,12 @@ def start_of(given: dict) -> State:
 def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
     """One run of a peer, as the rows of a report make it."""
     return registry.ready(name, setting)(*problem, **options)
+
+
+def distance(one: Trajectory, other: Trajectory) -> Fraction:
+    """The largest difference of two components, exactly."""
+    pairs = zip(one.states, other.states, strict=True)
+    return max(abs(exact(a) - exact(b)) for first, second in pairs for a, b in zip(first, second, strict=True))
 
 
 def without_progress(errors: str) -> str:

@@ -47,6 +47,13 @@ def spin(top: HeavyTop, start: State, times: Times, precision: Precision, *, sys
     return propagate(top, start, times, precision, system=system)
 
 
+def rotor(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """A rotor counted with the wrong sign along axis 3 when its momentum there is negative and Ω1 too."""
+    if top.rotor is not None and top.rotor[2] < 0 and start.omega[0] < 0:
+        top = HeavyTop(top.inertia, top.weight, top.centre, (*top.rotor[:2], -top.rotor[2]))
+    return propagate(top, start, times, precision, system=system)
+
+
 def rest(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
     """NaN within 1e-6 of an equilibrium: where the field is below that."""
     field = system.field(system.parameters(top, start).mapped(Fraction), start.flat)

@@ -24,7 +24,7 @@ runs = [{ precision = "double", horizon = "50", samples = 200 }, { precision = "
 [[measure]]
 kind = "growth"
 cases = ["gyrostat"]
-runs = [{ precision = "double", horizon = "2e4", starts = 24 }]
+runs = [{ precision = "double", horizon = "5e3", starts = 24 }]
 [[measure]]
 kind = "homoclinic"
 cases = ["delone"]

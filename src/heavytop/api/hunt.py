@@ -68,7 +68,8 @@ def hunt(
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
         precision, horizon: the format, and the time up to which errors count; negative for backwards.
         budget: a number of motions, or seconds such as "60s", which become a number by the cost of the first 64.
-        family: "any", or tops that are all "euler", "lagrange" or "kovalevskaya".
+        family: "any", or tops that are all "euler", "lagrange" or "kovalevskaya", or tops with a rotor,
+            "heavy_gyrostat".
         against: an integrator; then the ratio to its error is searched for.
         limit: what counts as found: an error in eps T^1.5, or with ``against`` a ratio.  None for two decades beyond
             what the integrator's own law and the motion's amplification explain.

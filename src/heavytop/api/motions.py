@@ -476,8 +476,11 @@ class Integrator:
         if self._is_plain:
             plain = self._plain(state, row, targets)
             if plain is not None:
-                with self._tool.borrowed() as engine:
+                engine = self._tool.take()
+                try:
                     return states_at(engine, self._numbers, plain, targets, self._limit, self._form)
+                finally:
+                    self._tool.spare.append(engine)
         if state is None:
             state = State(row[:3], row[3:])
         found = propagate(
@@ -532,6 +535,8 @@ class Integrator:
         """States at all times, ``nan`` where they were not reached."""
         missing = count - len(states)
         if not missing:
+            if count == 1:
+                return states[0].reshape(1, 6)
             return states if isinstance(states, numpy.ndarray) else numpy.array(states)
         nothing = [number(Fraction(0), self._form) * float("nan")] * 6
         return numpy.array([*states, *([nothing] * missing)])

@@ -74,7 +74,7 @@ def hunt(
     precision: Annotated[str, typer.Option(help="Number format.")] = "double",
     horizon: Annotated[str, typer.Option(help="Time up to which errors count.")] = "100",
     budget: Annotated[str, typer.Option(help="Motions, 5000, or seconds, 60s.")] = "5000",
-    family: Annotated[str, typer.Option(help="any, euler, lagrange or kovalevskaya.")] = "any",
+    family: Annotated[str, typer.Option(help="any, euler, lagrange, kovalevskaya or heavy_gyrostat.")] = "any",
     against: Annotated[str | None, typer.Option(help="Search for the largest ratio to its error.")] = None,
     limit: Annotated[str | None, typer.Option(help="What is found: an error in eps T^1.5, or a ratio.")] = None,
     seed: Annotated[int, typer.Option(help="Search otherwise.")] = 1,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from math import log10
 
-from heavytop.claims.audit.audit import PAPER, audited, own_system, paper_claim
-from heavytop.claims.audit.judge import judge
 from heavytop.claims.library.entry import library
 from heavytop.document.document import Block, Card, Headline, In, Note, Word, clip
 from heavytop.errors import InputError, quoted
@@ -37,6 +35,8 @@ class AuditTable(PlanTable, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row; raises InputError for an unknown claim or system, and for a system that a claim is not about."""
+        from heavytop.claims.audit.audit import PAPER, own_system  # loads SymPy, which no other kind needs
+
         keys: list[RowKey] = []
         for claim in self.claims:
             systems = self._systems(claim)
@@ -46,6 +46,8 @@ class AuditTable(PlanTable, tag=NAME):
 
     def _systems(self, claim: str) -> tuple[str, ...]:
         """The systems of a claim's rows, "" for its own."""
+        from heavytop.claims.audit.audit import PAPER, own_system, paper_claim
+
         asked = [system(name) for name in self.systems]
         if claim in PAPER:
             return tuple(paper_claim(claim).about(each).name for each in asked) or (HEAVY_TOP.name,)
@@ -61,6 +63,8 @@ def _entries(claim: str) -> list[str]:
     if claim == LIBRARY:
         return list(library())
     if claim not in library():
+        from heavytop.claims.audit.audit import PAPER
+
         raise InputError(
             f"Unknown claim {claim[:60]!r} to audit.",
             f'Use {", ".join(PAPER)}, a name of `heavytop claims`, or "{LIBRARY}".',
@@ -80,6 +84,9 @@ class AuditKind(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
+        from heavytop.claims.audit.audit import PAPER, paper_claim
+        from heavytop.claims.audit.judge import judge
+
         if task.key.case not in PAPER:
             return _of_entry(task)
         claim, about = paper_claim(task.key.case), system(task.key.system)
@@ -147,6 +154,8 @@ def _of_entry(task: Task) -> Row:
 
     Of published numbers also how many of their digits are right.
     """
+    from heavytop.claims.audit.audit import audited
+
     entry = library()[task.key.case]
     judged, found = audited(entry)
     metrics: dict[Quantity, Metric] = {}

@@ -19,6 +19,7 @@ from heavytop.suite.hunt.measured import Family
 from heavytop.suite.hunt.search import Asked, Hunted, command_of, hunt, keep, kept
 from heavytop.suite.plan import positive
 from heavytop.suite.rows import Find, PlanTable, Task, computed, exact_row, failed
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 
 NAME = "hunt"
 WORST = Quantity("hunt_error", "relative_to_law", "max")
@@ -53,7 +54,8 @@ class HuntTable(PlanTable, tag=NAME):
         if self.found:
             kept(Path(self.found))
         name = f"{self.family}-{self.seed}"
-        key = RowKey(NAME, name, "heavy_top", computed(self.integrator), parse(self.precision).name)
+        system = HEAVY_GYROSTAT.name if self.family == HEAVY_GYROSTAT.name else HEAVY_TOP.name
+        key = RowKey(NAME, name, system, computed(self.integrator), parse(self.precision).name)
         options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
         return [Task(key, "", self.integrator, options=options)]
 

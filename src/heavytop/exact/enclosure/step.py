@@ -41,7 +41,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from math import exp, inf, isfinite, lcm
+from math import exp, inf, isfinite, lcm, log2
 from typing import Any, Protocol
 
 import numpy as np
@@ -272,6 +272,11 @@ class Errors:
     radii: Matrix
     exponent: int
 
+    @property
+    def bits(self) -> float:
+        """log2 of the largest error, in ulps, plus 2^exponent: the bits that are lost."""
+        return self.exponent + log2(float(self.sizes().max()) + 1)
+
     def sizes(self, matrix: Matrix | None = None, slack: float = 0.0) -> Matrix:
         """Upper bounds of the components of (matrix + anything of norm ``slack``) times the set, without 2^exponent."""
         across = self.frame if matrix is None else matrix
@@ -356,17 +361,23 @@ class Step:
         """(Q', T, η): the frame at τ = 1, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
         return _new_frame(self.variation.sum(axis=0), self.summed_error, self.node.errors)
 
-    def end(self, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
-        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame, that of :meth:`transfer`."""
+    def end(self, transfer: tuple[Matrix, Matrix, float] | None = None, dropped: int = 0) -> Node:
+        """The node at τ = 1: Σ b_n, and the set of errors in a new frame, that of :meth:`transfer`.
+
+        dropped: how many bits fewer than this step the node has.  The sum is then rounded to nearest, by at most half
+        of its ulp in each component, and the set is wider by as much; with 0 the sum is exact.
+        """
         errors = self.node.errors
         frame, turned, slack = transfer or self.transfer()
         radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
-        radii = (radii + reach * self.local) * _UP
+        rounding = float(np.ldexp(0.5, dropped - errors.exponent)) if dropped else 0.0
+        radii = (radii + reach * (self.local + rounding)) * _UP
         exponent = errors.exponent
         if radii.max() > 2.0**400:
             radii, exponent = np.ldexp(radii, -400), exponent + 400
-        return Node(self.node.time + self.length, self.series.total, Errors(frame, radii, exponent), self._halvings())
+        centre = rounded_off(self.series.total, dropped) if dropped else self.series.total
+        return Node(self.node.time + self.length, centre, Errors(frame, radii, exponent - dropped), self._halvings())
 
     def _halvings(self) -> int:
         """The next step: where the orders a bit are few it is doubled, where they are many it is halved."""
@@ -374,6 +385,12 @@ class Step:
         if wanted > many:
             return self.node.halvings + 1
         return self.node.halvings - int(wanted < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
+
+
+def rounded_off(centre: Sequence[int], dropped: int) -> tuple[mpz, ...]:
+    """Each number over 2^dropped, rounded to nearest."""
+    half = mpz(1) << (dropped - 1)
+    return tuple((value + half) >> dropped for value in centre)
 
 
 def horner(coefficients: list[int], tau: Fraction) -> mpz:

@@ -12,7 +12,6 @@ from threading import Lock, RLock
 from time import perf_counter
 from typing import Any
 
-import heyoka
 import numpy
 
 from heavytop.errors import Contradiction, InputError
@@ -171,9 +170,6 @@ def _require(fine: bool, what: str, precision: Precision) -> None:
         )
 
 
-# A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
-heyoka.llvm_state.set_diskcache_enabled(False)
-
 _XI = ("xi1", "xi2", "xi3")
 
 
@@ -196,20 +192,31 @@ class Compiled:
 
         Whoever runs meanwhile, another thread or an observer of this very run, has another copy.
         """
-        try:
-            engine = self.spare.pop()
-        except IndexError:
-            with self.copying:
-                engine = deepcopy(self.engine)
+        engine = self.take()
         try:
             yield engine
         finally:
             self.spare.append(engine)
 
+    def take(self) -> Any:
+        """A copy that is to be given back to ``spare``: :meth:`borrowed` for who counts microseconds."""
+        try:
+            return self.spare.pop()
+        except IndexError:
+            with self.copying:
+                return deepcopy(self.engine)
+
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
 _compiling: dict[tuple[Any, ...], RLock] = {}
 """One lock a key: what one thread compiles, another that needs the same waits for."""
+
+
+def not_finite() -> Any:
+    """The outcome of a step to a state that is not finite."""
+    import heyoka
+
+    return heyoka.taylor_outcome.err_nf_state
 
 
 def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
@@ -218,6 +225,8 @@ def expressions(system: System, attitude: bool, constants: Parameters | None = N
 
     constants: doubles in the place of all par[i].
     """
+    import heyoka  # when it is used: its loading takes half of a start
+
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
     p = constants or system.taken_in([heyoka.par[i] for i in range(_count(system))])
@@ -275,6 +284,10 @@ def _built(
     constants: Parameters | None,
 ) -> tuple[Any, float]:
     """A new engine, and the seconds that compiling it took."""
+    import heyoka
+
+    # a cache of machine code on disk is not protected against corruption: a flipped bit gives wrong numbers silently
+    heyoka.llvm_state.set_diskcache_enabled(False)
     one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
     size = 9 if attitude else 6
     options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
@@ -329,7 +342,7 @@ def load(engine: Any, problem: Problem) -> None:
     parameters, engine.state[:] = arrays(problem)
     if len(engine.pars):
         engine.pars[:] = parameters
-    engine.time = number(Fraction(0), problem.precision)
+    engine.time = 0.0 if problem.precision == DOUBLE else number(Fraction(0), problem.precision)
 
 
 @last_call

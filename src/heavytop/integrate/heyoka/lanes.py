@@ -15,10 +15,9 @@ from threading import Event, Semaphore
 from time import perf_counter
 from typing import Any, NamedTuple
 
-import heyoka
 import numpy
 
-from heavytop.integrate.heyoka.engines import arrays, compiled
+from heavytop.integrate.heyoka.engines import arrays, compiled, not_finite
 from heavytop.integrate.heyoka.motions import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, exact
@@ -31,7 +30,6 @@ _ROOM = 1000
 _FAR = 2.0**1000
 # parameters and state of an idle lane: a bounded motion in either system
 _DUMMY = 1.0, numpy.linspace(0.1, 1.0, 9)
-_FAILED = heyoka.taylor_outcome.err_nf_state
 
 
 class StoppedError(Exception):
@@ -254,15 +252,15 @@ class Lanes:
         outcomes, smallest, *_ = zip(*self.mover.propagate_res, strict=True)
         ahead = self.direction * self.mover.time
         moved = (ahead < _FAR) & (2 * numpy.array(smallest) > numpy.spacing(ahead))
-        return _FAILED not in outcomes and bool(moved.all())
+        return not_finite() not in outcomes and bool(moved.all())
 
     def _single(self, before: _Ends) -> dict[int, Outcome]:
         """One step; the lanes that failed in it, with SUCCESS for those at rest."""
-        mover = self.mover
+        mover, bad = self.mover, not_finite()
         (mover.step if self.direction > 0 else mover.step_backward)(write_tc=True)
         failed = {}
         for lane, (outcome, _) in enumerate(mover.step_res):
-            if outcome == _FAILED:
+            if outcome == bad:
                 rests = at_rest(before.states[:, lane], mover.tc[:, :, lane])
                 failed[lane] = Outcome.SUCCESS if rests else Outcome.NON_FINITE
             elif mover.time[lane] == before.high[lane]:
@@ -328,7 +326,6 @@ class Lanes:
 
 
 LANES = 8
-_REACHED = heyoka.taylor_outcome.time_limit
 
 
 def states_on_a_grid(
@@ -340,6 +337,8 @@ def states_on_a_grid(
     above 0.  options: tolerance.  A motion is not good where it, or one of the seven beside it, did anything but get
     there in steps that move its time.
     """
+    import heyoka
+
     tool = compiled(system, DOUBLE, lanes=LANES, **options)
     count, ends = len(starts), numpy.array([0.0, *map(float, times)])
     grid = numpy.repeat(ends[:, None], LANES, axis=1)
@@ -354,7 +353,8 @@ def states_on_a_grid(
             engine.state[:] = starts[places].T
             found = engine.propagate_grid(grid)
             results = engine.propagate_res
-            moved = all(each[0] == _REACHED and 2 * each[1] > least for each in results)
+            reached = heyoka.taylor_outcome.time_limit
+            moved = all(each[0] == reached and 2 * each[1] > least for each in results)
             states[places] = (found[1] if isinstance(found, tuple) else found)[1:].transpose(2, 0, 1)
             steps[places] = [each[3] for each in results]
             good[places] = moved and numpy.isfinite(states[places]).all()

@@ -9,10 +9,9 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any
 
-import heyoka
 import numpy
 
-from heavytop.integrate.heyoka.engines import Compiled, compiled, load
+from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
 from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, TaylorStep, Trajectory, sampled
 from heavytop.precision import Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -52,6 +51,7 @@ class Stepper:
     _one_by_one: bool = False
     rest: Any = None
     _before: Any = None
+    _not_finite: Any = field(default_factory=not_finite)
 
     def reach(self, target: Any) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
@@ -96,13 +96,13 @@ class Stepper:
         self._before = state, self.engine.dtime, self.steps
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
-        self._covers = True
-        if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
+        self._covers, now = True, self.engine.time
+        if outcome == self._not_finite or now - now != 0:  # infinity and nan
             if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
             self.rest = state
             return Outcome.SUCCESS
-        if self.engine.time == before:
+        if now == before:
             return Outcome.STEP_TOO_SMALL
         self._went(1)
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
@@ -115,7 +115,7 @@ class Stepper:
         self._seconds_per_step = (perf_counter() - began) / max(done, 1)
         # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
         self._largest_step = max(self._largest_step, abs(float(largest)))
-        failed = outcome == heyoka.taylor_outcome.err_nf_state
+        failed = outcome == self._not_finite
         if failed or self._beyond(target):
             # what has been seen of the steps behind the target says how many lie before it
             self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2

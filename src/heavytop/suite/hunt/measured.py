@@ -32,7 +32,7 @@ from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.suite.sweeps import Random
 from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
 # A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
@@ -57,10 +57,10 @@ def follow(
     """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
     try:
         if integrator.supports_ensemble or isinstance(integrator.source, Command):
-            run = integrator.propagate(top, start, times, precision, HEAVY_TOP, again=False)
+            run = integrator.propagate(top, start, times, precision, system_of(None, top), again=False)
         else:
             which: Any = integrator.which
-            run = _ready(which)(top, start, times, precision, system=HEAVY_TOP)
+            run = _ready(which)(top, start, times, precision, system=system_of(None, top))
     except InputError:
         raise
     except HeavyTopError as error:
@@ -137,8 +137,8 @@ def _double() -> Precision:
 # Everything is exact and depends on the seeds of :class:`Dice` alone.
 
 
-Family = Literal["any", "euler", "lagrange", "kovalevskaya"]
-FAMILIES: tuple[Family, ...] = ("any", "euler", "lagrange", "kovalevskaya")
+Family = Literal["any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat"]
+FAMILIES: tuple[Family, ...] = ("any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat")
 Motion = tuple[HeavyTop, State]
 MOST_TURNS = 20_000
 """Motions of more radians, the rate times the horizon, are not tried: they cost what thousands of others do."""
@@ -189,12 +189,14 @@ def unit(values: Sequence[Fraction]) -> Vector:
 
 def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
     """Number ``index`` of the random motions: every second one of the first 64 and every eighth beyond are plain."""
-    plain = Random("random", seed, index + 1, family).cases()[index]
+    case = Random("random", seed, index + 1, "any" if family == "heavy_gyrostat" else family).cases()[index]
+    plain = case.top, case.start
+    if family == "heavy_gyrostat":
+        plain = _rotored(plain, Dice(f"{seed}/rotor/{index}"))
     if is_plain(index):
-        return plain.top, plain.start
+        return plain
     dice = Dice(f"{seed}/hunt/{index}")
-    found = dice.pick(_WAYS)((plain.top, plain.start), dice)
-    return possible(found, family, horizon) or (plain.top, plain.start)
+    return possible(dice.pick(_WAYS)(plain, dice), family, horizon) or plain
 
 
 def is_plain(index: int) -> bool:
@@ -208,6 +210,8 @@ def changed(one: Motion, other: Motion, seed: str, family: Family, horizon: Frac
     found = one
     for _ in range(1 + dice.below(3)):
         found = _crossed(found, other, dice) if dice.below(8) == 0 else dice.pick(_CHANGES)(found, dice)
+    if found[0].rotor is not None and dice.below(3) == 0:
+        found = _rotored(found, dice)
     return possible(found, family, horizon) or one
 
 
@@ -223,21 +227,23 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
         inertia[1], centre[:2] = inertia[0], [Fraction(0)] * 2
     elif family == "kovalevskaya":
         inertia[:2], centre[2] = [2 * inertia[2]] * 2, Fraction(0)
+    rotor = list(map(_short, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
     inertia, centre, omega = (list(map(_short, each)) for each in (inertia, centre, start.omega))
     weight = _short(top.weight)
     if min(inertia) <= 0 or 2 * max(inertia) > sum(inertia) or max(inertia) > _MOST_RATIO * min(inertia):
         return None
-    sizes = [abs(value) for value in (*inertia, weight, *centre, *omega) if value]
+    sizes = [abs(value) for value in (*inertia, weight, *centre, *omega, *(rotor or ())) if value]
     if max(sizes) > _LARGEST or min(sizes) * _LARGEST < 1:
         return None
-    found = HeavyTop(inertia, weight, centre), State(omega, start.gamma)
+    found = HeavyTop(inertia, weight, centre, rotor), State(omega, start.gamma)
     return found if turns(found, horizon) <= MOST_TURNS else None
 
 
 def turns(motion: Motion, horizon: Fraction) -> float:
     """How many radians the motion turns until the horizon, at most: its rate times the time."""
     top, start = motion
-    return float(rate(HEAVY_TOP, HEAVY_TOP.parameters(top, start), start.flat) * abs(horizon))
+    system = system_of(None, top)
+    return float(rate(system, system.parameters(top, start), start.flat) * abs(horizon))
 
 
 def _short(value: Fraction) -> Fraction:
@@ -253,7 +259,8 @@ def _simple(motion: Motion, dice: Dice) -> Motion:
     inertia = moments[by:] + moments[:by]
     centre = [Fraction(dice.below(5) - 2, 2) for _ in range(3)]
     omega = [Fraction(dice.below(9) - 4, 2) for _ in range(3)]
-    return HeavyTop(inertia, 1 + dice.below(3), centre), State(omega, dice.pick([*_POLES, motion[1].gamma]))
+    top = with_data(motion[0], inertia, 1 + dice.below(3), centre)
+    return top, State(omega, dice.pick([*_POLES, motion[1].gamma]))
 
 
 def _edge(motion: Motion, dice: Dice) -> Motion:
@@ -263,7 +270,7 @@ def _edge(motion: Motion, dice: Dice) -> Motion:
         second[(place + dice.below(3)) % 3] *= dice.pick([Fraction(0), dice.power(-5, -2)])
     x, y, z = second
     inertia = (y + z, z + x, x + y)
-    return (_with(motion[0], inertia=inertia) if min(inertia) else motion[0]), motion[1]
+    return (with_data(motion[0], inertia=inertia) if min(inertia) else motion[0]), motion[1]
 
 
 def _equal(motion: Motion, dice: Dice) -> Motion:
@@ -273,7 +280,7 @@ def _equal(motion: Motion, dice: Dice) -> Motion:
     near = dice.pick([Fraction(0), dice.power(-9, -3)])
     inertia[i] = inertia[j] * dice.pick([Fraction(1), Fraction(1), Fraction(2), Fraction(3, 2)]) * (1 + near)
     inertia[3 - i - j] = (inertia[i] + inertia[j]) * (2 + dice.part()) / 3
-    return _with(motion[0], inertia=inertia), motion[1]
+    return with_data(motion[0], inertia=inertia), motion[1]
 
 
 def _spun(motion: Motion, dice: Dice) -> Motion:
@@ -294,23 +301,23 @@ def _slow(motion: Motion, dice: Dice) -> Motion:
 
 def _weighed(motion: Motion, dice: Dice) -> Motion:
     """A tiny or huge weight."""
-    return _with(motion[0], weight=motion[0].weight * dice.power(-12, 4)), motion[1]
+    return with_data(motion[0], weight=motion[0].weight * dice.power(-12, 4)), motion[1]
 
 
 def _scaled(motion: Motion, dice: Dice) -> Motion:
     """Other units of mass, and the centre as far as it has to be."""
     top, start = motion
     mass, length = dice.power(-12, 11), dice.power(-6, 5)
-    return HeavyTop(
-        [mass * value for value in top.inertia], top.weight * mass / length, [length * value for value in top.centre]
-    ), start
+    inertia, centre = [mass * value for value in top.inertia], [length * value for value in top.centre]
+    return with_data(top, inertia, top.weight * mass / length, centre, rotor_times=mass), start
 
 
 def _faster(motion: Motion, dice: Dice) -> Motion:
     """The same path at another pace: Ω times s, the weight times s²."""
     top, start = motion
     pace = dice.power(-6, 1)
-    return _with(top, weight=top.weight * pace**2), State([pace * value for value in start.omega], start.gamma)
+    omega = [pace * value for value in start.omega]
+    return with_data(top, weight=top.weight * pace**2, rotor_times=pace), State(omega, start.gamma)
 
 
 def _poled(motion: Motion, dice: Dice) -> Motion:
@@ -330,7 +337,7 @@ def _balanced(motion: Motion, dice: Dice) -> Motion:
     along = dice.pick([Fraction(1), Fraction(-1), Fraction(0), dice.part()])
     near = dice.pick([Fraction(0), dice.power(-14, -2)])
     centre = [(speed**2 * i * g + along * g) / (top.weight or 1) for i, g in zip(top.inertia, gamma, strict=True)]
-    return _with(top, centre=centre), State([speed * g + near * dice.part() for g in gamma], gamma)
+    return with_data(top, centre=centre), State([speed * g + near * dice.part() for g in gamma], gamma)
 
 
 def _pendulum(motion: Motion, dice: Dice) -> Motion:
@@ -340,7 +347,7 @@ def _pendulum(motion: Motion, dice: Dice) -> Motion:
     across = dice.pick([Fraction(0), dice.power(-14, -4)])
     centre, omega, gamma = ([Fraction(0)] * 3 for _ in range(3))
     centre[i], gamma[i], omega[j], omega[k] = Fraction(1), Fraction(-1), 2 + near, across
-    return HeavyTop(motion[0].inertia, motion[0].inertia[j], centre), State(omega, gamma)
+    return with_data(motion[0], weight=motion[0].inertia[j], centre=centre), State(omega, gamma)
 
 
 def _nudged(motion: Motion, dice: Dice) -> Motion:
@@ -353,7 +360,7 @@ def _nudged(motion: Motion, dice: Dice) -> Motion:
 
     gamma = unit([value + size * dice.part() for value in start.gamma])
     (weight,) = near([top.weight])
-    return HeavyTop(near(top.inertia), weight, near(top.centre)), State(near(start.omega), gamma)
+    return with_data(top, near(top.inertia), weight, near(top.centre)), State(near(start.omega), gamma)
 
 
 def _without(motion: Motion, dice: Dice) -> Motion:
@@ -361,7 +368,7 @@ def _without(motion: Motion, dice: Dice) -> Motion:
     top, start = motion
     centre, omega = list(top.centre), list(start.omega)
     dice.pick([centre, omega])[dice.below(3)] *= dice.pick([0, -1])
-    return _with(top, centre=centre), State(omega, start.gamma)
+    return with_data(top, centre=centre), State(omega, start.gamma)
 
 
 def _turned(motion: Motion, dice: Dice) -> Motion:
@@ -373,7 +380,8 @@ def _turned(motion: Motion, dice: Dice) -> Motion:
         return [values[(i + by) % 3] for i in range(3)]
 
     if dice.below(2):
-        return HeavyTop(cycled(top.inertia), top.weight, cycled(top.centre)), start
+        rotor = None if top.rotor is None else cycled(top.rotor)
+        return HeavyTop(cycled(top.inertia), top.weight, cycled(top.centre), rotor), start
     return top, State(cycled(start.omega), cycled(start.gamma))
 
 
@@ -381,13 +389,24 @@ def _crossed(one: Motion, other: Motion, dice: Dice) -> Motion:
     return (one[0], other[1]) if dice.below(2) else (other[0], one[1])
 
 
-def _with(
+def _rotored(motion: Motion, dice: Dice) -> Motion:
+    """A rotor of any size along any of the axes, or none."""
+    top, start = motion
+    size = max(top.inertia) * dice.pick([Fraction(0), Fraction(1), Fraction(1), Fraction(1), dice.power(-12, 1)])
+    rotor = [size * dice.pick([Fraction(0), dice.part(), dice.part()]) for _ in range(3)]
+    return HeavyTop(top.inertia, top.weight, top.centre, rotor), start
+
+
+def with_data(
     top: HeavyTop,
-    inertia: Sequence[Fraction] | None = None,
-    weight: Fraction | None = None,
-    centre: Sequence[Fraction] | None = None,
+    inertia: Sequence[Any] | None = None,
+    weight: Fraction | int | None = None,
+    centre: Sequence[Any] | None = None,
+    rotor_times: Fraction | int = 1,
 ) -> HeavyTop:
-    return HeavyTop(inertia or top.inertia, top.weight if weight is None else weight, centre or top.centre)
+    """The top with other data; a rotor that it has times a number."""
+    rotor = None if top.rotor is None else [rotor_times * value for value in top.rotor]
+    return HeavyTop(inertia or top.inertia, top.weight if weight is None else weight, centre or top.centre, rotor)
 
 
 Way = Callable[[Motion, Dice], Motion]
@@ -452,8 +471,8 @@ class Meter:
         """Each of them, in order; the bits of one do not depend on the others."""
         if not motions:
             return []
-        problems = [Problem.of(*motion, self.precision, HEAVY_TOP) for motion in motions]
-        rates = [rate(HEAVY_TOP, each.parameters, each.start.flat) for each in problems]
+        problems = [Problem.of(*motion, self.precision, system_of(None, motion[0])) for motion in motions]
+        rates = [rate(each.system, each.parameters, each.start.flat) for each in problems]
         truths = self._truths(problems, rates)
         runs = self._runs(self.integrator, problems, motions, self._apart)
         others = [] if self.against is None else self._runs(self.against, problems, motions, None)
@@ -479,14 +498,14 @@ class Meter:
         """The same with the amplification over all directions, from the start on and from each sample on: what is
         rounded on the way may grow by more than what is rounded at the start.
         """
-        problem = Problem.of(*found.motion, self.precision, HEAVY_TOP)
-        largest = amplification(HEAVY_TOP, problem.parameters, problem.start.flat, self.horizon)
+        problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
+        largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
         (states,) = self._finely([replace(problem, precision=self._fine)])
         for time, state in zip(self.times[:-1], states or (), strict=False):
             # of a motion that is lost anyway no more is asked
             if largest > FOLLOWED:
                 break
-            later = amplification(HEAVY_TOP, problem.parameters, tuple(state), self.horizon - time)
+            later = amplification(problem.system, problem.parameters, tuple(state), self.horizon - time)
             largest = max(largest, later)
         return replace(found, amplification=max(largest, found.amplification))
 
@@ -581,7 +600,7 @@ _FAST = 20.0
 def class_of(top: HeavyTop, start: State) -> str:
     """The closed form that the motion has."""
     try:
-        found = next(matches(top, start, HEAVY_TOP), None)
+        found = next(matches(top, start, system_of(None, top)), None)
     except HeavyTopError:
         return NO_CLASS
     return NO_CLASS if found is None else found.method
@@ -613,7 +632,8 @@ def _moments(top: HeavyTop) -> list[str]:
 
 
 def _start(top: HeavyTop, start: State) -> list[str]:
-    parameters = HEAVY_TOP.parameters(top, start)
+    system = system_of(None, top)
+    parameters = system.parameters(top, start)
     pull = dot(top.moment, top.moment)
     spin = math.sqrt(dot(start.omega, start.omega))
     own = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
@@ -624,7 +644,7 @@ def _start(top: HeavyTop, start: State) -> list[str]:
         said.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
     elif own > _FAST * spin:
         said.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
-    field = [abs(value) for value in HEAVY_TOP.field(parameters.mapped(Fraction), start.flat)]
+    field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
     unit = spin + own or 1.0
     speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
     if not any(field):

@@ -42,10 +42,11 @@ from heavytop.suite.hunt.measured import (
     drawn,
     is_plain,
     possible,
+    with_data,
 )
 from heavytop.suite.plan import Top, document_of
 from heavytop.top.amplification import rate
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, system_of
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 
 # The simplest data that still show what was found: zeros, equal moments, numbers of few digits.
@@ -68,7 +69,7 @@ def digits(value: Fraction) -> int:
 def complexity(motion: Motion) -> tuple[int, int, int]:
     """What shrinking makes smaller: digits, numbers that are neither 0 nor 1, different numbers and signs."""
     top, start = motion
-    values = [*top.inertia, top.weight, *top.centre, *start.omega, *start.gamma]
+    values = [*top.inertia, top.weight, *top.centre, *(top.rotor or ()), *start.omega, *start.gamma]
     odd = sum(value not in (0, 1) for value in values)
     sizes = sum(len(shown(value)) for value in values) + sum(value < 0 for value in values)
     return sum(map(digits, values)), odd + len(set(top.inertia)), sizes
@@ -102,12 +103,12 @@ def _of_body(motion: Motion) -> Iterator[Motion]:
     top, start = motion
     for inertia in product((1, 2, 3, 4), repeat=3):
         if 2 * max(inertia) <= sum(inertia):
-            yield HeavyTop(inertia, top.weight, top.centre), start
-            yield HeavyTop(inertia, 1, (0, 0, 0)), start
+            yield with_data(top, inertia, top.weight, top.centre), start
+            yield with_data(top, inertia, 1, (0, 0, 0)), start
     for place in range(3):
         centre = [each if i == place else Fraction(0) for i, each in enumerate(top.centre)]
-        yield HeavyTop(top.inertia, top.weight, centre), start
-        yield HeavyTop(top.inertia, 1, [top.weight * each for each in centre]), start
+        yield with_data(top, top.inertia, top.weight, centre), start
+        yield with_data(top, top.inertia, 1, [top.weight * each for each in centre]), start
 
 
 def _of_units(motion: Motion) -> Iterator[Motion]:
@@ -115,9 +116,9 @@ def _of_units(motion: Motion) -> Iterator[Motion]:
     top, start = motion
     for unit in {value for value in top.inertia if value != 1}:
         inertia = [value / unit for value in top.inertia]
-        yield HeavyTop(inertia, top.weight / unit, top.centre), start
-        yield HeavyTop(inertia, 1, [top.weight / unit * value for value in top.centre]), start
-    yield HeavyTop(top.inertia, 1, [top.weight * value for value in top.centre]), start
+        yield with_data(top, inertia, top.weight / unit, rotor_times=1 / unit), start
+        yield with_data(top, inertia, 1, [top.weight / unit * value for value in top.centre], 1 / unit), start
+    yield with_data(top, top.inertia, 1, [top.weight * value for value in top.centre]), start
 
 
 def _of_start(motion: Motion) -> Iterator[Motion]:
@@ -130,7 +131,7 @@ def _of_start(motion: Motion) -> Iterator[Motion]:
             pole = [Fraction(sign * (i == place)) for i in range(3)]
             yield top, State(start.omega, pole)
             yield top, State((0, 0, 0), pole)
-            yield HeavyTop(top.inertia, 1, pole), State((0, 0, 0), pole)
+            yield with_data(top, top.inertia, 1, pole), State((0, 0, 0), pole)
     yield top, State((0, 0, 0), start.gamma)
 
 
@@ -143,13 +144,13 @@ def _of_inertia(motion: Motion) -> Iterator[Motion]:
                 for also in ((i,), (i, (i + 1) % 3), (i, (i + 2) % 3)):
                     inertia = [simple if k in also else each for k, each in enumerate(top.inertia)]
                     if 2 * max(inertia) <= sum(inertia):
-                        yield HeavyTop(inertia, top.weight, top.centre), start
+                        yield with_data(top, inertia, top.weight, top.centre), start
 
 
 def _of_weight(motion: Motion) -> Iterator[Motion]:
     top, start = motion
     for simple in _simpler(top.weight):
-        yield HeavyTop(top.inertia, simple, top.centre), start
+        yield with_data(top, top.inertia, simple, top.centre), start
 
 
 def _of_centre(place: int) -> Callable[[Motion], Iterator[Motion]]:
@@ -157,9 +158,20 @@ def _of_centre(place: int) -> Callable[[Motion], Iterator[Motion]]:
         top, start = motion
         for simple in _simpler(top.centre[place]):
             centre = [simple if i == place else each for i, each in enumerate(top.centre)]
-            yield HeavyTop(top.inertia, top.weight, centre), start
+            yield with_data(top, top.inertia, top.weight, centre), start
 
     return change
+
+
+def _of_rotor(motion: Motion) -> Iterator[Motion]:
+    """None of it, or one component simpler."""
+    top, start = motion
+    if top.rotor is not None:
+        yield with_data(top, rotor_times=0), start
+        for place, value in enumerate(top.rotor):
+            for simple in _simpler(value):
+                rotor = [simple if i == place else each for i, each in enumerate(top.rotor)]
+                yield HeavyTop(top.inertia, top.weight, top.centre, rotor), start
 
 
 def _of_omega(place: int) -> Callable[[Motion], Iterator[Motion]]:
@@ -223,6 +235,7 @@ _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
     _of_weight,
     *(_of_centre(place) for place in range(3)),
     *(_of_omega(place) for place in range(3)),
+    _of_rotor,
 )
 
 
@@ -249,7 +262,7 @@ def proof(meter: Meter, found: MeasuredMotion, other: ChosenIntegrator) -> Proof
 
     Raises Contradiction where two proofs exclude each other.
     """
-    problem = Problem.of(*found.motion, meter.precision, HEAVY_TOP)
+    problem = Problem.of(*found.motion, meter.precision, system_of(None, found.motion[0]))
     known = truth(problem, meter.times)
     runs = [meter.run_of(each, found.motion) for each in (meter.integrator, other)]
     if isinstance(known, str):
@@ -264,7 +277,7 @@ def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) 
     if run.outcome != Outcome.SUCCESS.value:
         return math.inf
     bits = problem.precision.bits + GUARD_BITS
-    unit = rate(HEAVY_TOP, problem.parameters, problem.start.flat) or 1
+    unit = rate(problem.system, problem.parameters, problem.start.flat) or 1
     found = 0.0
     with working_precision(bits):
         for time, state in zip(meter.times, run.states, strict=True):
@@ -516,7 +529,8 @@ class _Hunt:
 def _shape(motion: Motion) -> object:
     """What is the same of motions that differ in the names and senses of their axes alone, or nearly."""
     top, start = motion
-    axes = zip(top.inertia, map(abs, top.moment), map(abs, start.omega), map(abs, start.gamma), strict=True)
+    vectors = (top.moment, top.rotor or (Fraction(0),) * 3, start.omega, start.gamma)
+    axes = zip(top.inertia, *(map(abs, each) for each in vectors), strict=True)
     return tuple(sorted(axes))
 
 
@@ -550,7 +564,7 @@ def ratio(error: float, other: float | None, eps: float) -> float | None:
 
 def case_of(motion: Motion, number: int) -> Case:
     """The motion as a case."""
-    return Case(f"hunted-{number}", "found by a hunt", HEAVY_TOP, *motion)
+    return Case(f"hunted-{number}", "found by a hunt", system_of(None, motion[0]), *motion)
 
 
 def command_of(asked: Asked, motion: Motion, integrator: str, failed: bool) -> str:
@@ -589,8 +603,10 @@ def kept(path: Path) -> tuple[Motion, ...]:
         return ()
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read: {error}.", _PASTE) from None
-    if any(case.system is not HEAVY_TOP for case in cases):
-        raise InputError(f"{path} holds a top of another system than heavy_top.", "Take it out: heavy tops are hunted.")
+    if any(case.system is GYROSTAT for case in cases):
+        raise InputError(
+            f"{path} holds a top of the system gyrostat.", "Take it out: heavy tops and heavy gyrostats are hunted."
+        )
     return tuple((case.top, case.start) for case in cases)
 
 
@@ -609,4 +625,4 @@ def keep(path: Path, motions: Sequence[Motion]) -> None:
 
 def _plain(motion: Motion) -> Motion:
     top, start = motion
-    return HeavyTop(top.inertia, top.weight, top.centre), start
+    return HeavyTop(top.inertia, top.weight, top.centre, top.rotor), start
