@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import heavytop as ht
-from heavytop.api.integrators import check_integrator, new_integrator
+from heavytop.api.integrators import case_document, check_integrator, listing, new_integrator
 from heavytop.api.pages import page
 from heavytop.cases import case
 from heavytop.cli import app
@@ -266,3 +266,12 @@ def test_bad_input_of_every_other_command_is_the_same_error(
 def test_every_command_is_in_a_table() -> None:
     tried = {words[0] for words, _ in COMMANDS.values()} | {"propagate", "reference"}
     assert {command.name for command in app.registered_commands} == tried
+
+
+def test_what_there_is_is_listed_by_both() -> None:
+    printed = json.loads(CliRunner().invoke(app, ["list", "--json"]).stdout)
+    assert printed == json.loads(json.dumps(listing()))
+    shown = json.loads(CliRunner().invoke(app, ["list", "--case", "euler", "--json"]).stdout)
+    assert shown == {key: value for key, value in case_document("euler").items() if key != "json"}
+    with pytest.raises(HeavyTopError, match="nothing"):
+        case_document("nothing")

@@ -18,7 +18,7 @@ from itertools import islice
 from math import isqrt
 from numbers import Rational
 from operator import index, is_
-from typing import Any, TypeVar, cast
+from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
 from heavytop.errors import HeavyTopError, InputError, quoted
 
@@ -30,6 +30,10 @@ _LARGE_POWER = 498
 """Numbers below 2^498 are not beyond it."""
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
+
+
+Given: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
+"""A number as users give it: an integer, a float of any format (the exact binary number it is), or exact text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +124,7 @@ def require(precision: Precision) -> Precision:
     return precision
 
 
-def usable_tolerance(value: Any, precision: Precision) -> Fraction:
+def usable_tolerance(value: Given, precision: Precision) -> Fraction:
     """An exact tolerance; raises InputError unless it goes from the eps of the format to 1."""
     tolerance = exact(value)
     if not precision.eps <= tolerance <= 1:
@@ -474,6 +478,28 @@ def _are_same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
 # Vectors of three exact numbers, and their products over any ring.
 
 
+class Ring(Protocol):
+    """A number as far as the algebra of tops goes: Fraction, float, ball, array, expression of heyoka, or sympy's."""
+
+    def __add__(self, other: Self, /) -> Self: ...
+    def __sub__(self, other: Self, /) -> Self: ...
+    def __mul__(self, other: Self, /) -> Self: ...
+    def __rmul__(self, other: int, /) -> Self: ...
+    def __truediv__(self, other: int, /) -> Self: ...
+
+
+class OrderedRing(Ring, Protocol):
+    """Real numbers: those that are near some float."""
+
+    def __radd__(self, other: int, /) -> Self: ...
+    def __rsub__(self, other: int, /) -> Self: ...
+    def __neg__(self) -> Self: ...
+    def __float__(self) -> float: ...
+
+
+Scalar = TypeVar("Scalar", bound=Ring)
+"""Numbers of one ring, those of the arguments and of what is returned."""
+Real = TypeVar("Real", bound=OrderedRing)
 Vector = tuple[Fraction, Fraction, Fraction]
 MOST_MEMBERS = 10_000_000
 """Members of a list; a generator may have no end."""
@@ -509,12 +535,12 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     raise InputError(f"{what} = {quoted(values)} is not a list.", remedy)
 
 
-def dot(a: Any, b: Any) -> Any:
+def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
     """a · b over any ring."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
+def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
     """a × b over any ring."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 

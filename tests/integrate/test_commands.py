@@ -86,6 +86,7 @@ DIAGNOSED = {
     "fifteen digits": ("digits", "Its numbers have 15 significant digits: double takes 17."),
     "begins badly": ("restart", "A run to t = 2 and one that starts anew at t = 1 differ by"),
     "single precision": ("digits", "Its numbers have 24 bits, those of double 53."),
+    "wrong backwards": ("backwards", "its steps back in time are wrong"),
     "swapped": ("one time", "look at the order of the components"),
     "other each time": ("determinism", "The same request twice gives two answers"),
     "counts wrongly": ("steps", "It counts 2000 steps to t = 2, where steps of 0.01 are 200."),

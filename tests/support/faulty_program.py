@@ -127,6 +127,8 @@ def answer(fault, given):
         count = math.ceil(abs(end - t) / h)
         if fault == "begins badly":
             y = [value + 1e-9 * rate for value, rate in zip(y, HEAVY_TOP.field(p, y), strict=True)]
+        if fault == "wrong backwards" and end < t:
+            y[2] *= 1 + 1e-7
         for _ in range(count):
             y = step(lambda y: HEAVY_TOP.field(p, y), y, (end - t) / count)
         t, steps = end, steps + count

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, SupportsIndex, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import (
     DOUBLE,
+    Given,
     Precision,
     dot,
     exact,
@@ -29,7 +29,7 @@ from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
-Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
+Number: TypeAlias = Given
 """A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""
 Numbers: TypeAlias = Iterable[Any]
 """A list, a tuple or an array of :data:`Number`; type checkers take lists of several kinds for lists of anything."""

@@ -80,3 +80,48 @@ def _texts(part: str) -> dict[str, str]:
     """The files of that part, by name."""
     place = resources.files("heavytop.api") / "starters" / part
     return {each.name.removesuffix(".txt"): each.read_text("utf-8") for each in place.iterdir() if each.is_file()}
+
+
+# What there is to choose from.
+
+
+def listing() -> dict[str, Any]:
+    """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them."""
+    from heavytop.cases import CASES, named_bodies
+    from heavytop.integrate import registry
+    from heavytop.precision import FORMATS, available
+    from heavytop.suite.plan import BUILT_IN
+    from heavytop.top.equations import SYSTEMS
+
+    notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
+    known, reasons = registry.known(), registry.available()
+    integrators = {
+        name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
+        for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
+    }
+    return {
+        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
+        "bodies": [
+            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
+        ],
+        "plans": list(BUILT_IN),
+        "systems": [system.name for system in SYSTEMS],
+        "formats": {
+            "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
+            for name, reason in available().items()
+        },
+        "integrators": integrators,
+        "capabilities": {name: each.capabilities() for name, each in known.items()},
+    }
+
+
+def case_document(name: str) -> dict[str, Any]:
+    """The data of a case, and the text of them in every form that is read, as `list --case NAME --json` prints them.
+
+    Raises InputError for an unknown name.
+    """
+    from heavytop.cases import case
+    from heavytop.suite.case_text import case_data, forms
+
+    found = case(name)
+    return case_data(found) | {"about": found.about, "source": found.source, "units": found.units} | forms(found)

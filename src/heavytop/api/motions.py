@@ -23,7 +23,7 @@ from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
-from heavytop.precision import DOUBLE, LARGEST, Precision, exact, number, numbers, ordered, whole
+from heavytop.precision import DOUBLE, LARGEST, OrderedRing, Precision, exact, number, numbers, ordered, whole
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
@@ -471,7 +471,7 @@ class Integrator:
             raise InputError(f"start = {quoted(start)} is no start.", _SHAPES) from None
         raise InputError(f"start has the shape {given.shape}.", _SHAPES)
 
-    def _one(self, state: State | None, row: Any, targets: Sequence[Any]) -> tuple[Any, Outcome, Any, int]:
+    def _one(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
         """As :func:`heavytop.integrate.heyoka.motions.states_at`."""
         if self._is_plain:
             plain = self._plain(state, row, targets)
@@ -495,7 +495,7 @@ class Integrator:
         )
         return found.states, found.outcome, number(found.time_reached, self._form), found.steps
 
-    def _plain(self, state: State | None, row: Any, targets: Sequence[Any]) -> Any:
+    def _plain(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> Any:
         """The start in doubles, checked; None for irrational ones, and where exact numbers tell what is wrong."""
         if state is not None:
             if state.attitude is not None:
@@ -520,7 +520,7 @@ class Integrator:
         return Problem.of(self._top, state, self._form, self._system)
 
     def _together(
-        self, found: list[tuple[Any, Outcome, Any, int]], targets: Sequence[Any], several: bool, is_one: bool
+        self, found: list[tuple[Any, Outcome, Any, int]], targets: Sequence[OrderedRing], several: bool, is_one: bool
     ) -> Propagated:
         blocks = [self._filled(states, len(targets)) for states, *_ in found]
         times = targets[0] if is_one else numpy.array(targets)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
 from heavytop.top.equations import NAMES
 from heavytop.top.heavy_top import HeavyTop
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["animate", "digits", "drift", "error", "herpolhode", "phase", "poincare", "polhode", "sphere"]
 
@@ -465,7 +468,7 @@ def _equal(axes: Any, extent: float, middle: Any = (0.0, 0.0, 0.0)) -> None:
 
 
 def _visible_path(
-    axes: Any, path: NDArray[np.float64], colour: str, label: str | None, weights: Any = (1.0, 1.0, 1.0)
+    axes: Axes, path: NDArray[np.float64], colour: str, label: str | None, weights: Any = (1.0, 1.0, 1.0)
 ) -> None:
     """A path on an ellipsoid Σ weight x² = 1: the part that faces the eye as a line, the rest thin."""
     front = (path * np.asarray(weights)) @ _sight(axes) >= 0
@@ -500,7 +503,7 @@ def _named(name: str) -> str:
     return f"{NAMES[place]} ({_RATE})" if place < 3 else NAMES[place]
 
 
-def _time_axis(axes: Any, times: NDArray[np.float64]) -> None:
+def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
     """Logarithmic over two decades or more; sizes of times."""
     positive = times[times > 0]
     if len(positive) and positive.max() >= _SPAN * positive.min():

@@ -121,7 +121,9 @@ def list_(
     """List cases, plans, formats and integrators."""
     if case is not None:
         return _one_case(case, json)
-    listed = _everything()
+    from heavytop.api.integrators import listing
+
+    listed = listing()
     if json:
         print_json(listed)
         return 0
@@ -147,52 +149,19 @@ def _lines(notes: dict[str, str], indent: int = 0) -> None:
         print(fill(note, 80, initial_indent=f"  {name:{width}} ", subsequent_indent=" " * (width + 3 + indent)))
 
 
-def _everything() -> dict[str, Any]:
-    from heavytop.cases import CASES, named_bodies
-    from heavytop.integrate import registry
-    from heavytop.precision import FORMATS, available
-    from heavytop.suite.plan import BUILT_IN
-    from heavytop.top.equations import SYSTEMS
-
-    notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    known, reasons = registry.known(), registry.available()
-    integrators = {
-        name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
-        for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
-    }
-    return {
-        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
-        "bodies": [
-            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
-        ],
-        "plans": list(BUILT_IN),
-        "systems": [system.name for system in SYSTEMS],
-        "formats": {
-            "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
-            for name, reason in available().items()
-        },
-        "integrators": integrators,
-        "capabilities": {name: each.capabilities() for name, each in known.items()},
-    }
-
-
 def _one_case(name: str, json: bool) -> int:
-    from heavytop.cases import case as case_named
-    from heavytop.suite.case_text import case_data, forms
+    from heavytop.api.integrators import case_document
 
-    found = case_named(name)
+    found = case_document(name)
     if json:
-        print_json(
-            case_data(found)
-            | {"about": found.about, "source": found.source, "units": found.units}
-            | {key: forms(found)[key] for key in ("command", "csv", "toml", "python")}
-        )
+        print_json({key: value for key, value in found.items() if key != "json"})  # it would stand in itself
         return 0
-    print(fill(f"{found.name}: {found.about}", 80))
-    if found.source:
-        print(fill(f"Source: {found.source}. Units: {found.units}.", 80))
-    for form, text in forms(found).items():
-        print(f"\n{_FORMS[form]}\n{text}")
+    print(fill(f"{found['name']}: {found['about']}", 80))
+    if found["source"]:
+        print(fill(f"Source: {found['source']}. Units: {found['units']}.", 80))
+    for form, title in _FORMS.items():
+        if form in found:
+            print(f"\n{title}\n{found[form]}")
     return 0
 
 

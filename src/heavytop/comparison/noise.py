@@ -23,7 +23,7 @@ from typing import Literal
 import msgspec
 
 from heavytop.document.kind import ReportedKind
-from heavytop.errors import InputError
+from heavytop.errors import InputError, invalid
 from heavytop.files import read_whole
 from heavytop.precision import exact, log10, physical
 from heavytop.records import Metric, Quantity, Row
@@ -179,7 +179,7 @@ def load(path: Path) -> Policy:
     except InputError as error:
         raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"The policy {path} is not valid: {error}.", _REMEDY) from None
+        raise InputError(f"The policy {path} is not valid: {invalid(error)}.", _REMEDY) from None
 
 
 def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = None) -> Policy:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import Flag, auto
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.document.svg import COLOURS, MARKERS, Picture
 from heavytop.errors import InputError
@@ -18,6 +18,9 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import decimal_text, exact, log10
 from heavytop.records import Identity, Metric, Quantity, Report, Row, Series
 from heavytop.top.equations import HEAVY_TOP
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # What a row is called, for people.
 
@@ -180,7 +183,7 @@ def numbered(label: str, place: int, old: bool = False) -> Key:
     return Key(clip(label, 50), place % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
 
 
-def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
+def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
     """One curve, or points, as its legend has it.
 
     every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.

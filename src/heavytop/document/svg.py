@@ -11,9 +11,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from io import StringIO
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.display import printable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
 """Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""
@@ -86,7 +90,7 @@ def new_axes(x: str, y: str, height: float = 2.8, right: float = 0.12) -> Any:
     return axes
 
 
-def decades(axis: Any, ticks: int = 7) -> None:
+def decades(axis: Axis, ticks: int = 7) -> None:
     """Ticks 10⁻⁵, 1, 10, ... on an axis that carries decimal logarithms, which :func:`finish` makes two of at least."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -94,7 +98,7 @@ def decades(axis: Any, ticks: int = 7) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(value))))
 
 
-def _two_decades(axes: Any) -> None:
+def _two_decades(axes: Axes) -> None:
     """Widen what :func:`decades` has set to at least two."""
     from matplotlib.ticker import FuncFormatter
 

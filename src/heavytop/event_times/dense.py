@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
@@ -29,6 +29,10 @@ from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, decimal_text, exact, number
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
 """Each is looked at, in some 0.1 ms in double: these take hours."""
@@ -43,7 +47,7 @@ def dyadic(value: Any) -> Dyadic:
     return number.numerator, 1 - number.denominator.bit_length()
 
 
-def dyadics(values: Any) -> list[Dyadic]:
+def dyadics(values: NDArray[np.float64]) -> list[Dyadic]:
     """Numbers of a format as m 2^e each."""
     import numpy
 
@@ -253,7 +257,7 @@ def _of_run(
     return Piece(began, length, bits, in_units)
 
 
-def _reader_of(rows: Any) -> Callable[[int], Sequence[Dyadic]]:
+def _reader_of(rows: NDArray[np.float64]) -> Callable[[int], Sequence[Dyadic]]:
     return lambda index: dyadics(rows[index])
 
 

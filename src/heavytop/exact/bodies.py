@@ -120,7 +120,7 @@ def _near(attitude: Attitude, bits: int) -> tuple[tuple[Vector, Vector, Vector],
 
 
 @whole_evaluation
-def _distance(attitude: Attitude, near: Rows, bits: int) -> Fraction:
+def _distance(attitude: Attitude, near: Rows[Fraction], bits: int) -> Fraction:
     """A bound of every entry of R − ``near``."""
     with working_precision(bits + _GUARD_BITS):
         rows = attitude.rows(FUNCTIONS, ball)
@@ -183,8 +183,10 @@ def _field_error(
     body, principal = given
     rest = _root(sum(value * value for row in principal.left for value in row))
     tensor = _root(sum(value * value for row in body.tensor for value in row))
-    pull, whirl = _root(dot(body.moment, body.moment)), _root(dot(body.rotor or (0, 0, 0), body.rotor or (0, 0, 0)))
-    short, slow = (_root(dot(vector, vector)) for vector in lacks or ((0, 0, 0), (0, 0, 0)))
+    none = (Fraction(0), Fraction(0), Fraction(0))
+    rotor = body.rotor or none
+    pull, whirl = _root(dot(body.moment, body.moment)), _root(dot(rotor, rotor))
+    short, slow = (_root(dot(vector, vector)) for vector in lacks or (none, none))
     # |D⁻¹| and |X| as norms of matrices; |γ| is 1 within _MARGIN
     least = min(principal.moments) - rest
     inverse = 1 / least

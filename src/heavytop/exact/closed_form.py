@@ -149,7 +149,7 @@ def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
     return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
 
 
-def rotate(vector: Sequence[Any], omega: Vector, time: Any) -> list[Any]:
+def rotate(vector: Sequence[Any], omega: Sequence[Fraction], time: Any) -> list[Any]:
     """The solution of v' = v × Ω for a constant Ω at ``time``, a number or series."""
     if not any(omega):
         return list(vector)

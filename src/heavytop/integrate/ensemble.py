@@ -18,7 +18,7 @@ from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.lanes import Lanes, Work
 from heavytop.integrate.heyoka.motions import follow
 from heavytop.integrate.trajectory import Problem, Trajectory
-from heavytop.precision import DOUBLE, exact, number
+from heavytop.precision import DOUBLE, OrderedRing, exact, number
 from heavytop.top.heavy_top import check_times
 
 Observer = Callable[[int, Fraction, Any], None]
@@ -27,7 +27,7 @@ Finished = Callable[[int, Trajectory], None]
 
 def propagate_ensemble(
     problems: Sequence[Problem],
-    times: Sequence[Any],
+    times: Sequence[OrderedRing],
     *,
     observer: Observer | None = None,
     finished: Finished | None = None,

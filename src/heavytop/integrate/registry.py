@@ -25,13 +25,24 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, quoted
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
-from heavytop.precision import DOUBLE, FORMATS, Precision, Vector, decimal_text, exact, last_call, log10, parse
+from heavytop.precision import (
+    DOUBLE,
+    FORMATS,
+    OrderedRing,
+    Precision,
+    Vector,
+    decimal_text,
+    exact,
+    last_call,
+    log10,
+    parse,
+)
 from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
@@ -251,7 +262,7 @@ def command_of(table: Any, folder: Path, where: str) -> Command:
         command = msgspec.structs.replace(msgspec.convert(table, Command), folder=str(folder.absolute()))
         _require_possible(command)
     except (msgspec.ValidationError, HeavyTopError) as error:
-        cause = error.cause if isinstance(error, HeavyTopError) else f"{error}."
+        cause = error.cause if isinstance(error, HeavyTopError) else f"{invalid(error)}."
         raise InputError(f"{where}: [[integrator]] is not valid: {cause}", _SHOWN) from None
     return command
 
@@ -513,7 +524,7 @@ def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
     def call(
         top: HeavyTop,
         start: State,
-        times: Sequence[Any],
+        times: Sequence[OrderedRing],
         precision: Precision = DOUBLE,
         *,
         system: System = HEAVY_TOP,
@@ -565,7 +576,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
     run = _with(loaded(found.ensemble), name, options)
 
-    def call(problems: Sequence[Problem], times: Sequence[Any], **more: Any) -> Any:
+    def call(problems: Sequence[Problem], times: Sequence[OrderedRing], **more: Any) -> Any:
         for problem in problems if len(times) else ():
             require_reach(problem, exact(times[-1]), options.get("step_limit"))
         return run(problems, times, **more)

@@ -100,7 +100,9 @@ def attitude_of(run: Trajectory) -> Any:
 def _start(run: Trajectory) -> list[float]:
     """The quaternion at t = 0, of the sign of the convention."""
     problem = run.problem
-    rows = rows_of(problem.start.gamma, problem.xi) if run.frame is None else rows_of(run.frame.gamma, run.frame.xi)
+    start, xi = (problem.start, problem.xi) if run.frame is None else (run.frame, run.frame.xi)
+    assert xi is not None  # without ξ no attitude was computed
+    rows = rows_of(start.gamma, xi)
     products = quaternion_products(rows)
     multiple = max(zip(products, range(4), strict=True), key=lambda each: each[0][each[1]])[0]
     sign = first_sign(multiple, 2**_SIGN_BITS * problem.precision.eps)
@@ -153,7 +155,7 @@ def _exactly(run: Trajectory, place: int, attitude: Any, output: Output) -> Sequ
         return [math.nan] * math.prod(output.shape)
     lib = _functions(run.problem.precision.bits + _GUARD_BITS)
     omega, gamma, xi = state[:3], state[3:6], state[6:]
-    values = list(output.at(omega, gamma, xi, _centre(run, output), lib, Fraction))
+    values: list[Fraction | float] = list(output.at(omega, gamma, xi, _centre(run, output), lib, Fraction))
     if output.name == "euler":
         square = euler_terms(rows_of(gamma, xi), output.sequence)[1][0]
         if square < (_LOCKED * run.problem.precision.eps) ** 2:
@@ -581,7 +583,7 @@ def framed(run: Trajectory, frame: Frame) -> Trajectory:
     return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
 
 
-def in_frame(values: Any, frame: Frame, precision: Precision) -> Any:
+def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
     import numpy
 
@@ -608,7 +610,7 @@ def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> An
     return in_frame(numpy.array([state]), frame, precision)[0]
 
 
-def _permuted(part: Any, frame: Frame) -> Any:
+def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
     """Each component of the axes given is one of the others, or its negative."""
     import numpy
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 from flint import arb
@@ -23,8 +23,12 @@ from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits, whole_evaluatio
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Precision, decimal_text, exact, number, shown
-from heavytop.top.attitude import attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
+from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
 from heavytop.top.equations import GYROSTAT, gyrostat_energy
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 MODEL_BITS = 160
 
@@ -152,7 +156,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
         )
 
 
-def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Any) -> Values:
+def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Library) -> Values:
     """The same motion in the forms that lose no digits, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
     omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
@@ -349,8 +353,8 @@ class Curves:
     """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
 
     times: Any
-    states: Any
-    angles: Any
+    states: NDArray[np.float64]
+    angles: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,7 +363,7 @@ class PaperCurve:
 
     figure: PaperFigure
     times: Any
-    values: Any
+    values: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -479,7 +483,7 @@ def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
 
 
-def _continuous(angles: Any, states: Any) -> Any:
+def _continuous(angles: NDArray[np.float64], states: NDArray[np.float64]) -> Any:
     """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
 
     Whole turns are taken off until φ and ψ lie within a turn of 0 there.

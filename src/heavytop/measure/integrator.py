@@ -29,7 +29,7 @@ from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
-from heavytop.precision import Precision, decimal_text, exact
+from heavytop.precision import OrderedRing, Precision, decimal_text, exact
 from heavytop.records import Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -71,7 +71,7 @@ class ChosenIntegrator:
         self,
         top: HeavyTop,
         start: State,
-        times: Sequence[Any],
+        times: Sequence[OrderedRing],
         precision: Precision,
         system: System,
         observer: Observer | None = None,
@@ -110,7 +110,7 @@ class ChosenIntegrator:
     def propagate_many(
         self,
         problems: Sequence[Problem],
-        times: Sequence[Any],
+        times: Sequence[OrderedRing],
         observer: EnsembleObserver | None = None,
         finished: Finished | None = None,
         threads: int | None = None,

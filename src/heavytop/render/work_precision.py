@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING
 
 from heavytop.comparison.work_precision import ERRORS, Lead, WorkPrecisionLine, leads, panels, seconds_text
 from heavytop.document.document import (
@@ -27,6 +27,9 @@ from heavytop.document.document import (
 from heavytop.document.svg import COLOURS, End, Picture, decades, finish, new_axes, room, spoken
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST_CASES = 12
 _LEADS = (
@@ -235,7 +238,7 @@ def alike(rows: Sequence[Row]) -> list[Row]:
     return [rows[min(chosen[name])[1]] for name in METHODS]
 
 
-def _curve(axes: Any, key: Key, row: Row, name: str, power: float) -> tuple[Trend | None, str, End | None]:
+def _curve(axes: Axes, key: Key, row: Row, name: str, power: float) -> tuple[Trend | None, str, End | None]:
     """Draw the series ``name`` of a row over time, its trend dashed: the trend, the last value, the place of the law.
 
     The axes carry decimal logarithms.  power: of the steps, by which rounding errors grow.

@@ -35,6 +35,8 @@ _PATIENCE = 60
 _FAREWELL = 2.0
 _OFF = 0.05
 """An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
+_AS_RIGHT = 100
+"""How many times as large the error of a motion back in time may be as that of its mirror image."""
 _RESTART = 1000
 """eps by which a run that stops and goes on may differ."""
 _HUGE = 10**150
@@ -245,7 +247,23 @@ class _Contract:
     def _backwards(self) -> str:
         if self.program and set(self.program.directions) != {"forward", "backward"}:
             return f"It declares {self.program.directions[0]} alone."
-        return self._right(self._run([-1]), "At t = -1 it")
+        back = self._run([-1])
+        found = self._right(back, "At t = -1 it")
+        if self.system is HEAVY_TOP:
+            self._require_as_right(back)
+        return found
+
+    def _require_as_right(self, back: Trajectory) -> None:
+        """The heavy top is reversible: from (−Ω, γ) forwards is the same motion, and a method as right on it."""
+        ahead = self._run([1], State([-w for w in self.start.omega], self.start.gamma))
+        (known,) = propagate(self.top, self.start, list(back.times), DOUBLE, system=self.system).states
+        mirrored = [sign * exact(value) for sign, value in zip((-1, -1, -1, 1, 1, 1), ahead.states[-1], strict=True)]
+        off, other = _distance(back.states[-1], known), _distance(mirrored, known)
+        if off > _RESTART * self.precision.eps + _AS_RIGHT * other:
+            raise _Violated(
+                f"At t = -1 it is off by {decimal_text(off, 2)}, and from (−Ω, γ) forwards, which is the same motion, "
+                f"by {decimal_text(other, 2)}: its steps back in time are wrong."
+            )
 
     def _rest(self) -> str:
         top = HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))

@@ -14,14 +14,17 @@ from fractions import Fraction
 from functools import lru_cache
 from operator import itemgetter
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from heavytop.top.equations import Parameters, System
 
 if TYPE_CHECKING:
+    import numpy
+    from gmpy2 import mpq
     from numpy.typing import NDArray
 
 
+Doubles: TypeAlias = "NDArray[numpy.float64]"
 _ORDER = 20
 _TOLERANCE = 2.0**-52
 _STEPS = 1000
@@ -80,7 +83,7 @@ def _units(scale: Fraction) -> list[Fraction]:
     return [abs(scale)] * 3 + [Fraction(1)] * 3
 
 
-def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArray[Any], NDArray[Any]]:
+def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Doubles, Doubles]:
     """L, shape (6, 6), and symmetric B, shape (6, 6, 6), of the field L y + B(y, y) in units of ``scale``."""
     import numpy
     from gmpy2 import mpq
@@ -88,7 +91,7 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArra
     units = [mpq(unit) for unit in _units(scale)]
     size, exactly = mpq(scale), p.mapped(mpq)
 
-    def field(*places: int) -> list[tuple[Any, Any]]:
+    def field(*places: int) -> list[tuple[mpq, mpq]]:
         """(even, odd) part of each rate."""
         y = [places.count(k) * unit for k, unit in enumerate(units)]
         there, opposite = system.field(exactly, y), system.field(exactly, [-value for value in y])
@@ -108,7 +111,7 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArra
     return linear, products
 
 
-def _nearest(value: Any) -> float:
+def _nearest(value: mpq) -> float:
     """The nearest double; raises OverflowError beyond them."""
     return float(Fraction(int(value.numerator), int(value.denominator))) if value else 0.0
 
@@ -119,7 +122,7 @@ class _Path:
     Each entry of ``steps``: the time after a step, the state, Φ, the largest amplification up to it.
     """
 
-    def __init__(self, linear: NDArray[Any], products: NDArray[Any], start: Sequence[float]) -> None:
+    def __init__(self, linear: Doubles, products: Doubles, start: Sequence[float]) -> None:
         import numpy
 
         self._linear, self._flat = linear, products.reshape(36, 6)
@@ -164,7 +167,7 @@ class _Path:
         return time + step, state, carried, max(largest, size)
 
 
-_Step = tuple[float, Any, Any, float]
+_Step: TypeAlias = "tuple[float, Doubles, Doubles, float]"
 
 
 @lru_cache(maxsize=64)
@@ -175,7 +178,7 @@ def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], f
     return _Path(linear, products, [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
 
 
-def _series(linear: NDArray[Any], flat: NDArray[Any], state: NDArray[Any]) -> NDArray[Any]:
+def _series(linear: Doubles, flat: Doubles, state: Doubles) -> Doubles:
     """Taylor coefficients of (y, Φ) from y and Φ = 1, shape (order + 1, 6, 7).
 
     (n + 1) Φ_(n+1) = Σ_m J_m Φ_(n−m) with J_m = 2 B(y_m, ·), and L in J_0; of y itself half of the products.

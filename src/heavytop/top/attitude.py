@@ -19,17 +19,35 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import Vector, cross, decimal_text, dot, exact, exact_text, ordered, physical, round_to, vector
+from heavytop.precision import (
+    Given,
+    Real,
+    Scalar,
+    Vector,
+    cross,
+    decimal_text,
+    dot,
+    exact,
+    exact_text,
+    ordered,
+    physical,
+    round_to,
+    vector,
+)
 
 if TYPE_CHECKING:
-    import numpy as np
+    import numpy
     from numpy.typing import NDArray
 
-Rows = Sequence[Sequence[Any]]
+Rows = Sequence[Sequence[Scalar]]
+Item = TypeVar("Item")
+Three = tuple[Item, Item, Item]
 Number = Callable[[Fraction], Any]
+Library = ModuleType | SimpleNamespace
 
 SEQUENCES = tuple("".join(letters) for letters in product("XYZ", repeat=3) if letters[0] != letters[1] != letters[2])
 """The twelve sequences of Euler angles."""
@@ -39,30 +57,30 @@ _DEGREES = "deg"
 _NORMALIZE = "Normalize it (--normalize on the command line, normalize=True in Python), or give exact numbers."
 
 
-def rows_of(gamma: Any, xi: Any) -> tuple[Any, Any, Any]:
+def rows_of(gamma: Sequence[Scalar], xi: Sequence[Scalar]) -> Three[Sequence[Scalar]]:
     """The rows of R: ξ, γ × ξ, γ."""
     return tuple(xi), cross(gamma, xi), tuple(gamma)
 
 
-def rotated(rows: Rows, v: Any) -> tuple[Any, Any, Any]:
+def rotated(rows: Rows[Scalar], v: Sequence[Scalar]) -> Three[Scalar]:
     """R v: components in space of a vector of the body."""
     return dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)
 
 
-def transposed(rows: Rows) -> tuple[Any, Any, Any]:
+def transposed(rows: Rows[Scalar]) -> Three[Three[Scalar]]:
     """The columns of R."""
-    first, second, third = zip(*rows, strict=True)
-    return first, second, third
+    a, b, c = rows
+    return (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
 
 
-def multiplied(left: Rows, right: Rows) -> tuple[Any, Any, Any]:
+def multiplied(left: Rows[Scalar], right: Rows[Scalar]) -> Three[Three[Scalar]]:
     """The rows of the product of two matrices."""
-    columns = transposed(right)
-    first, second, third = (tuple(dot(row, column) for column in columns) for row in left)
+    one, two, three = transposed(right)
+    first, second, third = ((dot(row, one), dot(row, two), dot(row, three)) for row in left)
     return first, second, third
 
 
-def matrix_of_quaternion(q: Sequence[Any]) -> tuple[Any, Any, Any]:
+def matrix_of_quaternion(q: Sequence[Scalar]) -> Three[Three[Scalar]]:
     """|q|² R of a quaternion of any length: polynomials, hence exact over the rationals."""
     w, x, y, z = q
     return (
@@ -72,14 +90,14 @@ def matrix_of_quaternion(q: Sequence[Any]) -> tuple[Any, Any, Any]:
     )
 
 
-def rotation_of(q: Sequence[Fraction]) -> tuple[Vector, Vector, Vector]:
+def rotation_of(q: Sequence[Fraction]) -> Three[Vector]:
     """R of a rational quaternion of any length but 0, in exact rationals."""
     square = sum(value * value for value in q)
-    first, second, third = (tuple(value / square for value in row) for row in matrix_of_quaternion(q))
+    first, second, third = ((x / square, y / square, z / square) for x, y, z in matrix_of_quaternion(q))
     return first, second, third
 
 
-def quaternion_products(rows: Rows) -> tuple[tuple[Any, ...], ...]:
+def quaternion_products(rows: Rows[Real]) -> tuple[tuple[Real, ...], ...]:
     """4 q qᵀ, row by row: each row is a multiple of q; linear in R, so exact over the rationals."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return (
@@ -90,13 +108,13 @@ def quaternion_products(rows: Rows) -> tuple[tuple[Any, ...], ...]:
     )
 
 
-def _multiple_of_quaternion(rows: Rows) -> tuple[Any, ...]:
+def _multiple_of_quaternion(rows: Rows[Real]) -> tuple[Real, ...]:
     """4 c q with c the largest component of q: c² is at least 1/4, so that no digits are lost."""
     products = quaternion_products(rows)
     return products[max(range(4), key=lambda place: float(products[place][place]))]
 
 
-def quaternion_of_rows(rows: Rows, lib: Any) -> tuple[Any, Any, Any, Any]:
+def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real, Real]:
     """(w, x, y, z) of length 1, of the sign in which its largest component is positive."""
     multiple = _multiple_of_quaternion(rows)
     length = lib.sqrt(sum(value * value for value in multiple))
@@ -104,13 +122,13 @@ def quaternion_of_rows(rows: Rows, lib: Any) -> tuple[Any, Any, Any, Any]:
     return w, x, y, z
 
 
-def continuous(quaternions: Iterable[Sequence[Any]]) -> list[tuple[Any, ...]]:
+def continuous(quaternions: Iterable[Sequence[Real]]) -> list[tuple[Real, ...]]:
     """The same attitudes with signs that follow the motion.
 
     The first has w ≥ 0, and its first non-zero component positive where w = 0; each other one is the nearer to the one
     before of q and −q, meaningful where samples are less than a turn apart.
     """
-    result: list[tuple[Any, ...]] = []
+    result: list[tuple[Real, ...]] = []
     for q in quaternions:
         if result:
             turn = sum(float(a) * float(b) for a, b in zip(q, result[-1], strict=True)) < 0
@@ -145,7 +163,7 @@ def _axes(sequence: str) -> tuple[int, int, int]:
     return first, second, third
 
 
-def rows_of_euler(sequence: str, angles: Sequence[Any], lib: Any) -> tuple[Any, Any, Any]:
+def rows_of_euler(sequence: str, angles: Sequence[Scalar], lib: Library) -> Three[Three[Scalar]]:
     """R_I(a) R_J(b) R_K(c); raises InputError for an unknown sequence."""
     first, second, third = (
         _elementary(axis, lib.cos(angle), lib.sin(angle)) for axis, angle in zip(_axes(sequence), angles, strict=True)
@@ -153,7 +171,7 @@ def rows_of_euler(sequence: str, angles: Sequence[Any], lib: Any) -> tuple[Any, 
     return multiplied(multiplied(first, second), third)
 
 
-def euler_terms(rows: Rows, sequence: str) -> tuple[tuple[Any, Any], tuple[Any, Any], tuple[Any, Any]]:
+def euler_terms(rows: Rows[Real], sequence: str) -> Three[tuple[Real, Real]]:
     """(sin, cos) of a and of c, each times s, and in the middle the two squares and the cosine or sine that give b.
 
     s is |sin b| for a sequence such as ZXZ and |cos b| for one such as ZYX; where it is 0, a and c are not defined by
@@ -169,7 +187,7 @@ def euler_terms(rows: Rows, sequence: str) -> tuple[tuple[Any, Any], tuple[Any, 
     return (-sign * rows[j][k], rows[k][k]), (square, sign * rows[i][k]), (-sign * rows[i][j], rows[i][i])
 
 
-def euler_of_rows(rows: Rows, sequence: str, lib: Any) -> tuple[Any, Any, Any]:
+def euler_of_rows(rows: Rows[Real], sequence: str, lib: Library) -> Three[Real]:
     """(a, b, c) with R = R_I(a) R_J(b) R_K(c): a and c in (−π, π], b in [0, π], of three different axes in [−π/2, π/2].
 
     At gimbal lock (:func:`euler_terms`) a and c are what atan2(0, 0) of ``lib`` is.
@@ -189,7 +207,7 @@ class Angle:
     degrees: bool = False
 
     @classmethod
-    def read(cls, value: Any) -> Angle:
+    def read(cls, value: Given | Angle) -> Angle:
         """Radians, or degrees where it ends with "deg"; raises InputError for what is not a number."""
         if isinstance(value, Angle):
             return value
@@ -207,7 +225,7 @@ class Angle:
         turns = self.number / 90
         return int(turns) % 4 if self.degrees and turns.denominator == 1 else None
 
-    def radians(self, lib: Any, number: Number) -> Any:
+    def radians(self, lib: Library, number: Number) -> Any:
         """In radians, as a number of the ring."""
         if not self.degrees:
             return number(self.number)
@@ -227,7 +245,7 @@ class Attitude:
     sequence: str = ""
 
     @classmethod
-    def quaternion(cls, w: Any, x: Any, y: Any, z: Any, *, normalize: bool = False) -> Attitude:
+    def quaternion(cls, w: Given, x: Given, y: Given, z: Given, *, normalize: bool = False) -> Attitude:
         """From body to space, the scalar first.
 
         Raises InputError unless |q| = 1 exactly, or, with ``normalize``, for q = 0; R of any rational quaternion is
@@ -262,7 +280,7 @@ class Attitude:
         return cls("matrix", tuple(value for row in found for value in row))
 
     @classmethod
-    def euler(cls, sequence: str, a: Any, b: Any, c: Any) -> Attitude:
+    def euler(cls, sequence: str, a: Given | Angle, b: Given | Angle, c: Given | Angle) -> Attitude:
         """R = R_I(a) R_J(b) R_K(c) for ``sequence`` "IJK", intrinsic; radians, or degrees as "30deg".
 
         Raises InputError for an unknown sequence and for what is not a number.
@@ -270,7 +288,7 @@ class Attitude:
         return cls("euler", angles=tuple(map(Angle.read, (a, b, c))), sequence=require_sequence(sequence))
 
     @classmethod
-    def axis_angle(cls, axis: Iterable[Any], angle: Any) -> Attitude:
+    def axis_angle(cls, axis: Iterable[Any], angle: Given | Angle) -> Attitude:
         """The rotation by ``angle`` (radians, or "30deg") about ``axis``, of any length; raises InputError for 0."""
         found = vector(axis, "axis")
         if not any(found):
@@ -296,7 +314,7 @@ class Attitude:
         values = f"({texts})" if self.kind == "matrix" else texts
         return f"Attitude.{self.kind}({values}{'' if unit else ', normalize=True'})"
 
-    def rational_rows(self, bits: int) -> tuple[Vector, Vector, Vector]:
+    def rational_rows(self, bits: int) -> Three[Vector]:
         """R where it is rational; else a rational rotation, exactly orthogonal, within 2^-bits of it."""
         known = self.exact_rows()
         return known if known is not None else rotation_of(self._near_quaternion(bits + _GUARD_BITS))
@@ -310,7 +328,7 @@ class Attitude:
         rows = self.rows(lib, lambda value: lib.mpf(value.numerator) / value.denominator)
         return tuple(exact(value) for value in _multiple_of_quaternion(rows))
 
-    def exact_rows(self) -> tuple[Vector, Vector, Vector] | None:
+    def exact_rows(self) -> Three[Vector] | None:
         """R in exact rationals; None where some entry may be irrational."""
         if self.kind == "quaternion":
             return rotation_of(self.numbers)
@@ -323,7 +341,7 @@ class Attitude:
             return None
         return self._product([_quarter(count or 0) for count in quarters], Fraction, lambda square: square)
 
-    def rows(self, lib: Any, number: Number = lambda value: value) -> tuple[Any, Any, Any]:
+    def rows(self, lib: Library, number: Number = lambda value: value) -> tuple[Any, Any, Any]:
         """The rows of R, as numbers of ``lib``.
 
         number: what makes an exact rational one of them, such as :func:`heavytop.exact.flint.balls.ball`; left as it is
@@ -368,7 +386,7 @@ def _quarter(count: int) -> tuple[Fraction, Fraction]:
     return Fraction(found[0]), Fraction(found[1])
 
 
-def _square(rows: Iterable[Any]) -> tuple[Vector, Vector, Vector]:
+def _square(rows: Iterable[Any]) -> Three[Vector]:
     """Three rows of three, out of three rows or nine numbers."""
     remedy = "Give R row by row: nine numbers, or three rows of three."
     found = ordered(rows, "matrix", remedy)
@@ -391,12 +409,12 @@ def _size(value: Fraction) -> str:
 # sympy, or :data:`heavytop.exact.flint.balls.FUNCTIONS`).
 
 
-def gamma_from_angles(phi: Any, theta: Any, lib: Any) -> tuple[Any, Any, Any]:
+def gamma_from_angles(phi: Real, theta: Real, lib: Library) -> Three[Real]:
     """γ = (sinθ sinφ, sinθ cosφ, cosθ), (3.2)."""
     return lib.sin(theta) * lib.sin(phi), lib.sin(theta) * lib.cos(phi), lib.cos(theta)
 
 
-def omega_from_angles(gamma: Any, phi: Any, rates: Any, lib: Any) -> tuple[Any, Any, Any]:
+def omega_from_angles(gamma: Sequence[Real], phi: Real, rates: Sequence[Real], lib: Library) -> Three[Real]:
     """(3.1): (ψ'γ1 + θ' cosφ, ψ'γ2 − θ' sinφ, ψ'γ3 + φ'), from ``rates`` = (φ', θ', ψ')."""
     phi_rate, theta_rate, psi_rate = rates
     return (
@@ -406,7 +424,7 @@ def omega_from_angles(gamma: Any, phi: Any, rates: Any, lib: Any) -> tuple[Any, 
     )
 
 
-def attitude_from_angles(phi: Any, theta: Any, psi: Any, lib: Any) -> tuple[Any, Any, Any]:
+def attitude_from_angles(phi: Real, theta: Real, psi: Real, lib: Library) -> Three[Real]:
     """ξ, the space axis e_x in body components, for any angles (θ of either sign)."""
     sin_psi, cos_psi, cos_theta = lib.sin(psi), lib.cos(psi), lib.cos(theta)
     return (
@@ -416,7 +434,7 @@ def attitude_from_angles(phi: Any, theta: Any, psi: Any, lib: Any) -> tuple[Any,
     )
 
 
-def euler_angles(gamma: Any, xi: Any, lib: Any) -> tuple[Any, Any, Any]:
+def euler_angles(gamma: Sequence[Real], xi: Sequence[Real], lib: Library) -> Three[Real]:
     """(φ, θ, ψ) with φ = atan2(γ1, γ2), θ = atan2(√(γ1² + γ2²), γ3) in [0, π], ψ = atan2(ξ3, −η3).
 
     φ and ψ are undefined at the poles γ3 = ±1.
@@ -426,7 +444,9 @@ def euler_angles(gamma: Any, xi: Any, lib: Any) -> tuple[Any, Any, Any]:
     return lib.atan2(gamma[0], gamma[1]), lib.atan2(across, gamma[2]), lib.atan2(xi[2], -eta[2])
 
 
-def rotation_angle(first: tuple[Any, Any], second: tuple[Any, Any], lib: Any) -> Any:
+def rotation_angle(
+    first: tuple[Sequence[Real], Sequence[Real]], second: tuple[Sequence[Real], Sequence[Real]], lib: Library
+) -> Any:
     """The angle in [0, π] of the rotation between two attitudes (γ, ξ), each of unit vectors.
 
     Twice atan2(s, c) with s = |R − 1|/(2√2) and c² = 1 − s²: no digits are lost near 0.
@@ -521,8 +541,14 @@ class Output:
         return _COLUMNS.get(self.name) or tuple(f"euler{place}" for place in (1, 2, 3))
 
     def at(
-        self, omega: Any, gamma: Any, xi: Any, centre: Vector, lib: Any, number: Callable[[Fraction], Any]
-    ) -> tuple[Any, ...]:
+        self,
+        omega: Sequence[Real],
+        gamma: Sequence[Real],
+        xi: Sequence[Real],
+        centre: Vector,
+        lib: Library,
+        number: Callable[[Fraction], Real],
+    ) -> tuple[Real, ...]:
         """The value at one time, flat: a matrix row by row; a quaternion of either sign.
 
         omega, gamma, xi: three numbers of ``lib`` each, |γ| = |ξ| = 1.  centre: of mass, in the same axes.
@@ -546,7 +572,7 @@ class Output:
         return centre if self.point is None else self.point
 
 
-def output(text: str | Output, point: Any = None, pivot: Any = None) -> Output:
+def output(text: str | Output, point: Iterable[Any] | None = None, pivot: Iterable[Any] | None = None) -> Output:
     """The output of that name, "euler:ZXZ" with its sequence; one that was read before, as it is.
 
     point, pivot: three exact numbers each, of a position alone.
@@ -568,12 +594,12 @@ def output(text: str | Output, point: Any = None, pivot: Any = None) -> Output:
     return Output(name, sequence, found, _ORIGIN if pivot is None else _place(pivot, "pivot"))
 
 
-def _place(value: Any, what: str) -> Vector:
+def _place(value: Iterable[Any], what: str) -> Vector:
     first, second, third = (physical(part, what) for part in vector(value, what))
     return first, second, third
 
 
-def outputs(text: str, point: Any = None, pivot: Any = None) -> tuple[Output, ...]:
+def outputs(text: str, point: Iterable[Any] | None = None, pivot: Iterable[Any] | None = None) -> tuple[Output, ...]:
     """The outputs of a text such as "quaternion,euler:ZXZ,position", each once.
 
     Raises InputError as :func:`output`, for one that stands twice (two sequences of Euler angles included), and for a
@@ -603,7 +629,7 @@ def shaped(values: Sequence[Any], shape: tuple[int, ...]) -> list[Any]:
     return [shaped(values[place : place + size], shape[1:]) for place in range(0, len(values), size)]
 
 
-def first_sign(q: Sequence[Any], slack: Fraction = Fraction(0)) -> int:
+def first_sign(q: Sequence[Fraction], slack: Fraction = Fraction(0)) -> int:
     """±1, by which a quaternion (or a multiple of it) is multiplied at the start of a motion.
 
     So that w > 0, or the first of x, y, z that is not 0 is positive where w = 0; what is within ``slack`` of 0 counts
@@ -612,7 +638,7 @@ def first_sign(q: Sequence[Any], slack: Fraction = Fraction(0)) -> int:
     return next((1 if value > 0 else -1 for value in q if abs(value) > slack), 1)
 
 
-def signs(start: Sequence[float], quaternions: Any) -> Any:
+def signs(start: Sequence[float], quaternions: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     """±1 for each quaternion, an array: q goes on from ``start`` at t = 0 without a jump.
 
     Each is the nearer to the one before of q and −q; the motion meant is that of the samples: where the body turns by
@@ -622,7 +648,7 @@ def signs(start: Sequence[float], quaternions: Any) -> Any:
     import numpy
 
     chain = numpy.concatenate([[start], quaternions])
-    return numpy.cumprod(numpy.where((chain[1:] * chain[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+    return numpy.cumprod(numpy.where((chain[1:] * chain[:-1]).sum(axis=1) < 0, -1.0, 1.0), dtype=float)
 
 
 def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, Any]:
@@ -647,10 +673,10 @@ class InSpace:
 
     __slots__ = ()
 
-    def _in_double(self, what: Output) -> NDArray[np.float64]:
+    def _in_double(self, what: Output) -> NDArray[numpy.float64]:
         raise NotImplementedError
 
-    def quaternions(self) -> NDArray[np.float64]:
+    def quaternions(self) -> NDArray[numpy.float64]:
         """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
 
         The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
@@ -658,14 +684,14 @@ class InSpace:
         """
         return self._in_double(output("quaternion"))
 
-    def matrices(self) -> NDArray[np.float64]:
+    def matrices(self) -> NDArray[numpy.float64]:
         """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
 
         Raises InputError for a motion without attitude.
         """
         return self._in_double(output("matrix"))
 
-    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[numpy.float64]:
         """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
 
         point: three exact numbers in body axes; None for the centre of mass.
@@ -674,11 +700,11 @@ class InSpace:
         """
         return self._in_double(output("position", point, pivot))
 
-    def omega_space(self) -> NDArray[np.float64]:
+    def omega_space(self) -> NDArray[numpy.float64]:
         """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a motion without attitude."""
         return self._in_double(output("omega-space"))
 
-    def euler(self, sequence: str) -> NDArray[np.float64]:
+    def euler(self, sequence: str) -> NDArray[numpy.float64]:
         """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
 
         a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal

@@ -10,8 +10,20 @@ from math import isqrt, lcm
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import Vector, cross, dot, exact, exact_text, ordered, rational_root, round_to, shown, vector
-from heavytop.top.attitude import Attitude, Rows, multiplied, perpendicular, rotated, rotation_of, transposed
+from heavytop.precision import (
+    Given,
+    Vector,
+    cross,
+    dot,
+    exact,
+    exact_text,
+    ordered,
+    rational_root,
+    round_to,
+    shown,
+    vector,
+)
+from heavytop.top.attitude import Attitude, Rows, Three, multiplied, perpendicular, rotated, rotation_of, transposed
 from heavytop.top.heavy_top import HeavyTop, State
 
 # Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation all but theirs.
@@ -45,7 +57,7 @@ class PrincipalAxes:
         return not any(value for row in self.left for value in row)
 
 
-def principal_axes(tensor: Rows, bits: int) -> PrincipalAxes:
+def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
     """The principal axes of a symmetric tensor of exact rationals.
 
     A diagonal tensor keeps its axes.  bits: where they are irrational, what is left is within some 2^-bits of the
@@ -63,13 +75,14 @@ def principal_axes(tensor: Rows, bits: int) -> PrincipalAxes:
     return _with_rest(tensor, near, _exact_moments(tensor, (first, second, third)))
 
 
-def _with_rest(tensor: Rows, axes: Any, moments: Vector) -> PrincipalAxes:
+def _with_rest(tensor: Rows[Fraction], axes: Tensor, moments: Vector) -> PrincipalAxes:
     turned = multiplied(transposed(axes), multiplied(tensor, axes))
-    first, second, third = (tuple(turned[i][j] - (moments[i] if i == j else 0) for j in range(3)) for i in range(3))
+    (a, b, c), (d, e, f), (g, h, i) = turned
+    first, second, third = (a - moments[0], b, c), (d, e - moments[1], f), (g, h, i - moments[2])
     return PrincipalAxes(axes, moments, (first, second, third))
 
 
-def _spread(tensor: Rows) -> int:
+def _spread(tensor: Rows[Fraction]) -> int:
     """Bits by which the smallest moment may be below the largest entry, in whole words: det/trace² is a bound of it.
 
     0 for ordinary bodies, whose guard bits do, and for a tensor that has a moment below 0.
@@ -87,17 +100,17 @@ def _spread(tensor: Rows) -> int:
     return spread // _GUARD_BITS * _GUARD_BITS
 
 
-def _determinant(rows: Rows) -> Any:
+def _determinant(rows: Rows[Fraction]) -> Fraction:
     return dot(rows[0], cross(rows[1], rows[2]))
 
 
-def _less(tensor: Rows, moment: Fraction) -> tuple[Any, Any, Any]:
+def _less(tensor: Rows[Fraction], moment: Fraction) -> Three[Vector]:
     """J − moment."""
-    first, second, third = (tuple(tensor[i][j] - (moment if i == j else 0) for j in range(3)) for i in range(3))
-    return first, second, third
+    (a, b, c), (d, e, f), (g, h, i) = tensor
+    return (a - moment, b, c), (d, e - moment, f), (g, h, i - moment)
 
 
-def _exact_moments(tensor: Rows, near: Vector) -> Vector:
+def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
     """Each moment that is rational in place of the number near it: over the common denominator it is an integer."""
     common = lcm(*(value.denominator for row in tensor for value in row))
     found = []
@@ -107,7 +120,7 @@ def _exact_moments(tensor: Rows, near: Vector) -> Vector:
     return found[0], found[1], found[2]
 
 
-def _rational(tensor: Rows, near: Rows) -> PrincipalAxes | None:
+def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | None:
     """The principal axes where all moments and unit vectors are rational, ordered as the axes near them; else None."""
     turned = multiplied(transposed(near), multiplied(tensor, near))
     guess = (turned[0][0], turned[1][1], turned[2][2])
@@ -130,7 +143,7 @@ def _rational(tensor: Rows, near: Rows) -> PrincipalAxes | None:
     return _with_rest(tensor, axes, (turned[0][0], turned[1][1], turned[2][2]))
 
 
-def _unit_vectors(tensor: Rows, moments: Vector) -> list[Vector] | None:
+def _unit_vectors(tensor: Rows[Fraction], moments: Vector) -> list[Vector] | None:
     """Three rational unit vectors along principal axes; None where there are none."""
     single = [moment for moment in moments if moments.count(moment) == 1]
     found = []
@@ -147,7 +160,7 @@ def _unit_vectors(tensor: Rows, moments: Vector) -> list[Vector] | None:
     return found
 
 
-def _near(tensor: Rows, bits: int) -> tuple[Vector, Vector, Vector]:
+def _near(tensor: Rows[Fraction], bits: int) -> tuple[Vector, Vector, Vector]:
     """A rotation that all but diagonalizes the tensor: Jacobi's method, each of its rotations a rational one.
 
     A sweep squares what is off the diagonal; it is computed from the tensor itself again after each.
@@ -227,8 +240,8 @@ class Body:
 
     def __init__(
         self,
-        mass: Any,
-        gravity: Any,
+        mass: Given,
+        gravity: Given,
         centre: Iterable[Any],
         inertia: Iterable[Any],
         about: str | None = None,
@@ -314,7 +327,7 @@ def _texts(values: Vector) -> str:
     return f"({', '.join(repr(exact_text(value)) for value in values)})"
 
 
-def _number(value: Any, what: str) -> Fraction:
+def _number(value: Given, what: str) -> Fraction:
     try:
         return exact(value)
     except InputError as error:

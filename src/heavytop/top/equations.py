@@ -15,7 +15,7 @@ from itertools import permutations
 from typing import Any, NamedTuple, Protocol
 
 from heavytop.errors import InputError
-from heavytop.precision import Vector, cross, dot, shown
+from heavytop.precision import Scalar, Vector, cross, dot, shown
 from heavytop.top.heavy_top import HeavyTop, State
 
 VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
@@ -39,7 +39,7 @@ class Parameters(NamedTuple):
         return self.rotor if isinstance(self.rotor, tuple) else (self.rotor,)
 
     @property
-    def rotor_rate(self) -> Any:
+    def rotor_rate(self) -> Fraction:
         """The rate at which the rotor makes exact motions change, in 1/time unit: |λ|, or the largest |k_i| over the
         smallest moment.
         """
@@ -58,7 +58,7 @@ class Parameters(NamedTuple):
         return Parameters(tuple(map(number, self.inertia)), tuple(map(number, self.moment)), kept)
 
 
-def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
+def heavy_top(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """(1.1) M' = M × Ω + P γ × r and (1.2) γ' = γ × Ω, as (Ω', γ') in the order of the state."""
     (i1, i2, i3), n = p.inertia, p.moment
     w1, w2, w3 = omega = y[:3]
@@ -72,7 +72,7 @@ def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
     )
 
 
-def gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
+def gyrostat(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """M' = M × ω and γ' = γ × ω with ω = Ω + λ e2: the free gyrostat with a constant rotor along axis 2.
 
     M = IΩ = Iω − I2 λ e2 is the angular momentum of body and rotor, so −I2 λ is the rotor's own, relative to the body.
@@ -88,7 +88,7 @@ def gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     )
 
 
-def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
+def heavy_gyrostat(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """M' = M × Ω + γ × n and γ' = γ × Ω with M = IΩ + k: a heavy top that carries a rotor of constant momentum k.
 
     k = 0 is the heavy top.  n = 0 is the gyrostat of Zhukovsky and Volterra; :func:`gyrostat` is its case
@@ -106,7 +106,7 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     )
 
 
-def _of_full_tensor(p: Parameters, y: Any, rotor: Any) -> tuple[Any, ...]:
+def _of_full_tensor(p: Parameters, y: Sequence[Scalar], rotor: Sequence[Scalar] | None) -> tuple[Scalar, ...]:
     """(1.1), (1.2) with products of inertia, ``p.inertia`` the three rows of the tensor, and k = ``rotor`` or None.
 
     Ω' = I⁻¹ (M × Ω + γ × n), with I⁻¹ by the cofactors of the symmetric tensor.
@@ -126,12 +126,18 @@ def _of_full_tensor(p: Parameters, y: Any, rotor: Any) -> tuple[Any, ...]:
     return (*(dot(row, torque) / determinant for row in adjugate), *cross(gamma, omega))
 
 
-def _omega(p: Parameters, y: Any) -> tuple[Any, ...]:
+def _omega(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return tuple(y[:3])
 
 
-def _omega_with_rotor(p: Parameters, y: Any) -> tuple[Any, ...]:
+def _omega_with_rotor(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return y[0], y[1] + p.rotor, y[2]
+
+
+class VectorField(Protocol):
+    """A function of a state, of as many numbers."""
+
+    def __call__(self, p: Parameters, y: Sequence[Scalar], /) -> tuple[Scalar, ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +148,8 @@ class System:
     """
 
     name: str
-    field: Callable[[Parameters, Any], tuple[Any, ...]]
-    angular_velocity: Callable[[Parameters, Any], tuple[Any, ...]]
+    field: VectorField
+    angular_velocity: VectorField
     enters: tuple[str, ...] = ("inertia", "moment")
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -171,7 +177,7 @@ class System:
             found[name] = part if size == 3 else part[0]
         return Parameters(**found)
 
-    def rates(self, p: Parameters, y: Any) -> tuple[Any, ...]:
+    def rates(self, p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The field where ``p.inertia`` may be the three rows of a full tensor, with y in its axes.
 
         ``field`` itself is for principal axes and has no branch: it is compiled.
@@ -180,12 +186,12 @@ class System:
             return self.field(p, y)
         return _of_full_tensor(p, y, p.rotor if "rotor" in self.enters else None)
 
-    def attitude(self, p: Parameters, y: Any, xi: Any) -> tuple[Any, Any, Any]:
+    def attitude(self, p: Parameters, y: Sequence[Scalar], xi: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
         """ξ' = ξ × ω for a vector ξ fixed in space."""
         return cross(xi, self.angular_velocity(p, y))
 
 
-def rotor(top: HeavyTop, start: State) -> Any:
+def rotor(top: HeavyTop, start: State) -> Fraction:
     """λ = P b / (M·γ), from the exact start.
 
     Raises InputError unless a = c = 0, M·γ is not 0 and γ is parallel to M (2.1): without these the paper's
@@ -198,7 +204,7 @@ def rotor(top: HeavyTop, start: State) -> Any:
             "Give a centre of mass (0, b, 0): the paper assumes a = c = 0.",
         )
     momentum = top.angular_momentum(start.omega)
-    area = dot(momentum, start.gamma)
+    area: Fraction = dot(momentum, start.gamma)
     if area == 0:
         raise InputError(
             "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).", "Choose a start that turns about gamma."
@@ -281,46 +287,46 @@ class Integral:
     condition: str
 
 
-def momentum(p: Parameters, y: Any) -> tuple[Any, Any, Any]:
+def momentum(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
     """M = I Ω; of a full tensor where the moments are its three rows."""
     if isinstance(p.inertia[0], tuple):
         return dot(p.inertia[0], y[:3]), dot(p.inertia[1], y[:3]), dot(p.inertia[2], y[:3])
     return p.inertia[0] * y[0], p.inertia[1] * y[1], p.inertia[2] * y[2]
 
 
-def gamma_squared(p: Parameters, y: Any) -> Any:
+def gamma_squared(p: Parameters, y: Sequence[Scalar]) -> Scalar:
     """|γ|² = 1, the first of (1.3)."""
     return dot(y[3:6], y[3:6])
 
 
-def area(p: Parameters, y: Any) -> Any:
+def area(p: Parameters, y: Sequence[Scalar]) -> Scalar:
     """C0 = M·γ, the second of (1.3)."""
     return dot(momentum(p, y), y[3:6])
 
 
-def energy(p: Parameters, y: Any) -> Any:
+def energy(p: Parameters, y: Sequence[Scalar]) -> Any:
     """C1 = ½ Ω·M + P r·γ, the third of (1.3)."""
     return dot(momentum(p, y), y[:3]) / 2 + dot(p.moment, y[3:6])
 
 
-def momentum_squared(p: Parameters, y: Any) -> Any:
+def momentum_squared(p: Parameters, y: Sequence[Scalar]) -> Scalar:
     """|M|²: Euler's top (P r = 0), and the gyrostat."""
     m = momentum(p, y)
     return dot(m, m)
 
 
-def gyrostat_energy(p: Parameters, y: Any) -> Any:
+def gyrostat_energy(p: Parameters, y: Sequence[Scalar]) -> Any:
     """½ M·I⁻¹M + λ M2, the gyrostat's energy."""
     m = momentum(p, y)
     return dot(m, y[:3]) / 2 + p.rotor * m[1]
 
 
-def spin(p: Parameters, y: Any, axes: Axes) -> Any:
+def spin(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Scalar:
     """Lagrange's integral: Ω along the axis of symmetry ``axes[2]``."""
     return y[axes[2]]
 
 
-def kovalevskaya_xi(p: Parameters, y: Any, axes: Axes) -> tuple[Any, Any]:
+def kovalevskaya_xi(p: Parameters, y: Sequence[Scalar], axes: Axes) -> tuple[Scalar, Scalar]:
     """ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``: (real, imaginary)."""
     i, j, k = axes
     a, b = p.moment[i], p.moment[j]
@@ -329,52 +335,52 @@ def kovalevskaya_xi(p: Parameters, y: Any, axes: Axes) -> tuple[Any, Any]:
     return real, imaginary
 
 
-def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
+def kovalevskaya(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Scalar:
     """|ξ|² of :func:`kovalevskaya_xi`."""
     real, imaginary = kovalevskaya_xi(p, y, axes)
     return real * real + imaginary * imaginary
 
 
-def goryachev_chaplygin(p: Parameters, y: Any, axes: Axes) -> Any:
+def goryachev_chaplygin(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
     """Ω3 (Ω1² + Ω2²) − (n1 Ω1 + n2 Ω2) γ3, n = P r/I3, conserved on C0 = 0; the small moment on axis ``axes[2]``."""
     i, j, k = axes
     along = p.moment[i] * y[i] + p.moment[j] * y[j]
     return y[k] * (y[i] * y[i] + y[j] * y[j]) - along * y[3 + k] / p.inertia[k]
 
 
-def hess(p: Parameters, y: Any, axes: Axes) -> Any:
+def hess(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
     """I1 a Ω1 + I3 c Ω3 (times P), an invariant relation: conserved where it is 0."""
     i, _, k = axes
     return p.moment[i] * p.inertia[i] * y[i] + p.moment[k] * p.inertia[k] * y[k]
 
 
-def moment_along_centre(p: Parameters, y: Any) -> Any:
+def moment_along_centre(p: Parameters, y: Sequence[Scalar]) -> Any:
     """M·r (times P) of a top with I1 = I2 = I3."""
     return dot(momentum(p, y), p.moment)
 
 
-def momentum_with_rotor(p: Parameters, y: Any) -> tuple[Any, Any, Any]:
+def momentum_with_rotor(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
     """M = I Ω + k of `heavy_gyrostat`."""
     first, second, third = momentum(p, y)
     return first + p.rotor[0], second + p.rotor[1], third + p.rotor[2]
 
 
-def area_with_rotor(p: Parameters, y: Any) -> Any:
+def area_with_rotor(p: Parameters, y: Sequence[Scalar]) -> Scalar:
     """M·γ with M = I Ω + k."""
     return dot(momentum_with_rotor(p, y), y[3:6])
 
 
-def momentum_with_rotor_squared(p: Parameters, y: Any) -> Any:
+def momentum_with_rotor_squared(p: Parameters, y: Sequence[Scalar]) -> Scalar:
     """|M|² with M = I Ω + k: P r = 0, the gyrostat of Zhukovsky and Volterra."""
     m = momentum_with_rotor(p, y)
     return dot(m, m)
 
 
-def _equatorial_square(y: Any, axes: Axes) -> Any:
+def _equatorial_square(y: Sequence[Scalar], axes: Axes) -> Scalar:
     return y[axes[0]] * y[axes[0]] + y[axes[1]] * y[axes[1]]
 
 
-def kovalevskaya_yehia(p: Parameters, y: Any, axes: Axes) -> Any:
+def kovalevskaya_yehia(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
     """|ξ|² of :func:`kovalevskaya_xi` + 2λ (Ω3 − λ)(Ω1² + Ω2²) − 4λ (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3.
 
     The rotor lies on the axis of the small moment, ``axes[2]``.  Source: H. M. Yehia, 1986.
@@ -386,7 +392,7 @@ def kovalevskaya_yehia(p: Parameters, y: Any, axes: Axes) -> Any:
     return kovalevskaya(p, y, axes) + half + half
 
 
-def sretensky(p: Parameters, y: Any, axes: Axes) -> Any:
+def sretensky(p: Parameters, y: Sequence[Scalar], axes: Axes) -> Any:
     """(Ω3 − λ)(Ω1² + Ω2²) − (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3, conserved on M·γ = 0.
 
     The rotor lies on the axis of the small moment, ``axes[2]``.  Source: L. N. Sretensky, 1963.
@@ -443,7 +449,7 @@ def _of_gyrostat(top: HeavyTop) -> Iterator[Integral]:
         yield Integral("spin2", partial(spin, axes=(2, 0, 1)), "I1 = I3: the rotor lies on the axis of symmetry")
 
 
-def _of_heavy_top(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
+def _of_heavy_top(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
     n = p.moment
     if not any(n):
         yield Integral("momentum_squared", momentum_squared, "Euler: P r = 0")
@@ -470,7 +476,7 @@ def _of_heavy_top(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
                 yield Integral("hess", relation, "Hess, on its invariant relation")
 
 
-def _of_heavy_gyrostat(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
+def _of_heavy_gyrostat(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
     n, rotor = p.moment, p.rotor
     if not any(n):
         yield Integral("momentum_squared", momentum_with_rotor_squared, "Zhukovsky-Volterra: P r = 0")

@@ -8,11 +8,12 @@ from decimal import Decimal
 from fractions import Fraction
 from math import isqrt
 from operator import lt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import (
     MOST_MEMBERS,
+    Given,
     Vector,
     decimal_text,
     dot,
@@ -26,6 +27,9 @@ from heavytop.precision import (
     vector,
 )
 from heavytop.top.attitude import Attitude, rotated, transposed
+
+if TYPE_CHECKING:
+    pass
 
 _SHOWN_BITS = 64
 _ATTITUDE_BITS = 256
@@ -56,7 +60,7 @@ class HeavyTop:
     rotor: Vector | None
 
     def __init__(
-        self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any], rotor: Iterable[Any] | None = None
+        self, inertia: Iterable[Any], weight: Given, centre: Iterable[Any], rotor: Iterable[Any] | None = None
     ) -> None:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
@@ -271,7 +275,7 @@ class TimeText(str):
         return float(exact(str(self)))
 
     @classmethod
-    def of(cls, value: Any) -> TimeText:
+    def of(cls, value: Given) -> TimeText:
         """The text of a time.
 
         Text stays as it is; of a float and of any other number the exact decimal, where it has one of up to 60 digits,

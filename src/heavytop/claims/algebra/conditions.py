@@ -8,7 +8,6 @@ from enum import Enum
 from fractions import Fraction
 from itertools import islice, product
 from math import comb, prod
-from typing import Any
 
 import sympy
 from flint import arb, fmpq_mpoly
@@ -121,7 +120,7 @@ def _is_plain(need: Need) -> bool:
     return bool(e.is_Rational and (e > 0 or (e < 0 and need.kind is ConditionKind.NONZERO)))
 
 
-def conditions_of(expressions: Iterable[Any]) -> frozenset[Need]:
+def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
     """What sympy expressions need, as they stand: what has been simplified away is not seen."""
     found: set[Need] = set()
     for part in {node for e in expressions for node in sympy.preorder_traversal(e)}:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import msgspec
 import sympy
@@ -154,7 +154,7 @@ class TensorTexts:
         """The moments about the axes."""
         return self.texts if len(self.texts) == 3 else self.texts[::4]
 
-    def of(self, entries: Sequence[Any]) -> tuple[Any, ...]:
+    def of(self, entries: Sequence[sympy.Expr]) -> tuple[sympy.Expr | tuple[sympy.Expr, ...], ...]:
         """Three moments, or three rows; raises InputError for a tensor that is not symmetric."""
         if len(entries) == 3:
             return tuple(entries)
@@ -181,7 +181,7 @@ def read_tensor(inertia: Sequence[str | list[str]]) -> TensorTexts:
     return TensorTexts(tuple(texts[place] for place in _ORDER) if len(texts) == 6 else texts)
 
 
-def minors(inertia: Sequence[Any]) -> tuple[sympy.Expr, ...]:
+def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[sympy.Expr, ...]:
     """What is > 0 of every body: the moments; of a full tensor its principal minors, the determinant last."""
     if not isinstance(inertia[0], tuple):
         return tuple(inertia)
@@ -193,7 +193,7 @@ def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
     return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
 
 
-def of_bodies(inertia: Sequence[Any]) -> tuple[Need, ...]:
+def of_bodies(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[Need, ...]:
     """∫ x xᵀ dm = ½ tr I − I is positive semidefinite: its principal minors are >= 0; () for numbers."""
     matrix = sympy.Matrix(inertia)
     if not matrix.free_symbols:

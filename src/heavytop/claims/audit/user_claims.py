@@ -145,6 +145,7 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         formulas = three(table.omega, names, "motion.omega")
         omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
+        assert rates is not None  # angles are required where Ω is not given
         omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
     return ClaimedMotion(
         "smooth",

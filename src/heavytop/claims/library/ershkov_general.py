@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from heavytop.top.attitude import Library
+
 
 class GeneralConstants(NamedTuple):
     """Data of the general case in any ring: I1 != I3, C0 != 0."""
@@ -65,12 +67,12 @@ def omega1_squared(c: GeneralConstants, omega2: Any) -> Any:
     )
 
 
-def phi(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Any) -> Any:
+def phi(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Library) -> Any:
     """(3.3): φ = arctan(I1 Ω1/(I2 Ω2))."""
     return lib.arctan(c.inertia[0] * omega[0] / (c.inertia[1] * omega[1]))
 
 
-def theta(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Any) -> Any:
+def theta(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Library) -> Any:
     """(3.3): θ = arccos(I3 Ω3/C0)."""
     return lib.arccos(c.inertia[2] * omega[2] / c.c0)
 

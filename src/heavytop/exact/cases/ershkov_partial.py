@@ -22,6 +22,7 @@ from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
 from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.solution import SPIN_UPWARDS, ExactRelation, apart, positive
 from heavytop.precision import shown
+from heavytop.top.attitude import Library
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -32,7 +33,7 @@ def hyperbolic(alpha: Any, ratio: Any, tanh: Any, sech: Any) -> tuple[tuple[Any,
     return (alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2]), gamma
 
 
-def hyperbolic_angles(s: Any, lib: Any) -> tuple[Any, Any]:
+def hyperbolic_angles(s: Any, lib: Library) -> tuple[Any, Any]:
     """(φ, θ) at s = k t/2: φ = π/2 + gd(s) = 2 arctan e^s, θ = −gd(s); no digits are lost at either end."""
     return 2 * lib.arctan(lib.exp(s)), -2 * lib.arctan(lib.tanh(s / 2))
 

@@ -81,7 +81,7 @@ def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:
     (i1, i2, i3), n = top.inertia, top.moment
     square, spin = dot(n, n), dot(omega, n)
     kappa = n[0] * n[2] * (i1 - i3) / square
-    phase = dot(omega, cross(n, (0, 1, 0)))
+    phase = dot(omega, cross(n, (Fraction(0), Fraction(1), Fraction(0))))
     across = cross(omega, n)
     return [
         ((i1 - i2 + i3) * spin * (w - spin * e / square) - kappa * omega[1] * x + kappa * spin * phase * e / square)

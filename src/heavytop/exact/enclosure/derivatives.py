@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from flint import arb, fmpz
@@ -126,7 +126,7 @@ class StepDerivatives:
     moved: a bound of |Φ − V| as an operator, V the fundamental matrix along the step's own polynomial.
     """
 
-    rows: list[list[Any]]
+    rows: list[list[mpz]]
     errors: list[float]
     moved: float
 
@@ -172,7 +172,7 @@ def _centred(step: Step, centre: Sequence[int]) -> Node:
     return replace(step.node, centre=centre)
 
 
-def _end(series: StepSeries, tau: Fraction) -> Sequence[Any]:
+def _end(series: StepSeries, tau: Fraction) -> Sequence[mpz]:
     """The polynomials at τ, in ulps."""
     return list(series.total) if tau == 1 else [horner(component, tau) for component in series.values]
 
@@ -271,7 +271,7 @@ def _ldexp(value: float, exponent: int) -> float:
     return float(np.ldexp(value, max(-1000, exponent))) + 2.0**-1000
 
 
-def unit_columns(size: int, bits: int, columns: int) -> list[list[Any]]:
+def unit_columns(size: int, bits: int, columns: int) -> list[list[mpz]]:
     """The derivatives at time 0: the unit matrix, and 0 for the data, in ulps of 2^-bits."""
     return [[mpz((i == j) << bits) for j in range(columns)] for i in range(size)]
 
@@ -286,19 +286,22 @@ DATA = ("I1", "I2", "I3", "n1", "n2", "n3")
 """The data that motions are differentiated with respect to: principal moments, and n = P r."""
 
 
+Exact: TypeAlias = int | Fraction | mpq
+
+
 @dataclass(frozen=True, slots=True)
 class Dual:
     """value + slope ε with ε² = 0, over exact numbers."""
 
-    value: Any
-    slope: Any = 0
+    value: Exact
+    slope: Exact = 0
 
     @classmethod
-    def of(cls, number: Any) -> Dual:
+    def of(cls, number: Dual | Exact) -> Dual:
         """A number, as one without slope."""
         return number if isinstance(number, Dual) else cls(number)
 
-    def __add__(self, other: Any) -> Dual:
+    def __add__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value + b.value, self.slope + b.slope)
 
@@ -307,27 +310,27 @@ class Dual:
     def __neg__(self) -> Dual:
         return Dual(-self.value, -self.slope)
 
-    def __sub__(self, other: Any) -> Dual:
+    def __sub__(self, other: Dual | Exact) -> Dual:
         return self + -Dual.of(other)
 
-    def __rsub__(self, other: Any) -> Dual:
+    def __rsub__(self, other: Dual | Exact) -> Dual:
         return Dual.of(other) + -self
 
-    def __mul__(self, other: Any) -> Dual:
+    def __mul__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value * b.value, self.slope * b.value + self.value * b.slope)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Dual:
+    def __truediv__(self, other: Dual | Exact) -> Dual:
         b = Dual.of(other)
         return Dual(self.value / b.value, (self.slope * b.value - self.value * b.slope) / (b.value * b.value))
 
-    def __rtruediv__(self, other: Any) -> Dual:
+    def __rtruediv__(self, other: Dual | Exact) -> Dual:
         return Dual.of(other) / self
 
 
-def moved(p: Parameters, datum: int, by: Any) -> Parameters:
+def moved(p: Parameters, datum: int, by: Dual | Exact) -> Parameters:
     """The parameters with ``by`` added to one of :data:`DATA`."""
     numbers = [*p.inertia, *p.moment]
     numbers[datum] = numbers[datum] + by
@@ -338,7 +341,7 @@ def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Frac
     """(f(θ + by) − f(θ))/over for one of :data:`DATA`."""
     varied = moved(p, datum, by)
 
-    def field(y: tuple[Any, ...]) -> list[Any]:
+    def field(y: tuple[mpq, ...]) -> list[mpq]:
         pairs = zip(system.field(varied, y), system.field(p, y), strict=True)
         return [(a - b) / over for a, b in pairs]
 
@@ -349,7 +352,7 @@ def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fr
     """``factor`` ∂f/∂θ − (f(θ + by) − f(θ))/over: what a quotient lacks."""
     varied, slope = moved(p, datum, by), moved(p, datum, Dual(mpq(0), factor))
 
-    def field(y: tuple[Any, ...]) -> list[Any]:
+    def field(y: tuple[mpq, ...]) -> list[mpq]:
         rates = zip(system.field(varied, y), system.field(p, y), system.field(slope, y), strict=True)
         return [Dual.of(exact).slope - (a - b) / over for a, b, exact in rates]
 
@@ -358,6 +361,8 @@ def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fr
 
 METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
+Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int]
+"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, and the exponent."""
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
@@ -385,7 +390,7 @@ class EnclosedDerivatives:
 class _Columns:
     """(J, S) at a node: centre in ulps of 2^-bits, a row a component; errors {Q x: |x_i| ≤ radii_i 2^exponent}."""
 
-    rows: list[list[Any]]
+    rows: list[list[mpz]]
     radii: Matrix
     exponent: int
 
@@ -495,7 +500,7 @@ def unit_of(known: Validated, datum: int) -> Fraction:
     return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length() - _SMALLER)
 
 
-def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Any]]:
+def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
     """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
     node = start_node(motion.field, motion.scaled.state, tangent.precision)
     size = motion.field.dimension
@@ -532,7 +537,7 @@ def _step(tangent: Tangent, node: Node) -> tuple[Step, StepDerivatives] | tuple[
     return None, None
 
 
-def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[Any]]) -> list[list[Any]]:
+def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> list[list[mpz]]:
     """Φ (J, S) + (0, σ), each entry within half an ulp of that of the centres."""
     size, bits = len(rows), tangent.bits
     half = mpz(1) << (bits - 1)
@@ -547,7 +552,7 @@ def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[Any]]) -> l
     return found
 
 
-def _times(a: Any, b: Any) -> Any:
+def _times(a: mpz, b: mpz) -> mpz:
     return mpz(a) * b
 
 
@@ -576,9 +581,7 @@ def _carried(
     return _Columns(_product(tangent, own, columns.rows), radii, exponent)
 
 
-def _at(
-    tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, tau: Fraction
-) -> tuple[list[list[Any]], Matrix, int]:
+def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, tau: Fraction) -> Centre:
     """(J, S) within a step: the centre, and bounds of the errors in ulps 2^exponent."""
     variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(found.variation))
     frame = found.node.errors.frame
@@ -592,9 +595,7 @@ def _at(
 
 
 @whole_evaluation
-def _in_units(
-    known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]
-) -> EnclosedDerivatives:
+def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, inf, log10
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from flint import arb, arb_series
 from gmpy2 import mpq
@@ -288,13 +288,13 @@ class ScaledMotion:
             vectors=tuple(tuple(tuple(map(mpq, row)) for row in rows) for rows in scaled.coefficients.vectors),
         )
 
-        def given(state: tuple[Any, ...]) -> list[Any]:
+        def given(state: tuple[mpq, ...]) -> list[mpq]:
             found = [*system.field(own, state[:6])]
             if len(state) == 9:
                 found += system.attitude(own, state[:6], state[6:])
             return [sign * rate for rate in found]
 
-        def by_lanes(state: tuple[Any, ...]) -> list[Any]:
+        def by_lanes(state: tuple[mpq, ...]) -> list[mpq]:
             return [sign * rate for rate in rates(system, lanes, state)]
 
         motion = quadratic(given, size)

@@ -42,7 +42,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from math import exp, inf, isfinite, lcm, log2
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from flint import arb, fmpz, fmpz_poly
@@ -60,7 +60,8 @@ from heavytop.multiword.problem import variation as variation_of
 
 
 Matrix = NDArray[np.float64]
-Field = Callable[[tuple[Any, ...]], Sequence[Any]]
+Place = TypeVar("Place", int, tuple[int, int])
+Field = Callable[[tuple[mpq, ...]], Sequence[mpq]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +107,7 @@ def quadratic(field: Field, dimension: int) -> Quadratic:
     return _assemble(table, lines)
 
 
-def _keep(row: dict[Any, Fraction], key: Any, value: Any) -> None:
+def _keep(row: dict[Place, Fraction], key: Place, value: mpq) -> None:
     if value:
         row[key] = Fraction(int(value.numerator), int(value.denominator))
 

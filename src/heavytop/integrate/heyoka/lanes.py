@@ -13,15 +13,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from threading import Event, Semaphore
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy
 
 from heavytop.integrate.heyoka.engines import arrays, compiled, not_finite
 from heavytop.integrate.heyoka.motions import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, exact
+from heavytop.precision import DOUBLE, OrderedRing, exact
 from heavytop.top.equations import System
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # steps between two looks near a sample; a look costs as much as about ten
 _WINDOW = 64
@@ -135,9 +139,9 @@ class _Run(OnTheWay):
 class _Ends(NamedTuple):
     """The last step ends of all lanes: states (n, lanes), both words of the times, steps taken."""
 
-    states: Any
-    high: Any
-    low: Any
+    states: NDArray[np.float64]
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
     steps: Any
 
 
@@ -145,7 +149,7 @@ class _Sample(NamedTuple):
     """A sample to be taken at ``target``, by steps from where that lane was before it."""
 
     run: _Run
-    target: Any
+    target: OrderedRing
     lane: int
     before: _Ends
 
@@ -304,7 +308,7 @@ class Lanes:
             if len(run.times) == len(self.work.times):
                 self._finish(run, Outcome.SUCCESS, Fraction(0), int(sample.before.steps[sample.lane]) + steps)
 
-    def _stop(self, lane: int, outcome: Outcome, time: Any, steps: Any, rest: Any = None) -> None:
+    def _stop(self, lane: int, outcome: Outcome, time: OrderedRing, steps: Any, rest: Any = None) -> None:
         """End the run in the lane; SUCCESS where it is an equilibrium, ``rest``."""
         while self.samples:
             self._take_samples()
@@ -329,7 +333,11 @@ LANES = 8
 
 
 def states_on_a_grid(
-    system: System, parameters: Any, starts: Any, times: Sequence[Fraction], **options: Any
+    system: System,
+    parameters: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    times: Sequence[Fraction],
+    **options: Any,
 ) -> tuple[Any, Any, Any]:
     """States (motions, samples, 6), steps (motions,) and which of the motions they are good for.
 

@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
 from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, TaylorStep, Trajectory, sampled
-from heavytop.precision import Precision, exact, number, numbers
+from heavytop.precision import OrderedRing, Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
+
+if TYPE_CHECKING:
+    pass
 
 # One run of a compiled integrator, step by step.
 #
@@ -53,7 +56,7 @@ class Stepper:
     _before: Any = None
     _not_finite: Any = field(default_factory=not_finite)
 
-    def reach(self, target: Any) -> Outcome:
+    def reach(self, target: OrderedRing) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
         while self.rest is None and not (self._covers and self._beyond(target)):
             if self.step_limit is not None and self.steps >= self.step_limit:
@@ -73,10 +76,10 @@ class Stepper:
         outcome = self.reach(target)
         return outcome, self.sample(target) if outcome is Outcome.SUCCESS else None
 
-    def _beyond(self, target: Any) -> bool:
+    def _beyond(self, target: OrderedRing) -> bool:
         return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
 
-    def _steps_short_of(self, target: Any) -> int:
+    def _steps_short_of(self, target: OrderedRing) -> int:
         """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
         if self._one_by_one or not self._largest_step or self._beyond(target):
             return 1
@@ -108,7 +111,7 @@ class Stepper:
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
         return Outcome.SUCCESS
 
-    def _several(self, count: int, target: Any) -> Outcome:
+    def _several(self, count: int, target: OrderedRing) -> Outcome:
         state, time = self.engine.state.copy(), self.engine.dtime
         began = perf_counter()
         outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
@@ -159,7 +162,7 @@ class Stepper:
         state, time, steps = self._before
         return Place(samples, tuple(state), time, steps, seconds, flags)
 
-    def sample(self, target: Any) -> Any:
+    def sample(self, target: OrderedRing) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
         if self.rest is not None:
@@ -167,7 +170,7 @@ class Stepper:
         return self.engine.update_d_output(target).copy()
 
 
-def are_many(targets: Sequence[Any], precision: Precision) -> bool:
+def are_many(targets: Sequence[OrderedRing], precision: Precision) -> bool:
     """Whether one call of heyoka may be worth its while."""
     return len(targets) >= _MANY and precision.family in _ON_A_GRID
 
@@ -217,7 +220,7 @@ def at_rest(state: Any, coefficients: Any) -> bool:
 def propagate(
     top: HeavyTop,
     start: State,
-    times: Sequence[Any],
+    times: Sequence[OrderedRing],
     precision: Precision,
     *,
     system: System = HEAVY_TOP,

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import permutations
 from math import ceil
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
@@ -33,6 +33,10 @@ from heavytop.multiword.problem import Scaled
 from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import check_times
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _FIRST_CHUNK = 64
 _RISE = 2
@@ -277,8 +281,8 @@ _SPLIT = 134217729.0
 class Pairs:
     """high + low, arrays of one shape with |low| <= ulp(high)/2."""
 
-    high: Any
-    low: Any
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
 
     @classmethod
     def of(cls, value: Any) -> Pairs:
@@ -383,7 +387,11 @@ _UNITS = numpy.eye(6).tolist()
 
 
 def double_double_states(
-    parameters: Any, starts: Any, times: Sequence[Fraction], tolerance: Fraction, step_limit: int
+    parameters: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    times: Sequence[Fraction],
+    tolerance: Fraction,
+    step_limit: int,
 ) -> tuple[Pairs, Any]:
     """States (motions, samples, 6) of heavy tops, and which motions they are good for: the others need more care.
 
@@ -406,7 +414,7 @@ class _Grid:
     states.
     """
 
-    def __init__(self, parameters: Any, starts: Any, times: Any) -> None:
+    def __init__(self, parameters: NDArray[np.float64], starts: NDArray[np.float64], times: Any) -> None:
         constants = _constants(parameters)
         gamma = _power_above(numpy.abs(starts[:, 3:]).max(axis=1))
         torque = numpy.abs(constants[3:, 0]).max(axis=0) * 2.0**gamma
@@ -427,7 +435,7 @@ class _Grid:
         """Motions of which double-double keeps every component, that do not rest."""
         state, constants = numpy.abs(self.begin), numpy.abs(self.constants[:, 0].T)
 
-        def above(values: Any, bits: int) -> Any:
+        def above(values: NDArray[np.float64], bits: int) -> Any:
             return ((values == 0) | (values > 2.0**-bits)).all(axis=1)
 
         clear = above(state, TINY_BITS // 2 - 1) & above(constants, TINY_BITS // 2 - 1)
@@ -470,20 +478,20 @@ class _Grid:
         return Pairs(total, low - (total - high))
 
 
-def _constants(parameters: Any) -> Any:
+def _constants(parameters: NDArray[np.float64]) -> Any:
     """The coefficients of Ω × Ω and of the linear part, read off the field, three words each: (k, 3, motions)."""
     numbers = [Numerators(column, numpy.zeros(1)) for column in parameters.T]
     given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
 
     def rate(component: int, *axes: int) -> Any:
-        return HEAVY_TOP.field(given, [sum(_UNITS[axis][i] for axis in axes) for i in range(6)])[component]
+        return HEAVY_TOP.field(given, [sum((_UNITS[axis][i] for axis in axes), 0.0) for i in range(6)])[component]
 
     cyclic = [each for each in permutations(range(3)) if each in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
     products = [rate(i, j, k) for i, j, k in cyclic]
     return numpy.array([*products, *(rate(component, source) for _, component, source in terms(HEAVY_TOP))])
 
 
-def _power_above(values: Any) -> Any:
+def _power_above(values: NDArray[np.float64]) -> Any:
     """log2 of the least powers of two that are not less; 0 for 0."""
     part, exponent = numpy.frexp(values)
     return exponent - (part == 0.5)

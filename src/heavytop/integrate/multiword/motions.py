@@ -17,7 +17,7 @@ from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Flo
 from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
+from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
@@ -44,7 +44,7 @@ OUTCOMES = {
 def propagate_words(
     top: HeavyTop,
     start: State,
-    times: Sequence[Any],
+    times: Sequence[OrderedRing],
     precision: Precision,
     *,
     system: System = HEAVY_TOP,

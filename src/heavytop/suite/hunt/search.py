@@ -20,7 +20,7 @@ import numpy
 from flint import arb
 
 from heavytop.cases import Case
-from heavytop.errors import InputError
+from heavytop.errors import InputError, invalid
 from heavytop.exact.flint.balls import rational, whole_evaluation, working_precision
 from heavytop.files import replace
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -602,7 +602,7 @@ def kept(path: Path) -> tuple[Motion, ...]:
     except FileNotFoundError:
         return ()
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {error}.", _PASTE) from None
+        raise InputError(f"{path} cannot be read: {invalid(error)}.", _PASTE) from None
     if any(case.system is GYROSTAT for case in cases):
         raise InputError(
             f"{path} holds a top of the system gyrostat.", "Take it out: heavy tops and heavy gyrostats are hunted."

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy
@@ -22,6 +22,10 @@ from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, 
 from heavytop.suite.case_text import forms
 from heavytop.suite.rows import Task, data_of
 from heavytop.suite.survey.measured import Chunk
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # The file of a survey: one Parquet row group a chunk, one row a motion.
 
@@ -96,7 +100,7 @@ _MOST_BINS = 2000
 _FIRST = ("omega", "gamma", "inertia", "moment", "rotor")
 
 
-def histogram(values: Any) -> Histogram | None:
+def histogram(values: NDArray[np.float64]) -> Histogram | None:
     """Of the values above 0; None without any."""
     positive = values[values > 0]
     if not len(positive):
@@ -113,7 +117,7 @@ def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in ordered if len(numpy.unique(columns[name])) > 1)[:2]
 
 
-def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: Any) -> CellMap | None:
+def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: NDArray[np.float64]) -> CellMap | None:
     """Medians over at most 24 by 24 cells; cells of single values where there are no more of them.  NaN is left out."""
     kept = numpy.isfinite(lost) & numpy.isfinite(x[1]) & numpy.isfinite(y[1])
     if not kept.any():
@@ -136,7 +140,7 @@ def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: Any) -> CellMap | Non
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
 
-def _edges(values: Any) -> Any:
+def _edges(values: NDArray[np.float64]) -> Any:
     single = numpy.unique(values)
     if len(single) > _CELLS:
         return numpy.linspace(single[0], single[-1], _CELLS + 1)
@@ -245,7 +249,7 @@ class Gathered:
         return cell_map(x, y, lost)
 
 
-def _quantiles(quantity: Quantity, values: Any) -> dict[Quantity, Metric]:
+def _quantiles(quantity: Quantity, values: NDArray[np.float64]) -> dict[Quantity, Metric]:
     """Order statistics of sorted values, with half the width in decades of the 95 % interval of each by its ranks."""
     found: dict[Quantity, Metric] = {}
     n = len(values)

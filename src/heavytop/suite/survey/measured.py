@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
@@ -29,6 +29,10 @@ from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.suite.sweeps import Lazy, Random, Sweep
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # A chunk of a sweep as arrays: the tops and starts that the sweep's cases have, rounded to the format.
 
@@ -142,7 +146,7 @@ def _integrals(case: Case) -> tuple[Integral, ...]:
     return holding(case.top, case.start, case.system)
 
 
-def _rounded(numbers: Any) -> Any:
+def _rounded(numbers: NDArray[np.float64]) -> Any:
     """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
 
     All of them are below 2^53, so that each quotient is the exact number rounded once.
@@ -152,7 +156,7 @@ def _rounded(numbers: Any) -> Any:
     return numpy.hstack([thousandths, moment, numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
 
 
-def _problem(numbers: Any) -> Problem:
+def _problem(numbers: NDArray[np.float64]) -> Problem:
     i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
     given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
     return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)
