@@ -112,7 +112,7 @@ class Convention:
         return [_times(vector[place], sign) for place, sign in zip(places, signs, strict=True)]
 
 
-def _directed(rows: Rows, direction: str) -> list[list[Any]]:
+def _directed(rows: Rows[Any], direction: str) -> list[list[Any]]:
     return [list(row) for row in (rows if direction == "body_to_space" else transposed(rows))]
 
 
@@ -122,7 +122,7 @@ def _times(value: Any, sign: int) -> Any:
     return [-part for part in value] if isinstance(value, list | tuple) else -value
 
 
-def space_to_body(rows: Rows, vector: Sequence[Any]) -> tuple[Any, Any, Any]:
+def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any]:
     """R^T v over any ring."""
     return rotated(transposed(rows), vector)
 
@@ -237,7 +237,7 @@ class ObservedErrors(Statistics):
         """Each error at one sample, at the working precision."""
         axes = [[ball(entry) for entry in row] for row in self.posed.axes]
         omega, gamma = rotated(axes, true[:3]), rotated(axes, true[3:6])
-        rows: Rows | None = None
+        rows: Rows[arb] | None = None
         if len(true) > 6:
             along = rotated(axes, true[6:9])
             rows = [along, cross(gamma, along), gamma]
@@ -252,7 +252,7 @@ class ObservedErrors(Statistics):
         return found | {Quantity(SOLUTION_ERROR, "relative"): largest(columns)}
 
     def _of_columns(
-        self, name: str, part: list[arb], omega: Sequence[arb], gamma: Sequence[arb], rows: Rows | None
+        self, name: str, part: list[arb], omega: Sequence[arb], gamma: Sequence[arb], rows: Rows[arb] | None
     ) -> dict[Quantity, arb]:
         relative = Quantity(SOLUTION_ERROR, "relative")
         if name in ("omega", "gamma"):
@@ -273,7 +273,7 @@ class ObservedErrors(Statistics):
             Quantity(SOLUTION_ERROR, "gamma"): third,
         }
 
-    def _position(self, part: list[arb], rows: Rows) -> dict[Quantity, arb]:
+    def _position(self, part: list[arb], rows: Rows[arb]) -> dict[Quantity, arb]:
         pivot = [ball(value) for value in self.said.pivot]
         given = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
         true = rotated(rows, [ball(value) for value in self.point])
