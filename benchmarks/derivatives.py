@@ -1,22 +1,26 @@
 """Proven derivatives on random data of every class: contained differences, laws of the flow, radii and cost.
 
-    python benchmarks/derivatives.py [--count 100] [--case NAME]
+    python benchmarks/derivatives.py [--count 100] [--case NAME] [--records FILE [--seconds 240]]
     python benchmarks/derivatives.py --cost
 
 For each built-in case, COUNT random starts of its top (of a special motion: other roundings), each at a random time:
 one random column of ∂y/∂y0 and one of ∂y/∂(I, n) against a central difference of references, every law of the flow, and
-the seconds of this process against those of the enclosure without derivatives.  A line a case.  With --cost: seconds
-of references of a generic top without derivatives, with respect to the start, and to start and data.
+the seconds of this process against those of the enclosure without derivatives.  A line a case.  With --records a line
+of JSON a motion goes to FILE, those that stand there are not measured again, and no motion begins after --seconds.
+With --cost: seconds of references of a generic top without derivatives, with respect to the start, and to start and
+data.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -34,13 +38,18 @@ def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--count", type=int, default=100)
     options.add_argument("--case")
+    options.add_argument("--records", type=Path)
+    options.add_argument("--seconds", type=float, default=float("inf"))
     options.add_argument("--cost", action="store_true")
     given = options.parse_args()
     if given.cost:
         _cost()
         return 0
+    lines = given.records.read_text().splitlines() if given.records and given.records.exists() else []
+    known = {(record["case"], record["motion"]): record for record in map(json.loads, lines)}
+    end = time.monotonic() + given.seconds
     cases = [case for name, case in CASES.items() if given.case in (None, name)]
-    wrong = [_case(case, given.count) for case in cases]
+    wrong = [_case(case, given.count, known, given.records, end) for case in cases]
     return int(any(wrong))
 
 
@@ -59,40 +68,58 @@ def _cost() -> None:
         print(f"{digits:4} digits at t = {until:<5}{plain:9.4f}{ratios}", flush=True)
 
 
-def _case(case: Case, count: int) -> bool:
-    random = Random(case.name)
+def _case(
+    case: Case, count: int, known: dict[tuple[str, int], dict[str, Any]], records: Path | None, end: float
+) -> bool:
+    """Measure what is not known yet, and print a line; whether anything is wrong."""
     members = ensemble_of(case, min(count, FACTORS) if one_motion(case, 0) else count, 28)
-    wrong, refused, widest, plain, derived = 0, 0, Fraction(0), 0.0, 0.0
-    for top, start in members:
-        at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 100)
-        try:
-            began = time.process_time()
-            known(top, start, case.system).state(at, BITS)
-            plain += time.process_time() - began
-            motion = known(top, start, case.system)
-            began = time.process_time()
-            of(motion, at)
-            derived += time.process_time() - began
-            found = of(motion, at, data=True)
-        except HeavyTopError:
-            refused += 1
+    for number, (top, start) in enumerate(members):
+        if (case.name, number) in known or time.monotonic() > end:
             continue
-        size = max(1, *(abs(v).upper().__float__() for row in found.start + found.data for v in row))
-        widest = max(widest, largest_radius(found.start), largest_radius(found.data))
-        held = [holds(values, Fraction(size) ** 6 / 10**20) for values in laws(motion, at, found).values()]
-        for matrix, datum in ((found.start, False), (found.data, True)):
-            column = random.randrange(6)
-            values = difference(motion, at, column, datum=datum)
-            with working_precision(400):
-                pairs = zip(matrix, values, strict=True)
-                held.append(holds([row[column] - value for row, value in pairs], Fraction(size) / 10**20))
-        wrong += not all(held)
+        record = {"case": case.name, "motion": number, **_motion(top, start, case, Random(f"{case.name} {number}"))}
+        known[case.name, number] = record
+        if records:
+            with records.open("a") as file:
+                file.write(json.dumps(record) + "\n")
+    found = [record for (name, number), record in known.items() if name == case.name and number < len(members)]
+    if not found:
+        return False
+    wrong, refused = (sum(record[key] for record in found) for key in ("wrong", "refused"))
+    plain, derived = (sum(record[key] for record in found) for key in ("plain", "derived"))
+    widest = max(record["radius"] for record in found)
     print(
-        f"{case.name:28} {len(members):4} motions  {wrong} wrong  {refused} refused  "
-        f"widest radius {float(widest):.1e}  {derived / max(plain, 1e-9):5.1f} times the enclosure",
+        f"{case.name:28} {len(found):4} of {len(members)} motions  {wrong} wrong  {refused} refused  "
+        f"widest radius {widest:.1e}  {derived / max(plain, 1e-9):5.1f} times the enclosure",
         flush=True,
     )
     return bool(wrong)
+
+
+def _motion(top: ht.HeavyTop, start: ht.State, case: Case, random: Random) -> dict[str, Any]:
+    """Whether a difference or a law fails, or the derivatives are refused; the widest radius; seconds."""
+    at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 100)
+    try:
+        began = time.process_time()
+        known(top, start, case.system).state(at, BITS)
+        plain = time.process_time() - began
+        motion = known(top, start, case.system)
+        began = time.process_time()
+        of(motion, at)
+        derived = time.process_time() - began
+        found = of(motion, at, data=True)
+    except HeavyTopError:
+        return {"wrong": False, "refused": True, "radius": 0.0, "plain": 0.0, "derived": 0.0}
+    size = max(1, *(abs(v).upper().__float__() for row in found.start + found.data for v in row))
+    held = [holds(values, Fraction(size) ** 6 / 10**20) for values in laws(motion, at, found).values()]
+    for matrix, datum in ((found.start, False), (found.data, True)):
+        column = random.randrange(6)
+        values = difference(motion, at, column, datum=datum)
+        with working_precision(400):
+            pairs = zip(matrix, values, strict=True)
+            held.append(holds([row[column] - value for row, value in pairs], Fraction(size) / 10**20))
+    widest = max(largest_radius(found.start), largest_radius(found.data))
+    seconds = {"plain": plain, "derived": derived}
+    return {"wrong": not all(held), "refused": False, "radius": float(widest), **seconds}
 
 
 if __name__ == "__main__":

@@ -220,3 +220,28 @@ def test_files_of_a_case_name_it(command: str, tmp_path: Path) -> None:
     assert "\n# name: kovalevskaya\n" in files[0].read_text("utf-8")
     assert "\\caption{name kovalevskaya; " in files[1].read_text("utf-8")
     assert read(files[0]).name == "kovalevskaya"
+
+
+def _from(command: str, *attitude: str) -> dict:
+    options = [part for name, value in DATA.items() if name != "gamma" for part in (f"--{name}", value)]
+    done = in_process.heavytop(command, *options, *attitude, "--show", "matrix", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("command", ["propagate", "reference"])
+def test_axis_and_angle_are_an_attitude_of_both_commands(command: str) -> None:
+    """Of an axis of any length, in radians and in degrees."""
+    turned = _from(command, "--axis-angle", "0,0,3:1/20")
+    beside = _from(command, "--euler", "ZXZ:1/20,0,0")
+    assert (turned["states"], turned["matrix"]) == (beside["states"], beside["matrix"])
+    right = _from(command, "--axis-angle", "0,1,0:90deg")
+    assert right["states"] == _from(command, "--matrix", "0,0,1,0,1,0,-1,0,0")["states"]
+    assert "not an axis and an angle" in refused_without_gamma(command, "--axis-angle", "0,0,3")
+
+
+def refused_without_gamma(command: str, *more: str) -> str:
+    options = [part for name, value in DATA.items() if name != "gamma" for part in (f"--{name}", value)]
+    with pytest.raises(InputError) as error:
+        CliRunner().invoke(app, [command, *options, *more], catch_exceptions=False)
+    return str(error.value)

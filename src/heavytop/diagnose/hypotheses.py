@@ -516,6 +516,7 @@ _EXACTLY = 1e-9
 _MOST_STEPS = 300
 """In an interval between samples, of which one too many or too few is recognised: further ones are too near to 1."""
 _UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
+_FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
 
@@ -523,8 +524,9 @@ _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 class TimesHypothesis:
     """What the times may be.
 
-    kind: time_reversed, start_row_missing, rows_off_by_one, rows_reversed, times_shifted (by ``shift``: the state said
-    to be at t is that of t + shift), or time_unit (the state said to be at t is that of factor·t).
+    kind: time_reversed, start_row_missing, rows_off_by_one (early), rows_late, rows_reversed, times_shifted (by
+    ``shift``: the state said to be at t is that of t + shift), or time_unit (the state said to be at t is that of
+    factor·t).
     fitted: whether the number was fitted, and not one that units differ by.
     """
 
@@ -536,24 +538,39 @@ class TimesHypothesis:
 
 def clock(given: Examined) -> tuple[TimesHypothesis, float] | None:
     """The simplest of the suppositions about the times that are about as good as the best, and its error."""
-    found = [(each, given.error(given.supposed(times))) for each, times in _without_numbers(given) if len(times)]
+    found = [(each, at.error(at.supposed(times))) for each, at, times in _without_numbers(given) if len(times)]
     if len(given.rows) >= 3:
         found += _fitted(given)
     best = min((error for _, error in found), default=0.0)
     return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
 
 
-def _without_numbers(given: Examined) -> Iterator[tuple[TimesHypothesis, list[Fraction]]]:
+def _without_numbers(given: Examined) -> Iterator[tuple[TimesHypothesis, Examined, list[Fraction]]]:
+    """Each supposition, the samples that it is tried on and their times."""
     every = given.all_times
-    yield TimesHypothesis("time_reversed"), [-time for time in given.times]
+    yield TimesHypothesis("time_reversed"), given, [-time for time in given.times]
     if len(every) > 1:
-        yield TimesHypothesis("start_row_missing"), [every[row - 1] if row else Fraction(0) for row in given.rows]
-        yield TimesHypothesis("rows_reversed"), [every[-1 - row] for row in given.rows]
-        later = [*every[1:], 2 * every[-1] - every[-2]]
-        yield TimesHypothesis("rows_off_by_one"), [later[row] for row in given.rows]
+        before = [every[row - 1] if row else Fraction(0) for row in given.rows]
+        yield TimesHypothesis("start_row_missing"), given, before
+        yield TimesHypothesis("rows_reversed"), given, [every[-1 - row] for row in given.rows]
+        yield _neighbours(given, "rows_off_by_one", 1, 2 * every[-1] - every[-2])
+        yield _neighbours(given, "rows_late", -1, 2 * every[0] - every[1])
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * given.times[-1])) * given.rate <= FARTHEST:
-            yield TimesHypothesis("time_unit", factor=float(factor)), [factor * time for time in given.times]
+            yield TimesHypothesis("time_unit", factor=float(factor)), given, [factor * time for time in given.times]
+
+
+def _neighbours(
+    given: Examined, kind: str, off: int, beyond: Fraction
+) -> tuple[TimesHypothesis, Examined, list[Fraction]]:
+    """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
+    left: else it is that at ``beyond``.
+    """
+    inside = range(len(given.all_times))
+    rows = [row for row in given.rows if row + off in inside]
+    at = given.at(rows) if len(rows) >= _FEWEST_ROWS else given
+    times = [given.all_times[row + off] if row + off in inside else beyond for row in at.rows]
+    return TimesHypothesis(kind), at, times
 
 
 def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:

@@ -28,7 +28,6 @@ from heavytop.precision import (
     rounded,
 )
 from heavytop.top.attitude import (
-    InSpace,
     Output,
     euler_terms,
     first_sign,
@@ -345,6 +344,50 @@ class Place:
         """Raises ValueError unless one step from here covers the last sample: else the two are not of one run."""
         if steps != self.steps + 1:
             raise ValueError(f"{steps - self.steps} steps from a place to its sample")
+
+
+class InSpace:
+    """A motion whose attitude is seen in space: arrays in double, one entry a sample.
+
+    Each raises InputError for a motion without attitude.
+    """
+
+    __slots__ = ()
+
+    def _in_double(self, what: Output) -> NDArray[np.float64]:
+        raise NotImplementedError
+
+    def quaternions(self) -> NDArray[np.float64]:
+        """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
+
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
+        """
+        return self._in_double(output("quaternion"))
+
+    def matrices(self) -> NDArray[np.float64]:
+        """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ."""
+        return self._in_double(output("matrix"))
+
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
+
+        point: three exact numbers in body axes; None for the centre of mass.
+        pivot: where the fixed point stands in space; None for the origin.
+        """
+        return self._in_double(output("position", point, pivot))
+
+    def omega_space(self) -> NDArray[np.float64]:
+        """R Ω, the angular velocity in space axes, shape (n, 3)."""
+        return self._in_double(output("omega-space"))
+
+    def euler(self, sequence: str) -> NDArray[np.float64]:
+        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
+
+        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
+        lock, where they are not defined: of a computed motion b within 16 eps of an end of its interval.
+        Raises InputError for an unknown sequence too.
+        """
+        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

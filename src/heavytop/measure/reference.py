@@ -28,11 +28,12 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.exact.solution import ExactSolution
+from heavytop.integrate.trajectory import InSpace
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.measure.motion import motion_texts, xi_texts
 from heavytop.precision import Vector, decimal_text, dot, exact, shown, vector
-from heavytop.top.attitude import InSpace, Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
+from heavytop.top.attitude import Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, TimeText

@@ -154,6 +154,7 @@ _SENTENCES = {
     "time_reversed": "The states are those of the times with the other sign",
     "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
     "rows_off_by_one": "Each state is that of the next time: the states are one row early",
+    "rows_late": "Each state is that of the time before: the states are one row late",
     "kinematic_sign": "The states solve γ' = Ω × γ: the equation of γ has the other sign",
     "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r: the product of M and Ω has the other sign",
     "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",

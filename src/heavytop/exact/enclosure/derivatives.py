@@ -18,110 +18,185 @@ chosen so that the digits come out: it is raised by what was lacking, up to six 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import exp, inf
-from typing import TypeAlias
+from math import exp, inf, lcm
+from typing import Protocol, TypeAlias
 
 import numpy as np
-from flint import arb, fmpz
+from flint import arb, fmpz, fmpz_mat
 from gmpy2 import mpq, mpz
 
-from heavytop.errors import OutOfReach
+from heavytop.errors import Contradiction, OutOfReach
 from heavytop.exact.enclosure.run import ScaledMotion, Validated, own_parameters, seconds_a_step
 from heavytop.exact.enclosure.step import (
-    CAP,
     Matrix,
     Node,
     Quadratic,
     Step,
     StepSeries,
-    defect_bound,
+    Whole,
+    falling,
     horner,
+    lacking,
     norm,
     quadratic,
     start_node,
     step,
-    taylor_series,
 )
 from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, Total
+from heavytop.multiword.codegen.recurrence import Coefficients, coefficients_of
+from heavytop.multiword.codegen.recurrence import rates as lane_rates
+from heavytop.multiword.fixed_point.arithmetic import Grid
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, WordSeries
+from heavytop.multiword.fixed_point.first_variation import CertifiedColumns
+from heavytop.multiword.fixed_point.fixed_point_run import excess
+from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients
 from heavytop.precision import decimal_text
 from heavytop.top.equations import Parameters, System
 
 # One proven step of the derivatives: what the state at its end is to the state, and to the data, it began with.
 #
-# A step of :mod:`heavytop.exact.enclosure.step` goes over 0 ≤ τ ≤ 1 with y' = h f(y), f = Q(y, y) + L y.  φ is its flow
-# from the centre c, Φ = Dφ its fundamental matrix, and σ the derivative with respect to a datum θ that enters f,
+# A step of :mod:`heavytop.exact.enclosure.step` goes over 0 ≤ τ ≤ 1 with y' = h f(y), f = Q(y, y) + L y.  Φ is its
+# fundamental matrix and σ the derivative with respect to a datum θ that enters f, along the motion itself,
 #
 #     Φ' = h Df(y) Φ, Φ(0) = 1,     σ' = h Df(y) σ + h G(y), σ(0) = 0,     G = ∂f/∂θ, again of degree two.
 #
-# *Difference quotients over one step.*  Column j of Φ is (φ(c + δ e_j) − φ(c))/δ, both ends from Taylor polynomials in
-# 2^-precision, δ = 2^-shift.  Over a single step a second derivative is small and proven so, whatever the motion does
-# later: nothing of the quotient's error grows with time but by Φ itself.  So the machine code that computes the motion
-# computes its derivatives too.  For θ the field is f + δ G̃, G̃ = (f(θ + δ) − f(θ))/δ, exactly.
+# Their columns are computed along the polynomial p = Σ b_n τⁿ of the step, as polynomials v = Σ v_n τⁿ of its order N
+# or, where that leaves too much, of a larger one: in words
+# (:mod:`heavytop.multiword.fixed_point.first_variation`) or in exact integers, where the columns and the motion are one
+# field of degree two.  What v lacks is its defect E = v' − h Df(p) v − h G(p).  Below N it is what rounding left, ρ_n;
+# from N on it is known.  With β_n = |b_n|, ν_n = |v_n| and |G(y)| ≤ q_G |y|² + l_G |y|, the integral of |E| is at most
 #
-# *Theorem.*  Every motion that starts within max(δ, |w0|) of c is within C of the polynomial Σ b_n τⁿ of c, so that
-# R = Σ |b_n| + C bounds it, and Λ = h (2q (Σ |b_n|/(n + 1) + C) + l) the integral of |h Df| along it.  The end of each
-# polynomial is within E = D e^Λ of its motion (D: its defect, as in the enclosure).  |D²φ| ≤ M = 2 h q e^Λ B², where
-# B = Σ |V̂_n| + |V − V̂| + e^Λ 2 h q C (Σ |V̂_n| + |V − V̂|) bounds |Φ|.  So for any start y(0) = c + w, |w| ≤ |w0|,
+#     Δ = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (2q Σ_{j+k=n} β_j ν_k + l ν_n + q_G Σ_{j+k=n} β_j β_k + l_G β_n)/(n + 1).      (a)
 #
-#     |Φ e_j − quotient| ≤ M (δ/2 + |w0|) + (E_j + E_0)/δ.                                                          (a)
+# *Theorem.*  A motion y of the step stays within W of p (integers go on with the b_n until the columns are small too: W
+# is larger by the sum of those), so that R = Σ β_n + W bounds both, and Λ = h (2q (Σ β_n/(n + 1) + W) + l) the integral
+# of |h Df(y)|.  For the column u along y that v stands for,
 #
-# Let g = q_G R² + l_G R bound |G̃| and Λ' be Λ with q + δ q_G and l + δ l_G.  Then |σ| ≤ s = e^Λ' h g, its derivative
-# with respect to the datum is at most M' = e^Λ' h (2 (2 q_G R + l_G) s + 2 (q + δ q_G) s²), that with respect to the
-# start M'' = e^(2Λ') h (2 q_G R + l_G + 2q s), and
+#     |u − v| ≤ e^Λ (Δ + h W (2q Σ ν_n + 2 q_G R + l_G)),                                                           (b)
 #
-#     |σ − quotient| ≤ M' δ/2 + M'' |w0| + (E_j + E_0)/δ + e^Λ' h |G − G̃|.                                           (b)
-#
-# Proof: the equations of first and second variation, v' = h Df v, S' = h Df S + h D²f(v, v) with |D²f(a, b)| ≤ 2q
-# |a||b|, and with h DG v beside h D²f where θ varies; Gronwall; Taylor's formula with the second derivative as
-# remainder.
+# without q_G and l_G for a column of Φ.  Proof: (u − v)' = h Df(y) (u − v) + h (Df(y) − Df(p)) v + h (G(y) − G(p)) − E;
+# Df and G are of degree one and two, |Df(y) − Df(p)| ≤ 2q W and |G(y) − G(p)| ≤ (2 q_G R + l_G) W; Gronwall.  The same
+# without E, for all columns at once: |Φ − V| ≤ e^Λ 2 h q W (Σ |V̂_n| + |V − V̂|), V the fundamental matrix along p.
 
 
-TINY = 2.0**-190
 _LARGEST_GROWTH = 16.0
 
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """A datum θ of the field, in a unit of its own, and the field with θ + δ.
-
-    field: f + δ G̃.  certified: of its Taylor coefficients, as for a step.  quotient: (q, l) of G̃.  off: (q, l) of
-    G − G̃, in ulps of the derivatives.
-    """
+    """A datum θ of the field.  field: G, for a unit of θ in which it is of ordinary size; unit: that, as given."""
 
     field: Quadratic
-    certified: CertifiedSeries | None
-    quotient: tuple[float, float]
-    off: tuple[float, float]
+    unit: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """The motion and its columns as one field of degree two."""
+
+    pairs: tuple[tuple[int, int], ...]
+    rows: tuple[QuadraticComponent, ...]
+
+    @classmethod
+    def of(cls, field: Quadratic, data: Sequence[Quadratic]) -> Together:
+        """y, then a column of Φ for each component of y, then one of σ for each of the data."""
+        size, places = field.dimension, {pair: k for k, pair in enumerate(field.pairs)}
+        rows = [*field.rows]
+        for number, slope in enumerate([None] * size + [*data], 1):
+            for i, row in enumerate(field.rows):
+                common = lcm(row.denominator, slope.rows[i].denominator if slope else 1)
+                factor, off = common // row.denominator, size * number
+                both = [(c * factor, *field.pairs[pair]) for c, pair in row.products]
+                products = [(c, at) for c, j, k in both for at in ((j, off + k), (k, off + j))]
+                linear = [(c * factor, off + j) for c, j in row.linear]
+                if slope:
+                    factor = common // slope.rows[i].denominator
+                    products += [(c * factor, slope.pairs[pair]) for c, pair in slope.rows[i].products]
+                    linear += [(c * factor, j) for c, j in slope.rows[i].linear]
+                numbered = tuple((c, places.setdefault(at, len(places))) for c, at in products)
+                rows.append(QuadraticComponent(common, numbered, tuple(linear)))
+        return cls(tuple(places), tuple(rows))
 
 
 @dataclass(frozen=True, slots=True)
 class Tangent:
-    """What derivatives are computed with: ``field`` is f, δ = 2^-shift, on a grid of ``precision`` bits."""
+    """What derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
+
+    certified, columns: Taylor coefficients of the motion, and of its derivatives, in words; None in integers.
+    """
 
     field: Quadratic
-    certified: CertifiedSeries | None
     precision: int
-    shift: int
+    together: Together
+    certified: CertifiedSeries | None
+    columns: CertifiedColumns | None
     data: tuple[Datum, ...] = ()
 
     @property
-    def bits(self) -> int:
-        """Those of an ulp of the derivatives: an ulp of the motion over δ."""
-        return self.precision - self.shift
+    def width(self) -> int:
+        """The columns of Φ and of σ together."""
+        return self.field.dimension + len(self.data)
+
+
+class Columns(Protocol):
+    """Columns as polynomials, in whole ulps: in words, or made of exact integers."""
 
     @property
-    def columns(self) -> int:
-        """Those of Φ and of σ together."""
-        return self.field.dimension + len(self.data)
+    def total(self) -> list[list[int]]:
+        """Σ v_n, the components of each column."""
+
+    @property
+    def values(self) -> list[list[list[int]]] | None:
+        """Every v_n, where they were asked for."""
+
+    @property
+    def sizes(self) -> Matrix:
+        """Upper bounds of |v_n|, shape (columns, N + 1)."""
+
+    @property
+    def rounding(self) -> tuple[float, float]:
+        """Upper bounds of Σ_(n < N) ρ_n in ulps, of the columns of Φ and of those of σ."""
+
+    def scaled(self, rate: int) -> Matrix:
+        """Upper bounds of 2^(rate n) |v_n|."""
+
+
+@dataclass(frozen=True)
+class _WholeColumns:
+    """Columns in exact integers, each rounded once.
+
+    motion: the polynomial that they were computed along, of their own order.  beyond: Σ |b_n| in ulps of the orders
+    that it has more than the step.
+    """
+
+    values: list[list[list[int]]]
+    precision: int
+    motion: Whole
+    beyond: float
+
+    @property
+    def total(self) -> list[list[int]]:
+        return [[*Whole(column, self.precision).total] for column in self.values]
+
+    @property
+    def sizes(self) -> Matrix:
+        return np.array([Whole(column, self.precision).sizes for column in self.values])
+
+    @property
+    def rounding(self) -> tuple[float, float]:
+        half = (len(self.values[0][0]) - 1) / 2
+        return half, half
+
+    def scaled(self, rate: int) -> Matrix:
+        return np.array([Whole(column, self.precision).scaled(rate) for column in self.values])
 
 
 @dataclass(frozen=True, slots=True)
 class StepDerivatives:
-    """(Φ, σ) at τ: ``rows[i][column]`` in ulps of 2^-bits, within ``errors[column]`` ulps.
+    """(Φ, σ) at τ: ``rows[i][column]`` in ulps, within ``errors[column]`` ulps.
 
     moved: a bound of |Φ − V| as an operator, V the fundamental matrix along the step's own polynomial.
     """
@@ -132,136 +207,94 @@ class StepDerivatives:
 
 
 def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivatives | None:
-    """(Φ, σ) of ``step`` at 0 < τ ≤ 1, a column at a time; None where the bounds of the theorem are not finite."""
-    bounds = _Bounds.of(tangent, step)
-    if bounds is None:
+    """(Φ, σ) of ``step`` at 0 < τ ≤ 1; None where there are none, or the bounds of the theorem are not finite."""
+    found = _columns(tangent, step, tau != 1)
+    if found is None:
         return None
-    centre = step.node.centre
-    origin, columns, errors = _end(step.series, tau), [], []
-    for j in range(tangent.field.dimension):
-        series = taylor_series(
-            tangent.field, _centred(step, _beside(centre, j, 1 << tangent.bits)), tangent.precision, tangent.certified
-        )
-        error = bounds.end_error(tangent.field, series)
-        if series is None or error is None:
-            return None
-        columns.append(_end(series, tau))
-        errors.append(error + bounds.own_error + bounds.of_start + _rounding(step, series, tau))
-    for datum in tangent.data:
-        series = taylor_series(datum.field, _centred(step, centre), tangent.precision, datum.certified)
-        error, of_datum = bounds.end_error(datum.field, series), bounds.of_datum(datum)
-        if series is None or error is None or not of_datum < inf:
-            return None
-        columns.append(_end(series, tau))
-        errors.append(error + bounds.own_error + of_datum + _rounding(step, series, tau))
-    rows = [
-        [value - start for value in values] for start, values in zip(origin, zip(*columns, strict=True), strict=True)
-    ]
-    return StepDerivatives(rows, [error * _UP for error in errors], bounds.moved)
+    errors = _errors(tangent, step, found)
+    if errors is None:
+        return None
+    of_phi, of_sigma, moved = errors
+    rounding, ends = 0.0, found.total
+    if found.values is not None:
+        rounding = len(found.values[0][0]) / 2 + 1
+        ends = [[horner(component, tau) for component in column] for column in found.values]
+    size = tangent.field.dimension
+    bounds = [(of_phi if k < size else of_sigma) + rounding for k in range(tangent.width)]
+    return StepDerivatives([list(row) for row in zip(*ends, strict=True)], bounds, moved)
 
 
-def _beside(centre: Sequence[int], component: int, by: int) -> Sequence[int]:
-    """The centre with ``by`` ulps added to a component."""
-    if isinstance(centre, Total):
-        return centre.beside(component, by)
-    return [value + by * (k == component) for k, value in enumerate(centre)]
+def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
+    """The columns beside a step, with all their coefficients where these are asked for."""
+    if isinstance(step.series, WordSeries):
+        words = tangent.columns
+        return None if words is None else words.columns(step.node.centre, step.node.halvings, values)
+    size, one = tangent.field.dimension, 1 << tangent.precision
+    unit = [one * (i == j) for j in range(tangent.width) for i in range(size)]
+    start = [*map(int, step.node.centre), *unit]
+    found = coefficients(tangent.together, start, tangent.precision, step.node.halvings)
+    if found is None:
+        return None
+    own, after = found[:size], found[size:]
+    beyond = sum(max(map(abs, together)) for together in [*zip(*own, strict=True)][step.order + 1 :])
+    columns = [after[k : k + size] for k in range(0, len(after), size)]
+    return _WholeColumns(columns, tangent.precision, Whole(own, tangent.precision), float(beyond) * _UP)
 
 
-def _centred(step: Step, centre: Sequence[int]) -> Node:
-    """The node of ``step``, with another centre and the step's own length."""
-    return replace(step.node, centre=centre)
+def _along(step: Step, columns: Columns) -> tuple[StepSeries, float]:
+    """The polynomial that columns were computed along, and how far it is from that of the step, in ulps."""
+    return (columns.motion, columns.beyond) if isinstance(columns, _WholeColumns) else (step.series, 0.0)
 
 
-def _end(series: StepSeries, tau: Fraction) -> Sequence[mpz]:
-    """The polynomials at τ, in ulps."""
-    return list(series.total) if tau == 1 else [horner(component, tau) for component in series.values]
+def _errors(tangent: Tangent, step: Step, columns: Columns) -> tuple[float, float, float] | None:
+    """(b) for Φ and for σ in ulps, and the bound of |Φ − V|; None where they are not finite."""
+    h, q, slope = 2.0**-step.node.halvings, float(tangent.field.q) * _UP, float(tangent.field.l) * _UP
+    series, beyond = _along(step, columns)
+    beta, size = series.sizes, tangent.field.dimension
+    wide = (step.widest + _ldexp(beyond, -tangent.precision)) * _UP
+    mean = (float(beta @ (1 / np.arange(1.0, len(beta) + 1))) + wide) * _UP
+    growth = h * (2 * q * mean + slope) * _UP
+    if not growth < _LARGEST_GROWTH:
+        return None
+    factor, reach = exp(growth) * _UP, (float(beta.sum()) + wide) * _UP
+    widest = (_ldexp(step.widest_ulps, step.node.errors.exponent) + beyond) * _UP
+    sums = np.add.reduce(columns.sizes, 1)
+    off = h * widest * 2 * q * float(sums[:size].max()) * _UP
+    of_phi = factor * (_defect(tangent, step, columns, h) + off) * _UP
+    moved = factor * 2 * h * q * _ldexp(widest, -tangent.precision) * (step.powers + step.summed_error) * _UP
+    of_sigma = 0.0
+    if tangent.data:
+        gq, gl = (max(float(value) for value in bounds) * _UP for bounds in zip(*_slopes(tangent), strict=True))
+        off = h * widest * (2 * q * float(sums[size:].max()) + 2 * gq * reach + gl) * _UP
+        of_sigma = factor * (_defect(tangent, step, columns, h, (gq, gl)) + off) * _UP
+    found = (of_phi * _UP, of_sigma * _UP, moved * _UP)
+    return found if all(value < inf for value in found) else None
 
 
-def _rounding(step: Step, series: StepSeries, tau: Fraction) -> float:
-    """Of the two sums of a quotient, in ulps: they are exact at τ = 1."""
-    return 0.0 if tau == 1 else (step.order + series.order) / 2 + 1
+def _slopes(tangent: Tangent) -> list[tuple[Fraction, Fraction]]:
+    return [(datum.field.q, datum.field.l) for datum in tangent.data]
 
 
-@dataclass(frozen=True, slots=True)
-class _Bounds:
-    """The numbers of the theorem for one step; errors in ulps of the motion, which are those of the derivatives.
+def _defect(
+    tangent: Tangent, step: Step, columns: Columns, h: float, slopes: tuple[float, float] | None = None
+) -> float:
+    """Δ of (a) in ulps, of any column of Φ, or of any of σ where ``slopes`` are (q_G, l_G).
 
-    reach: R.  mean: Σ |b_n|/(n + 1) + C.  widest: C of the motions of Φ.  away_ulps: |w0| in ulps of the derivatives.
-    own_error: E_0.  of_start: M (δ/2 + |w0|).
+    β_n and ν_n are multiplied by 2^(rate n), so that binary64 holds them at any precision.
     """
-
-    tangent: Tangent
-    length: float
-    reach: float
-    mean: float
-    widest: float
-    away_ulps: float
-    own_error: float
-    of_start: float
-    moved: float
-
-    @classmethod
-    def of(cls, tangent: Tangent, step: Step) -> _Bounds | None:
-        """None where the theorem does not apply."""
-        field, precision = tangent.field, tangent.precision
-        h, q, slope = 2.0**-step.node.halvings, float(field.q) * _UP, float(field.l) * _UP
-        away = _ldexp(float(step.node.errors.sizes().max()), step.node.errors.exponent - precision)
-        reach, mean = (float(step.series.sizes.sum()) + CAP) * _UP, _mean(step.series)
-        growth = h * (2 * q * mean + slope) * _UP
-        if not growth < _LARGEST_GROWTH:
-            return None
-        factor = exp(growth) * _UP
-        # every motion within max(δ, |w0|) of the centre stays so near to the polynomial
-        widest = (step.widest + _ldexp(1.0, -tangent.shift) * factor) * _UP
-        if not widest < CAP:
-            return None
-        own = (defect_bound(step.series, precision, h * q, h * slope) + TINY) * factor * _UP
-        first = (step.powers + step.summed_error) * (1 + 2 * h * q * widest * factor) * _UP
-        second = 2 * h * q * factor * first**2 * _UP
-        away_ulps = _ldexp(float(step.node.errors.sizes().max()), step.node.errors.exponent - tangent.shift)
-        of_start = second * (_ldexp(0.5, tangent.bits - tangent.shift) + away_ulps) * _UP
-        moved = second * (away + _ldexp(own, -precision)) * _UP
-        if not of_start < inf:
-            return None
-        return cls(tangent, h, reach, mean, widest, away_ulps, own, of_start, moved)
-
-    def end_error(self, field: Quadratic, series: StepSeries | None) -> float | None:
-        """E of the polynomial that another motion of the step has, in ulps; None where it is too large."""
-        if series is None:
-            return None
-        h, q, slope = self.length, float(field.q) * _UP, float(field.l) * _UP
-        growth = h * (2 * q * _mean(series) + slope) * _UP
-        if not growth < _LARGEST_GROWTH:
-            return None
-        precision = self.tangent.precision
-        found = (defect_bound(series, precision, h * q, h * slope) + TINY) * exp(growth) * _UP
-        return found if _ldexp(found, -precision) < CAP else None
-
-    def of_datum(self, datum: Datum) -> float:
-        """What (b) adds to the errors of the two ends, in ulps of the derivatives; infinite where it does not apply."""
-        tangent, h, reach = self.tangent, self.length, self.reach
-        delta = _ldexp(1.0, -tangent.shift)
-        (gq, gl), (oq, ol) = datum.quotient, datum.off
-        q, slope = float(tangent.field.q) * _UP + delta * gq, float(tangent.field.l) * _UP + delta * gl
-        growth = h * (2 * q * self.mean + slope) * _UP
-        if not growth < _LARGEST_GROWTH:
-            return inf
-        factor = exp(growth) * _UP
-        size = factor * h * (gq * reach + gl) * reach * _UP
-        turning = 2 * gq * reach + gl
-        if not self.widest + delta * size < CAP:
-            return inf
-        by_datum = factor * h * (2 * turning * size + 2 * q * size**2) * _UP
-        by_start = factor**2 * h * (turning + 2 * q * size) * _UP
-        off = factor * h * (oq * reach + ol) * reach * _UP
-        by_both = by_datum * _ldexp(0.5, tangent.bits - tangent.shift) + by_start * self.away_ulps
-        return (by_both + off) * _UP
-
-
-def _mean(series: StepSeries) -> float:
-    """Σ |b_n|/(n + 1) + C, which bounds the integral of |y| over the step."""
-    sizes = series.sizes
-    return (float(sizes @ (1 / np.arange(1.0, len(sizes) + 1))) + CAP) * _UP
+    size, order, precision = tangent.field.dimension, columns.sizes.shape[1] - 1, tangent.precision
+    rate = precision // order
+    beta, sizes = _along(step, columns)[0].scaled(rate), columns.scaled(rate)
+    beta = np.concatenate([beta, np.zeros(order + 1 - len(beta))])
+    nu = (sizes[:size] if slopes is None else sizes[size:]).max(axis=0)
+    rates = 2 * float(tangent.field.q) * np.convolve(beta, nu)[order:]
+    last = float(tangent.field.l) * float(nu[-1])
+    if slopes is not None:
+        rates = rates + slopes[0] * np.convolve(beta, beta)[order:]
+        last += slopes[1] * float(beta[-1])
+    # n ≥ N in the denominators
+    beyond = h * (float(rates @ falling(rate, order)) + last) / (order + 1) * _UP
+    return (columns.rounding[slopes is not None] + _ldexp(beyond, precision - rate * order)) * _UP
 
 
 def _ldexp(value: float, exponent: int) -> float:
@@ -337,26 +370,10 @@ def moved(p: Parameters, datum: int, by: Dual | Exact) -> Parameters:
     return p._replace(inertia=tuple(numbers[:3]), moment=tuple(numbers[3:]))
 
 
-def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction) -> Quadratic:
-    """(f(θ + by) − f(θ))/over for one of :data:`DATA`."""
-    varied = moved(p, datum, by)
-
-    def field(y: tuple[mpq, ...]) -> list[mpq]:
-        pairs = zip(system.field(varied, y), system.field(p, y), strict=True)
-        return [(a - b) / over for a, b in pairs]
-
-    return quadratic(field, 6)
-
-
-def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction, factor: Fraction) -> Quadratic:
-    """``factor`` ∂f/∂θ − (f(θ + by) − f(θ))/over: what a quotient lacks."""
-    varied, slope = moved(p, datum, by), moved(p, datum, Dual(mpq(0), factor))
-
-    def field(y: tuple[mpq, ...]) -> list[mpq]:
-        rates = zip(system.field(varied, y), system.field(p, y), system.field(slope, y), strict=True)
-        return [Dual.of(exact).slope - (a - b) / over for a, b, exact in rates]
-
-    return quadratic(field, 6)
+def slope(system: System, p: Parameters, datum: int, unit: mpq) -> Callable[[Sequence[mpq]], list[mpq]]:
+    """``unit`` ∂f/∂θ for one of :data:`DATA`."""
+    varied = moved(p, datum, Dual(mpq(0), unit))
+    return lambda y: [mpq(Dual.of(rate).slope) for rate in system.field(varied, tuple(y))]
 
 
 METHOD = "validated: variational equation on the Taylor enclosure"
@@ -369,11 +386,11 @@ _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
 _OF_DATA = 8
 """Bits that S has fewer than J: a second run costs more than they do."""
-_COARSER = 4
-"""δ is 2^4 times the root of an ulp: the ends of a step are known less well than its second derivative is small."""
 _FEW = 4
 _SMALLER = 4
 _SHORTENED = 4
+_TINY = 2.0**-190
+_seen_right: set[tuple[Grid, str, bool]] = set()
 
 Balls = list[list[arb]]
 
@@ -435,13 +452,13 @@ def _one_way(
     loss, wanted = forecast, bits + _GUARD + _OF_DATA * data + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
         columns = 7 + 6 * data
-        planned = motion.precision(max(2 * wanted, wanted + loss), steps * columns)
+        planned = motion.precision(wanted + loss, steps * columns)
         if not steps * columns * seconds_a_step(*planned) < known.effort:
             break
         tangent = _tangent(known, motion, *planned, data)
         found, lacking = {}, 0
         for span, values in _run(tangent, motion, spans):
-            at = _in_units(known, motion, tangent, values) if values else None
+            at = _in_units(motion, tangent, values) if values else None
             lacking = bits - (
                 min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0
             )
@@ -459,52 +476,66 @@ def _one_way(
 
 
 def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: bool, data: bool) -> Tangent:
-    certified = motion.certified(precision) if in_words else None
-    tangent = Tangent(motion.field, certified, precision, precision // 2 - _COARSER)
-    if not data:
-        return tangent
-    return replace(tangent, data=tuple(_datum(known, motion, tangent, k) for k in range(len(DATA))))
+    found = [_datum(known, motion, k) for k in range(len(DATA))] if data else []
+    data_of = tuple(datum for datum, _ in found)
+    together = Together.of(motion.field, [datum.field for datum in data_of])
+    lanes = [given for _, given in found if given is not None]
+    certified = columns = None
+    if in_words and len(lanes) == len(found):
+        certified = motion.certified(precision)
+        columns = CertifiedColumns(certified, lanes)
+    tangent = Tangent(motion.field, precision, together, certified, columns, data_of)
+    _require_right(tangent, motion)
+    return tangent
 
 
-def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int) -> Datum:
-    """The field with one of the data larger by δ times :func:`unit_of`."""
-    given, size = known.parameters, unit_of(known, datum)
-    own = own_parameters(motion.scaled, given).mapped(mpq)
-    delta = mpq(1, 2**tangent.shift)
-    # the same change, in the units of the motion
-    unit = size if datum < 3 else size * motion.scaled.sizes[3] / motion.scaled.rate**2
-    varied = motion.with_parameters(moved(given, datum, size / 2**tangent.shift))
-    system = motion.scaled.system
-    direct = quotient(system, own, datum, delta * unit, delta)
-    off = difference(system, own, datum, delta * unit, delta, unit)
-    in_words = tangent.certified is not None and varied.in_words
-    certified = varied.certified(tangent.precision) if in_words else None
-    return Datum(varied.field, certified, _bounds(direct, 0), _bounds(off, tangent.bits))
+def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
+    """One of the data, and its G over the lanes of the motion; None where they do not compute it."""
+    scaled = motion.scaled
+    own, sign = own_parameters(scaled, known.parameters).mapped(mpq), 1 if motion.forwards else -1
+    largest = coefficients_of(scaled.system, slope(scaled.system, own, datum, mpq(1)), mpq(0)).largest
+    unit = Fraction(2) ** (excess(scaled) - _SMALLER)
+    if largest:
+        unit /= Fraction(2) ** (largest.numerator.bit_length() - largest.denominator.bit_length() + 1)
+    rates = slope(scaled.system, own, datum, mpq(unit))
+    lanes = coefficients_of(scaled.system, rates, mpq(0))
+    field = quadratic(lambda y: [sign * rate for rate in rates(y)], 6)
+    by_lanes = quadratic(lambda y: [sign * rate for rate in lane_rates(scaled.system, lanes, y)], 6)
+    given = unit if datum < 3 else unit * scaled.rate**2 / scaled.sizes[3]
+    return Datum(field, given), lanes if (field.pairs, field.rows) == (by_lanes.pairs, by_lanes.rows) else None
 
 
-def _bounds(field: Quadratic, bits: int) -> tuple[float, float]:
-    """Upper bounds of 2^bits q and 2^bits l."""
-    return float(field.q * 2**bits) * _UP + TINY, float(field.l * 2**bits) * _UP + TINY
-
-
-def unit_of(known: Validated, datum: int) -> Fraction:
-    """A power of two, about a sixteenth of what is varied: of I_i itself, or of the largest |n_i|.
-
-    By that much more the ends of a step are in error than its second derivative with respect to a datum is bounded.
-    """
-    given = known.parameters
-    size = given.inertia[datum] if datum < 3 else max(map(abs, given.moment))
-    if size == 0:  # no weight: that which would turn the body as fast as it turns
-        size = max(*(i * max(1, w * w) for i, w in zip(given.inertia, known.start.omega, strict=True)))
-    value = Fraction(size)
-    return Fraction(2) ** (value.numerator.bit_length() - value.denominator.bit_length() - _SMALLER)
+def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
+    """The first columns that machine code computes in this process are compared with exact integers."""
+    certified, columns = tangent.certified, tangent.columns
+    if certified is None or columns is None:
+        return
+    key = (certified.grid, motion.scaled.system.name, bool(tangent.data))
+    if key in _seen_right:
+        return
+    centre = [round(value * 2**tangent.precision) for value in motion.scaled.state]
+    for halvings in range(2, 64):
+        own, found = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
+        if own is None or found is None or found.values is None:
+            continue
+        after = [0] * (found.sizes.shape[1] - 1 - own.order)
+        values = [*(component + after for component in own.values), *(v for column in found.values for v in column)]
+        off = sum(lacking(tangent.together, Whole(values, tangent.precision), tangent.precision, halvings)[: own.order])
+        if off > Fraction(max(own.rounding, *found.rounding)):
+            raise Contradiction(
+                f"Machine code in {tangent.precision} bits gives derivatives that are further from the truth than they "
+                "can be.",
+                "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
+            )
+        _seen_right.add(key)
+        return
 
 
 def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
     """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
     node = start_node(motion.field, motion.scaled.state, tangent.precision)
     size = motion.field.dimension
-    columns = _Columns(unit_columns(size, tangent.bits, tangent.columns), np.zeros((size, tangent.columns)), 0)
+    columns = _Columns(unit_columns(size, tangent.precision, tangent.width), np.zeros((size, tangent.width)), 0)
     rest = [(span * motion.scaled.rate, span) for span in spans]
     while rest:
         found, own = _step(tangent, node)
@@ -525,44 +556,38 @@ def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Itera
 
 
 def _step(tangent: Tangent, node: Node) -> tuple[Step, StepDerivatives] | tuple[None, None]:
-    """The step from a node with its derivatives; shorter where they need it."""
-    for shorter in range(_SHORTENED):
-        trial = replace(node, halvings=node.halvings + shorter)
-        found = step(tangent.field, trial, tangent.precision, tangent.certified)
-        if found is None:
-            return None, None
-        own = step_derivatives(tangent, found, Fraction(1))
-        if own is not None:
-            return found, own
+    """The step from a node with its derivatives; shorter where they need it, in integers where words will not do."""
+    for certified in (tangent.certified, None) if tangent.certified else (None,):
+        for shorter in range(_SHORTENED):
+            trial = replace(node, halvings=node.halvings + shorter)
+            found = step(tangent.field, trial, tangent.precision, certified)
+            if found is None:
+                break
+            own = step_derivatives(tangent, found, Fraction(1))
+            if own is not None:
+                return found, own
     return None, None
 
 
 def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> list[list[mpz]]:
     """Φ (J, S) + (0, σ), each entry within half an ulp of that of the centres."""
-    size, bits = len(rows), tangent.bits
-    half = mpz(1) << (bits - 1)
-    columns = list(zip(*rows, strict=True))
-    found = []
-    for row in own.rows:
-        phi = row[:size]
-        line = [(sum(map(_times, phi, column), half)) >> bits for column in columns]
-        for place, value in enumerate(row[size:], size):
-            line[place] += value
-        found.append(line)
-    return found
-
-
-def _times(a: mpz, b: mpz) -> mpz:
-    return mpz(a) * b
+    size, width, bits = len(rows), tangent.width, tangent.precision
+    phi = fmpz_mat(size, size, [int(value) for row in own.rows for value in row[:size]])
+    product = (phi * fmpz_mat(size, width, [int(value) for row in rows for value in row])).entries()
+    half = fmpz(1) << (bits - 1)
+    lines = [[mpz(int((value + half) >> bits)) for value in product[width * i : width * (i + 1)]] for i in range(size)]
+    for line, row in zip(lines, own.rows, strict=True):
+        line[size:] = [value + int(of) for value, of in zip(line[size:], row[size:], strict=True)]
+    return lines
 
 
 def _local(tangent: Tangent, own: StepDerivatives, columns: _Columns) -> Matrix:
     """Bounds of the errors that a step itself makes in each column, in ulps 2^exponent."""
     size = len(columns.rows)
     of_phi = max(own.errors[:size])
-    found = of_phi * columns.sizes(tangent.bits) + 1.0
+    found = of_phi * columns.sizes(tangent.precision) + 1.0
     found[size:] += own.errors[size:]
-    return np.asarray(np.ldexp(found * _UP, -columns.exponent) + TINY)
+    return np.asarray(np.ldexp(found * _UP, -columns.exponent) + _TINY)
 
 
 def _carried(
@@ -595,15 +620,15 @@ def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, 
 
 
 @whole_evaluation
-def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
+def _in_units(motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes
-    scales = [*sizes, *(unit_of(known, k) for k in range(tangent.columns - len(rows)))]
+    scales = [*sizes, *(datum.unit for datum in tangent.data)]
     limits = [[float(r) for r in row] for row in radii]
-    longest = max(max(abs(v) for v in row).bit_length() for row in rows)
+    longest = max(max(abs(int(v)) for v in row).bit_length() for row in rows)
     with working_precision(longest + 64):
-        unit, scale = arb(2) ** -tangent.bits, arb(2) ** exponent
+        unit, scale = arb(2) ** -tangent.precision, arb(2) ** exponent
         table = [
             [
                 arb(fmpz(int(value)) * unit, (arb(limit) * scale).upper() * unit) * ball(size / of)

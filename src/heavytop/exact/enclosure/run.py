@@ -51,7 +51,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
-from heavytop.multiword.codegen.recurrence import coefficients, rates
+from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
@@ -268,19 +268,7 @@ class ScaledMotion:
     @classmethod
     def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], forwards: bool) -> ScaledMotion:
         """The motion of (Ω, γ), or of (Ω, γ, ξ), from ``y``."""
-        return cls._in_units(Scaled.of(system, p, y, bounded=True), p, forwards)
-
-    def with_parameters(self, p: Parameters) -> ScaledMotion:
-        """Of the same state in the same units, another field's."""
-        scaled = self.scaled
-        given = coefficients(scaled.system, p, len(scaled.state) == 9)
-        unit, gamma = scaled.rate, scaled.sizes[3]
-        linear = given.with_linear(gamma / unit**2, 1 / unit)
-        return self._in_units(dataclasses.replace(scaled, coefficients=linear), p, self.forwards)
-
-    @classmethod
-    def _in_units(cls, scaled: Scaled, p: Parameters, forwards: bool) -> ScaledMotion:
-        system, size = scaled.system, len(scaled.state)
+        scaled, size = Scaled.of(system, p, y, bounded=True), len(y)
         own = own_parameters(scaled, p).mapped(mpq)
         sign = 1 if forwards else -1
         lanes = dataclasses.replace(  # quicker than Fractions, and as exact

@@ -50,7 +50,7 @@ from gmpy2 import mpq, mpz
 from numpy.typing import NDArray
 
 from heavytop.multiword.fixed_point.certified_series import CertifiedSeries
-from heavytop.multiword.integers.integer_series import QuadraticComponent, coefficients
+from heavytop.multiword.integers.integer_series import QuadraticComponent, QuadraticField, coefficients
 from heavytop.multiword.problem import variation as variation_of
 
 # A vector field of degree two, taken apart into exact numbers.
@@ -238,7 +238,7 @@ class Whole:
         return np.asarray(np.ldexp(np.array(short).T, shift - self.precision))
 
 
-def lacking(motion: Quadratic, series: StepSeries, precision: int, halvings: int) -> list[Fraction]:
+def lacking(motion: QuadraticField, series: StepSeries, precision: int, halvings: int) -> list[Fraction]:
     """|b_(n+1) − h f_n/(n + 1)| in the maximum norm, in ulps, for 0 ≤ n < N: exactly, from integers."""
     polynomials = [fmpz_poly([int(value) for value in component]) for component in series.values]
     products = [polynomials[j] * polynomials[k] for j, k in motion.pairs]
@@ -511,12 +511,12 @@ def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: f
     scaled = series.scaled(rate)
     products = np.convolve(scaled, scaled)[order:]
     # n ≥ N in the denominators
-    beyond = (quadratic * float(products @ _falling(rate, order)) + linear * float(scaled[-1])) / (order + 1)
+    beyond = (quadratic * float(products @ falling(rate, order)) + linear * float(scaled[-1])) / (order + 1)
     return (series.rounding + float(np.ldexp(beyond, precision - rate * order))) * _UP
 
 
 @lru_cache(maxsize=512)
-def _falling(rate: int, order: int) -> Matrix:
+def falling(rate: int, order: int) -> Matrix:
     """2^(−rate n) for n = 0 to ``order``."""
     return np.ldexp(1.0, np.maximum(-rate * np.arange(order + 1), -1000))
 

@@ -171,7 +171,15 @@ def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: P
         return (zero + highs + lows) * sizes, odd.any(axis=1)
     lows = lows * sizes
     odd |= (lows != 0) & ~(abs(lows) > _LEAST_LOW)
-    return _widening(precision)(0.0) + highs * sizes + lows, odd.any(axis=1)
+    return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd.any(axis=1)
+
+
+def _added(start: Any, arrays: Sequence[Any]) -> Any:
+    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
+    found = start + arrays[0]
+    for each in arrays[1:]:
+        found += each
+    return found
 
 
 def _reals(words: list[Doubles], grid: Grid, bits: int) -> Any:
@@ -186,8 +194,10 @@ def _reals(words: list[Doubles], grid: Grid, bits: int) -> Any:
     # a double has 53 bits: of a larger one none is lost behind what the others begin with
     least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
     if first > 0 and all(((abs(word) >= least) | (word == 0)).all() for word in words[first:]):
-        return sum(words[:first], zero) + sum(words[first:], zero)
-    total = sum(words, heyoka.real(0, _EVERY_BIT))
+        found = _added(zero, words[:first])
+        found += _added(zero, words[first:])
+        return found
+    total = _added(heyoka.real(0, _EVERY_BIT), words)
     rounded = [heyoka.real(value, bits) for value in total.ravel()]
     return numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
 
@@ -202,7 +212,9 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     each = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
         scale = numpy.array([heyoka.real(float(size)) for size in sizes])
-        return _reals(each, grid, precision.bits) * scale, numpy.zeros(len(words), bool)
+        found = _reals(each, grid, precision.bits)
+        found *= scale
+        return found, numpy.zeros(len(words), bool)
     # two words fill a quad, and what the others add to is added to them at once
     first, second, rest, *smaller = (word.astype(heyoka.real128) for word in each)
     odd = numpy.zeros(words.shape[::2], bool)
@@ -211,7 +223,10 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
         part = total - rest
         odd |= (rest - (total - part)) + (word - part) != 0
         rest = total
-    return (first + second + rest) * sizes.astype(heyoka.real128), odd.any(axis=1)
+    first += second
+    first += rest
+    first *= sizes.astype(heyoka.real128)
+    return first, odd.any(axis=1)
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:

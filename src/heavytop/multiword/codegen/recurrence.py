@@ -4,8 +4,8 @@ doubles above it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from typing import Any
@@ -131,30 +131,31 @@ class Coefficients:
 @lru_cache(maxsize=256)
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     """Those of the field, exactly, for exact parameters."""
-
     exactly = p.mapped(mpq)  # quicker than Fractions, and as exact
+    given = coefficients_of(system, lambda y: system.field(exactly, y), mpq(1, 2))
+    if not attitude:
+        return given
+    # ξ' = ξ × ω turns as γ does
+    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in given.vectors[0]]
+    return replace(given, vectors=(given.vectors[0], tuple(_eight(row) for row in third)))
+
+
+def coefficients_of(system: System, rates: Callable[[Sequence[Any]], Sequence[Any]], turning: mpq) -> Coefficients:
+    """Those of a field whose terms are some of those of ``system``, with A = ``turning`` in lanes 3 to 5."""
 
     def unit(*axes: int) -> list[Any]:
         return [mpq(int(axis in axes)) for axis in range(6)]
 
-    def rates(y: Sequence[Any]) -> Sequence[Any]:
-        return system.field(exactly, y)
-
-    half = mpq(1, 2)
     others = ((1, 2), (2, 0), (0, 1))
     at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
     products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
     permuted = [[mpq(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
-    rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
+    rows = [_eight(row) for row in ([*products, turning, turning, turning], *permuted)]
     torques = _TORQUES[system.name]
     sizes = [[abs(c) for row in part for c in row] for part in (rows[1 : 1 + torques], rows[1 + torques :])]
     largest = [max(part, default=Fraction(0)) for part in sizes]
-    if not attitude:
-        return Coefficients((tuple(rows),), torques, *largest)
-    # ξ' = ξ × ω turns as γ does
-    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in rows]
-    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)), torques, *largest)
+    return Coefficients((tuple(rows),), torques, *largest)
 
 
 def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:

@@ -322,7 +322,7 @@ def machine(words: int, vectors: int) -> Machine:
         for v in range(vectors):
             value = size = code.zero
             for k in reversed(range(words)):
-                y = _component(code, side[words * (1 + v) + k])
+                y = component(code, side[words * (1 + v) + k])
                 magnitude, place = code.absolute(y), 8 * (words * v + k)
                 code.store(code.add(code.load(added, place), magnitude), added, place)
                 value, size = code.add(value, y), code.add(size, magnitude)
@@ -335,7 +335,7 @@ def machine(words: int, vectors: int) -> Machine:
     return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 4])})
 
 
-def _component(code: Code, left: Value) -> Value:
-    """A word of y, exactly."""
+def component(code: Code, left: Value) -> Value:
+    """A word of y out of one of L, exactly."""
     half = code.shuffle(left, code.zero, _SECOND)
     return code.fma(half, code.constant(-0.5), code.shuffle(left, code.zero, _FIRST))

@@ -77,13 +77,7 @@ class Total(Sequence[int]):
     @cached_property
     def _values(self) -> list[int]:
         grid, places = self._carrier.grid, self._carrier.places
-        return list(_whole(self.words[places], grid))
-
-    def beside(self, component: int, by: int) -> Total:
-        """The same with ``by`` ulps added to a component."""
-        words, certified = self.words.copy(), self._carrier
-        words[certified.places[component]] = _words(self[component] + by, certified.grid)
-        return Total(words, certified)
+        return list(whole(self.words[places], grid))
 
     def __len__(self) -> int:
         return len(self._carrier.places)
@@ -142,7 +136,7 @@ class CertifiedSeries:
         self.vectors = 1 if len(problem.state) == 6 else 2
         self.machine = fixed_point_run.machine(grid, problem.system, self.vectors == 2, processor)
         self.extents = arithmetic.machine(grid.words, self.vectors).functions["extents"]
-        self.grid, self.sign = grid, 1.0 if forwards else -1.0
+        self.problem, self.grid, self.sign = problem, grid, 1.0 if forwards else -1.0
         self.excess = fixed_point_run.excess(problem)
         self.constants, self.inverses = (
             fixed_point_run.constants(problem, grid, self.excess),
@@ -150,7 +144,7 @@ class CertifiedSeries:
         )
         self._own = (problem, grid, forwards, processor)
         self._sources = 1 + len(turned(problem.system))
-        self._of_constants = self._error_of_constants()
+        self._of_constants = [self._error_of_constants(count * self._sources) for count in (1, 2)]
         self._exponents = grid.bits * numpy.arange(1, grid.words + 1)[:, None]
         self._threads = local()
         self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
@@ -162,12 +156,12 @@ class CertifiedSeries:
 
     def series(self, centre: Sequence[int], halvings: int) -> WordSeries | None:
         """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
-        orders = self._computed(centre, halvings)
+        orders = self.computed(centre, halvings)
         if orders < 0:
             return None
-        scratch, length = self._scratch(), orders + 1
+        scratch, length = self.scratch(), orders + 1
         self.extents(scratch.pointers[3], orders, *scratch.measures)
-        rounding = self._rounding(scratch.widest, scratch.added, orders, ldexp(1.0, self.excess - halvings))
+        rounding = self.bound(scratch.widest, scratch.added, orders, ldexp(1.0, self.excess - halvings))
         if rounding is None:
             return None
         size = 8 * self.vectors
@@ -177,26 +171,24 @@ class CertifiedSeries:
 
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
         """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
-        length, grid = self._computed(centre, halvings) + 1, self.grid
+        length, grid = self.computed(centre, halvings) + 1, self.grid
         table = (
-            self._scratch()
+            self.scratch()
             .rows[: size_of(grid, self.vectors).row * length]
             .reshape(length, 1 + self.vectors, grid.words, 8)
         )
-        # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2; what is taken out of it are the words of y, exactly
-        found = [table[:, 1, :, lane] for lane in (2, 0, 1)]
-        for left in (table[:, 1 + vector] for vector in range(self.vectors)):
-            middle = left[:, :, 5] / 2
-            found += [left[:, :, 4] - middle, middle, left[:, :, 3] - middle]
-        return [_whole(component, grid).tolist() for component in found]
+        found = components(table[:, 1])
+        if self.vectors == 2:
+            found += components(table[:, 2])[3:]
+        return [whole(component, grid).tolist() for component in found]
 
-    def _computed(self, centre: Sequence[int], halvings: int) -> int:
+    def computed(self, centre: Sequence[int], halvings: int) -> int:
         """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
         exponent = self.excess - halvings
         if not -self.grid.bits <= exponent < 64:
             return UNSETTLED
         factor, raises = raises_of(exponent)
-        scratch = self._scratch()
+        scratch = self.scratch()
         if isinstance(centre, Total):
             scratch.state[:] = centre.words
         else:
@@ -204,26 +196,28 @@ class CertifiedSeries:
         found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
         return int(found)
 
-    def _scratch(self) -> _Scratch:
+    def scratch(self) -> _Scratch:
         """This thread's."""
         if not hasattr(self._threads, "scratch"):
             self._threads.scratch = _Scratch(self)
         return cast("_Scratch", self._threads.scratch)
 
-    def _rounding(self, widest: Doubles, added: Doubles, orders: int, scale: float) -> float | None:
+    def bound(
+        self, widest: Doubles, added: Doubles, orders: int, scale: float, products: int = 1, fields: int = 1
+    ) -> float | None:
         """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold.
 
         widest: max_n |word k|, shape (1 + vectors, K, 8), of R and each L.  added: Σ_n |word k of y|, shape
-        (vectors, K, 8).
+        (vectors, K, 8).  products: of an order, times n + 1.  fields: how often the sources are those of the field.
         """
         grid = self.grid
         wide = numpy.ldexp(widest, self._exponents)
         left, right = numpy.maximum.reduce(wide[1:]), wide[0]
-        one, products = _levels(grid, right, left)
-        sums = products[: grid.words - 1] + 3 * one[: grid.words - 1]
+        one, levels = _levels(grid, right, left)
+        sums = levels[: grid.words - 1] + 3 * one[: grid.words - 1]
         # γ1 and γ3 are differences of L's
         state = (1.5 * numpy.maximum.reduce(left, 1)).tolist()
-        term, once = _error(grid, products, orders)
+        term, once = _error(grid, levels, products * orders)
         limits = (
             (float(sums.max()), 2.0**52 * _ROOM),
             (float(numpy.ldexp(added, self._exponents).max()), 2.0**52),
@@ -234,18 +228,18 @@ class CertifiedSeries:
         if not all(found <= limit for found, limit in limits):
             return None
         harmonic = 1 + log(max(1, orders))
-        alone = (2 * once + self._of_constants) * harmonic
-        return (scale * (2 * term * orders + alone) + harmonic / 2 + 0.75 * orders) * _UP
+        alone = (2 * once + self._of_constants[fields - 1]) * harmonic
+        return (scale * (2 * term * products * orders + alone) + harmonic / 2 + 0.75 * orders) * _UP
 
-    def _error_of_constants(self) -> float:
-        """ε' + κ in ulps."""
+    def _error_of_constants(self, count: int) -> float:
+        """ε' + κ in ulps, of so many sources."""
         grid = self.grid
         constants = numpy.full((grid.words, 1), 2.0 ** (grid.bits - 1))
         constants[0] = 2.0**grid.bits
         sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0**16))
         sources[0] = 2.0**51
-        each, once = _error(grid, _levels(grid, constants, sources)[1], self._sources)
-        return self._sources * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
+        each, once = _error(grid, _levels(grid, constants, sources)[1], count)
+        return count * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
 
 
 class _Scratch:
@@ -305,7 +299,13 @@ def _words(value: int, grid: Grid) -> list[float]:
     return [*found, ldexp(float(value), -grid.total)]
 
 
-def _whole(words: Doubles, grid: Grid) -> Any:
+def components(left: Doubles) -> list[Doubles]:
+    """The words of y, exactly, out of those of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …) along the last axis."""
+    middle = left[..., 5] / 2
+    return [*(left[..., lane] for lane in (2, 0, 1)), left[..., 4] - middle, middle, left[..., 3] - middle]
+
+
+def whole(words: Doubles, grid: Grid) -> Any:
     """What words add to along the last axis, in ulps: an array of integers."""
     digits = numpy.ldexp(words, grid.bits * numpy.arange(1, grid.words + 1)).astype(numpy.int64).astype(object)
     total = digits[..., 0]

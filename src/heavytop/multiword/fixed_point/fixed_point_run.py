@@ -45,11 +45,15 @@ def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fractio
     """The words of the coefficients times ``factor``, over 2^over."""
     given = problem.coefficients
     flat = [row for vector in (given.beside if grid.bounded else given.vectors) for row in vector]
-    found = doubles(8 * grid.words * len(flat))
-    table = found.reshape(len(flat), grid.words, 8)
-    share = factor / 2**over
-    words = {c: digits(c * share, grid) for c in {c for row in flat for c in row}}
-    for index, row in enumerate(flat):
+    return words_of_rows(flat, grid, factor / 2**over)
+
+
+def words_of_rows(rows: Sequence[Sequence[Fraction]], grid: Grid, share: Fraction) -> Doubles:
+    """The words of eight exact numbers a row, times ``share``."""
+    found = doubles(8 * grid.words * len(rows))
+    table = found.reshape(len(rows), grid.words, 8)
+    words = {c: digits(c * share, grid) for c in {c for row in rows for c in row}}
+    for index, row in enumerate(rows):
         for lane, c in enumerate(row):
             if c:
                 table[index, :, lane] = words[c]

@@ -547,12 +547,22 @@ class WordRows(Rows):
             code.store(word, at, 8 * k)
 
     def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
+        self.begin_sums()
+        self.add_products(n, (self, zeros), (self, zeros), vector)
+        return self.end_sums()
+
+    def begin_sums(self) -> None:
+        """S = 0."""
+        for k, centre in enumerate(centred(self.code, self.grid, self.grid.words)):
+            self.code.store(centre, self.sums, 8 * k)
+
+    def add_products(
+        self, n: Value, lefts: tuple[WordRows, Value], rights: tuple[WordRows, Value], vector: int
+    ) -> None:
+        """S += Σ L_m ∘ R_(n−m), L and R each of rows with a number of leading zeros."""
         # for each number u of leading zero words on the left and w on the right, where orders have those
         code, b, words = self.code, self.code.builder, self.grid.words
-        rows, sums, places, seen = self.rows, self.sums, self.places, self.seen
         row = self.code.integer(self.size(self.grid, self.vectors, 1).row)
-        for k, centre in enumerate(centred(code, self.grid, words)):
-            code.store(centre, sums, 8 * k)
         one, zero = code.integer(1), code.integer(0)
 
         def smaller(a: Value, c: Value) -> Value:
@@ -561,33 +571,37 @@ class WordRows(Rows):
         def larger(a: Value, c: Value) -> Value:
             return b.select(b.icmp_signed(">", a, c), a, c)
 
-        def place(k: Value) -> Value:
-            return b.load(code.address(places, k))
+        def place(rows: WordRows, k: Value) -> Value:
+            return b.load(code.address(rows.places, k))
 
         def left(u: Value, _: list[Value]) -> None:
-            begin, end = place(u), place(b.add(u, one))
+            begin, end = place(lefts[0], u), place(lefts[0], b.add(u, one))
 
             def right(w: Value, _: list[Value]) -> None:
-                low = larger(larger(begin, b.add(b.sub(n, place(b.add(w, one))), one)), zero)
-                high = smaller(smaller(end, b.add(b.sub(n, place(w)), one)), b.add(n, one))
+                low = larger(larger(begin, b.add(b.sub(n, place(rights[0], b.add(w, one))), one)), zero)
+                high = smaller(smaller(end, b.add(b.sub(n, place(rights[0], w)), one)), b.add(n, one))
                 count = b.sub(high, low)
                 with b.if_then(b.icmp_signed(">", count, zero)):
                     at = b.add(b.mul(low, row), b.mul(u, code.integer(8)))
                     against = b.add(b.mul(b.sub(n, low), row), b.mul(w, code.integer(8)))
                     skipped = b.add(u, w)
                     arguments = [
-                        code.address(rows, b.add(at, code.integer(8 * words * (1 + vector)))),
-                        code.address(rows, against),
+                        code.address(lefts[0].rows, b.add(at, code.integer(8 * words * (1 + vector)))),
+                        code.address(rights[0].rows, against),
                         count,
-                        code.address(sums, b.mul(skipped, code.integer(8))),
-                        seen,
+                        code.address(self.sums, b.mul(skipped, code.integer(8))),
+                        self.seen,
                     ]
                     self._call(skipped, arguments)
 
-            code.loop(0, smaller(b.sub(code.integer(words), u), b.add(zeros, one)), right, [])
+            code.loop(0, smaller(b.sub(code.integer(words), u), b.add(rights[1], one)), right, [])
 
-        code.loop(0, b.add(zeros, one), left, [])
-        found = [code.load(sums, 8 * k) for k in range(words)]
+        code.loop(0, b.add(lefts[1], one), left, [])
+
+    def end_sums(self) -> list[Value]:
+        """S as K words, not carried, after a look at each."""
+        code, b, words, seen = self.code, self.code.builder, self.grid.words, self.seen
+        found = [code.load(self.sums, 8 * k) for k in range(words)]
         watched = Accumulator(code, self.grid, 0, found, b.bitcast(code.load(seen, 0), INT_VECTOR))
         watched.look_at_all()
         code.store(b.bitcast(watched.seen, VECTOR), seen, 0)

@@ -200,16 +200,20 @@ class SeriesCode:
         return found
 
     def _watched_rates(self, vector: int, gathered: list[Value], y: list[Value]) -> list[Value]:
-        code, b, grid, seen, linear = self.code, self.code.builder, self.grid, self.made.args[6], turned(self.system)
-        sources = [gathered, *([code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear)]
+        code, b, grid, seen = self.code, self.code.builder, self.grid, self.made.args[6]
         gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
         result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
-        for k, source in enumerate(sources):
-            factors = self._constants((1 + len(linear)) * vector + k)
+        for factors, source in self.sources(vector, gathered, y):
             result.add_product(factors, source, each=True, below=not grid.whole)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
         return [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, grid.words), strict=True)]
+
+    def sources(self, vector: int, gathered: list[Value], y: list[Value]) -> list[tuple[list[Value], list[Value]]]:
+        """The words of A and each B, and what they are multiplied by."""
+        linear = turned(self.system)
+        sources = [gathered, *([self.code.shuffle(word, self.code.zero, lanes) for word in y] for lanes in linear)]
+        return [(self._constants((1 + len(linear)) * vector + k), source) for k, source in enumerate(sources)]
 
     def _gathered(self, total: list[Value]) -> list[Value]:
         code, zero = self.code, self.code.zero
