@@ -20,7 +20,7 @@ import msgspec
 from heavytop.comparison.compare import compare
 from heavytop.comparison.noise import Policy
 from heavytop.comparison.verdicts import Verdict
-from heavytop.document.names import row_name
+from heavytop.document.document import row_name
 from heavytop.kinds import KINDS, work_precision
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact

@@ -35,7 +35,7 @@ from scipy.integrate._ivp import dop853_coefficients as dop853
 from heavytop.comparison.compare import compare
 from heavytop.comparison.noise import Policy
 from heavytop.comparison.rows import RowComparison
-from heavytop.document.names import row_name
+from heavytop.document.document import row_name
 from heavytop.errors import Unsupported
 from heavytop.integrate.peers.double import Given, Solved, double_peer
 from heavytop.integrate.peers.source import PythonObject

@@ -1,8 +1,11 @@
-"""A small table as text for a terminal and as HTML for a notebook, and a small picture of a path beside it."""
+"""A small table as text for a terminal and as HTML for a notebook, a small picture of a path beside it, and what can be
+shown of a name.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -151,3 +154,14 @@ def _lines(seen: Sequence[tuple[float, float, bool]]) -> str:
         for front, faint in ((False, ' stroke-opacity="0.35"'), (True, ""))
         if parts[front]
     )
+
+
+# Names of any origin as text that terminals, XML and pictures can show.
+
+
+_NO_SHAPE = re.compile("[^\t\n\r\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def printable(text: str) -> str:
+    """Text with U+FFFD for control characters other than tabs and line breaks, and for what XML 1.0 does not have."""
+    return _NO_SHAPE.sub("\ufffd", text)

@@ -8,7 +8,7 @@ import pytest
 
 from heavytop.comparison.noise import Policy, Rule, Timings
 from heavytop.comparison.verdicts import Verdict, judge_seconds
-from heavytop.document.names import short
+from heavytop.document.document import short
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact

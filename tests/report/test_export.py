@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-from heavytop.document.names import row_name
+from heavytop.document.document import row_name
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report

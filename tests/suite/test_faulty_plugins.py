@@ -15,6 +15,7 @@ from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError
 from heavytop.kinds import KINDS
 from heavytop.suite.plan import read
+from support.midpoint import MIDPOINT
 from support.reports import rows
 
 CASE = CASES["euler"]
@@ -26,19 +27,8 @@ from heavytop.integrate.peers.double import Solved
 class Mute(Exception):
     def __str__(self):
         raise RuntimeError
-
-def right(given):
-    field, y, t, states = given.system.field, given.start.copy(), 0.0, []
-    for end in given.times:
-        h = (end - t) / 50
-        for _ in range(50):
-            half = y + [h / 2 * k for k in field(given.parameters, y)]
-            y = y + [h * k for k in field(given.parameters, half)]
-        t = end
-        states.append(y)
-    return Solved(states, t, 50 * len(given.times))
-
 """
+HEAD += MIDPOINT.format(name="right") + "\n"
 SOLVE = HEAD + "def solve(given):\n    {}\n"
 AT_IMPORT = {
     "raise ValueError('no licence')": "is broken: ValueError: no licence",

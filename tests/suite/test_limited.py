@@ -22,6 +22,7 @@ from heavytop.kinds import KINDS
 from heavytop.suite.limited import RowLimits
 from heavytop.suite.plan import read
 from support.helpers import without_progress
+from support.midpoint import MIDPOINT
 from support.reports import all_good, compare, rows
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
@@ -32,16 +33,8 @@ from heavytop.integrate.peers.double import Solved, double_peer
 from heavytop.integrate.trajectory import Outcome
 
 def solve(given):
-    field, y, t, states = given.system.field, given.start.copy(), 0.0, []
     assert given.step_limit == 10**7
-    for end in given.times:
-        h = (end - t) / 50
-        for _ in range(50):
-            half = y + [h / 2 * k for k in field(given.parameters, y)]
-            y = y + [h * k for k in field(given.parameters, half)]
-        t = end
-        states.append(y)
-    return Solved(states, t, 50 * len(given.times))
+    return midpoint(given)
 
 def sleeps(given):
     time.sleep(1000)
@@ -62,6 +55,7 @@ def interrupts(given):
 
 forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])
 """
+MODULE += MIDPOINT.format(name="midpoint")
 PLAN = """name = "faults"
 row_timeout = "3"
 integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward", "mine.py:leaves",

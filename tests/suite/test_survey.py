@@ -13,7 +13,7 @@ import numpy
 import pytest
 
 import heavytop as ht
-from heavytop.comparison import motions
+from heavytop.comparison import compare as comparing
 from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.ensemble import propagate_ensemble
@@ -299,9 +299,9 @@ def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(
 def test_a_command_made_of_a_record_measures_the_same_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = _surveyed(tmp_path / "healthy", monkeypatch)
     (row,) = ht.read_report(out).rows
-    columns = motions._records(out / "survey.parquet", row)
+    columns = comparing._records(out / "survey.parquet", row)
     for index in (3, 70):
-        line = motions._command(row, columns, index, "success").partition(" | ")[0].split()
+        line = comparing._command(row, columns, index, "success").partition(" | ")[0].split()
         state = json.loads(heavytop("propagate", *line[2:]).stdout)
         case = Random(name="many", seed=3, count=80).cases()[index]
         expected = ht.propagate(case.top, case.start, TIMES, ht.DOUBLE)

@@ -14,9 +14,9 @@ from heavytop.api.arguments import Number
 from heavytop.api.run_folder import prepare
 from heavytop.comparison import compare as comparing
 from heavytop.comparison import noise as policies
-from heavytop.comparison.motions import beside
-from heavytop.display import Tabular, TitledTable
-from heavytop.document.names import printable, row_name, short
+from heavytop.comparison.compare import beside
+from heavytop.display import Tabular, TitledTable, printable
+from heavytop.document.document import row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept

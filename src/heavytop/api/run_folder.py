@@ -14,7 +14,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from heavytop.api import arguments
-from heavytop.document.names import printable, row_name
+from heavytop.display import printable
+from heavytop.document.document import row_name
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.registry import name_of, named, seconds_of

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
-from heavytop.document.names import short
+from heavytop.document.document import short
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR, WIDTHS, Convention

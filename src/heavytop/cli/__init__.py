@@ -10,7 +10,7 @@ import os
 import sys
 
 # each adds its commands
-from heavytop.cli import claims, integrators, motions, output, pages, reports  # noqa: F401
+from heavytop.cli import claims, integrators, motions, output, reports  # noqa: F401
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError

@@ -39,8 +39,8 @@ def compare(
 
     Else exit 3 if anything is missing or incomparable, else 0.
     """
+    from heavytop.comparison.compare import beside
     from heavytop.comparison.compare import compare as compare_reports
-    from heavytop.comparison.motions import beside
     from heavytop.kinds import KINDS
     from heavytop.store import store
 

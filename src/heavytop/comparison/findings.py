@@ -18,8 +18,7 @@ import msgspec
 from heavytop.comparison.rows import Finding
 from heavytop.comparison.verdicts import Verdict
 from heavytop.comparison.work_precision import ERRORS
-from heavytop.document.document import clip
-from heavytop.document.names import short
+from heavytop.document.document import clip, short
 from heavytop.measure.local_error import ORDER
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import SOLUTION_ERROR

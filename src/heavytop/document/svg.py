@@ -13,7 +13,7 @@ from io import StringIO
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from heavytop.document.names import printable
+from heavytop.display import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -79,22 +79,27 @@ def taylor(
     return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
 
 
-def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
-    """Derivatives at 0 of e^(−iκt) (u + i √square v), κ = rate √square, as pairs (real, imaginary/√square).
+def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
+    """Taylor coefficients of e^(−iκt) (u + i √square v), κ = rate √square, as pairs (real, imaginary/√square).
 
-    real, imaginary: the derivatives of u and v.
+    real, imaginary: the coefficients of u and v.
     """
     found = []
-    for order in range(len(real)):
+    for place in range(len(real)):
         a = b = Fraction(0)
-        for k in range(order + 1):
-            ways = factorial(order) // (factorial(k) * factorial(order - k))
-            # (−iκ)^k = (−rate)^k (i√square)^k, and (i√square)² = −square
-            weight = ways * (-winding.rate) ** k * (-winding.square) ** (k // 2)
-            u, v = real[order - k], imaginary[order - k]
-            a, b = (a + weight * u, b + weight * v) if k % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
+        for n in range(place + 1):
+            # (−iκ)^n = (−rate)^n (i√square)^n, and (i√square)² = −square
+            weight = (-winding.rate) ** n * (-winding.square) ** (n // 2) / factorial(n)
+            u, v = real[place - n], imaginary[place - n]
+            a, b = (a + weight * u, b + weight * v) if n % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
         found.append((a, b))
     return found
+
+
+def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
+    """The same in derivatives at 0, not divided by factorials: of u and v, and of the product."""
+    u, v = ([value / factorial(n) for n, value in enumerate(each)] for each in (real, imaginary))
+    return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(u, v, winding))]
 
 
 def initial_xi(gamma: Vector) -> list[arb]:
@@ -150,10 +155,41 @@ def rotate(vector: Sequence[Any], omega: Sequence[Fraction], time: Any) -> list[
         return list(vector)
     rate = ball(dot(omega, omega)).sqrt()
     sine, cosine = (rate * time).sin_cos()
-    axis = [component / rate for component in balls(omega)]
-    along = dot(axis, vector)
-    across = cross(vector, axis)
+    return about([component / rate for component in balls(omega)], cosine, sine, vector)
+
+
+def about(axis: Sequence[Any], cosine: Any, sine: Any, vector: Sequence[Any]) -> list[Any]:
+    """The vector turned about a unit vector, axis 2 towards axis 1 about axis 3, by the angle given."""
+    along, across = dot(axis, vector), cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
+
+
+def between(before: Sequence[Sequence[Any]], now: Sequence[Sequence[Any]]) -> Carry:
+    """What carries vectors with a frame of three unit vectors, from where it was to where it is."""
+
+    def carry(vector: Sequence[Any]) -> list[Any]:
+        parts = [dot(vector, direction) for direction in before]
+        return [sum(part * e[k] for part, e in zip(parts, now, strict=True)) for k in range(3)]
+
+    return carry
+
+
+def across(gamma: Vector) -> Vector:
+    """An exact vector ⟂ γ, not 0."""
+    zero = Fraction(0)
+    candidates = ((zero, gamma[2], -gamma[1]), (-gamma[2], zero, gamma[0]))
+    return candidates[0] if any(candidates[0]) else candidates[1]
+
+
+def carried_xi(gamma: Vector, carried: Callable[[Vector], tuple[Sequence[Any], Sequence[Any]]]) -> list[Any]:
+    """ξ where it started as :func:`initial_xi` of γ, which need not be rational.
+
+    carried: of an exact vector b ⟂ γ the images of b and γ × b/|γ|, both fixed in space.
+    """
+    xi, size, basis = initial_xi(gamma), ball(dot(gamma, gamma)).sqrt(), across(gamma)
+    exact, norm = balls(basis), ball(dot(basis, basis))
+    cosine, sine = dot(xi, exact) / norm, dot(xi, cross([g / size for g in balls(gamma)], exact)) / norm
+    return [cosine * a + sine * b for a, b in zip(*carried(basis), strict=True)]
 
 
 def tanh_sech(argument: Any) -> tuple[Any, Any]:

@@ -16,9 +16,9 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.engines import compiled
-from heavytop.integrate.heyoka.motions import Observer, Stepper
+from heavytop.integrate.heyoka.motions import Stepper
 from heavytop.integrate.registry import Integrator
-from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
+from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State

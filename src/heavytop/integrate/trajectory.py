@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 from math import inf
+from time import perf_counter
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
@@ -345,8 +346,52 @@ class Place:
             raise ValueError(f"{steps - self.steps} steps from a place to its sample")
 
 
+class InSpace:
+    """A motion whose attitude is seen in space: arrays in double, one entry a sample.
+
+    Each raises InputError for a motion without attitude.
+    """
+
+    __slots__ = ()
+
+    def _in_double(self, what: Output) -> NDArray[np.float64]:
+        raise NotImplementedError
+
+    def quaternions(self) -> NDArray[np.float64]:
+        """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
+
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
+        """
+        return self._in_double(output("quaternion"))
+
+    def matrices(self) -> NDArray[np.float64]:
+        """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ."""
+        return self._in_double(output("matrix"))
+
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
+
+        point: three exact numbers in body axes; None for the centre of mass.
+        pivot: where the fixed point stands in space; None for the origin.
+        """
+        return self._in_double(output("position", point, pivot))
+
+    def omega_space(self) -> NDArray[np.float64]:
+        """R Ω, the angular velocity in space axes, shape (n, 3)."""
+        return self._in_double(output("omega-space"))
+
+    def euler(self, sequence: str) -> NDArray[np.float64]:
+        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
+
+        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
+        lock, where they are not defined: of a computed motion b within 16 eps of an end of its interval.
+        Raises InputError for an unknown sequence too.
+        """
+        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trajectory(Tabular):
+class Trajectory(Tabular, InSpace):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
@@ -409,45 +454,8 @@ class Trajectory(Tabular):
         Raises InputError for another output, and for a run without attitude.
         """
         if of is not None:
-            return self._texts(output(of, point, pivot))
+            return as_texts(self, output(of, point, pivot))
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
-
-    def quaternions(self) -> NDArray[np.float64]:
-        """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
-
-        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
-        Raises InputError for a run without attitude.
-        """
-        return self._in_double(output("quaternion"))
-
-    def matrices(self) -> NDArray[np.float64]:
-        """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
-
-        Raises InputError for a run without attitude.
-        """
-        return self._in_double(output("matrix"))
-
-    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
-        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
-
-        point: three exact numbers in body axes; None for the centre of mass.
-        pivot: where the fixed point stands in space; None for the origin.
-        Raises InputError for a run without attitude.
-        """
-        return self._in_double(output("position", point, pivot))
-
-    def omega_space(self) -> NDArray[np.float64]:
-        """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a run without attitude."""
-        return self._in_double(output("omega-space"))
-
-    def euler(self, sequence: str) -> NDArray[np.float64]:
-        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
-
-        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
-        lock, where they are not defined: b within 16 eps of an end of its interval.
-        Raises InputError for an unknown sequence and for a run without attitude.
-        """
-        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
     def angles(self) -> NDArray[np.float64]:
         """φ, θ, ψ of (3.2) in radians, shape (n, 3), followed from t = 0 with all turns: ``euler("ZXZ")`` is ψ, θ, φ.
@@ -462,14 +470,7 @@ class Trajectory(Tabular):
         return numpy.array(self.angle_texts, dtype=float).reshape(-1, 3)
 
     def _in_double(self, what: Output) -> NDArray[np.float64]:
-        pass  # REGROUP
-
         return in_double(self, what)
-
-    def _texts(self, what: Output) -> list[Any]:
-        pass  # REGROUP
-
-        return as_texts(self, what)
 
     def to_numpy(self) -> NDArray[np.float64]:
         """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""
@@ -535,6 +536,62 @@ def _shown(value: Any, digits: int) -> str:
         return decimal_text(exact(value), digits)
     except InputError:
         return str(value)
+
+
+Observer = Callable[[Fraction, Any], None]
+
+
+class SampledRun(Protocol):
+    """A run that is advanced to wherever its next sample lies."""
+
+    def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
+        """How it came to the time, given as the native number and exactly, and the native state there."""
+        ...
+
+    def take_up(self, place: Place, covered: Any) -> None:
+        """Go on from there; takes the step again that covers the last sample."""
+        ...
+
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+        """Where the last step began."""
+        ...
+
+
+def sampled(
+    run: SampledRun,
+    targets: Sequence[Any],
+    flags: dict[str, str],
+    began: float,
+    observer: Observer | None,
+    place: Place | None,
+    mark: Callable[[Place], None] | None,
+) -> tuple[tuple[Fraction, ...], tuple[Any, ...], Outcome, float]:
+    """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
+
+    began: by :func:`time.perf_counter`.  The other arguments: as in
+    :func:`heavytop.integrate.heyoka.motions.propagate`.
+    """
+    times: list[Fraction] = []
+    states: list[Any] = []
+    outcome = Outcome.SUCCESS
+    if place is not None:
+        place.require_same(flags)
+        began -= place.seconds
+        times = [exact(target) for target in targets[: place.samples]]
+        run.take_up(place, targets[place.samples - 1])
+    for target in targets[len(times) :]:
+        time = exact(target)
+        outcome, state = run.at(target, time)
+        if outcome is not Outcome.SUCCESS:
+            break
+        times.append(time)
+        if observer is None:
+            states.append(state)
+        else:
+            observer(time, state)
+        if mark is not None and target != 0:
+            mark(run.place(len(times), perf_counter() - began, flags))
+    return tuple(times), tuple(states), outcome, perf_counter() - began
 
 
 @dataclass(frozen=True, slots=True)

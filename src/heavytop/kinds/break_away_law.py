@@ -25,8 +25,8 @@ from heavytop.document.document import (
     draw,
     left_out,
     logarithm,
+    short,
 )
-from heavytop.document.names import short
 from heavytop.document.svg import COLOURS, MARKERS, finish, new_axes, spoken
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome

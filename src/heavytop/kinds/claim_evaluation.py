@@ -8,9 +8,8 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from heavytop.document.document import Block, Cell, Chart, Headline, Value
+from heavytop.document.document import Block, Cell, Chart, Headline, Value, short
 from heavytop.document.document import Table as Cells
-from heavytop.document.names import short
 from heavytop.exact.flint.balls import working_precision
 from heavytop.kinds.base import Kind
 from heavytop.kinds.claim_model import CLAIM, EVALUATION_ERROR, claim_error, claim_of, claimed

@@ -33,9 +33,9 @@ from heavytop.document.document import (
     logarithm,
     points,
     scientific,
+    short,
 )
 from heavytop.document.document import Table as Cells
-from heavytop.document.names import short
 from heavytop.document.svg import COLOURS, decades, finish, new_axes, spoken
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic

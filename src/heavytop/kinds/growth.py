@@ -12,9 +12,8 @@ from typing import Any
 import msgspec
 
 from heavytop.cases import Case
-from heavytop.document.document import Block, Cell, Chart
+from heavytop.document.document import Block, Cell, Chart, computed_by, short
 from heavytop.document.document import Table as Cells
-from heavytop.document.names import computed_by, short
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kinds.base import Kind

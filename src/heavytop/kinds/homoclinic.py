@@ -11,9 +11,8 @@ from msgspec.structs import replace
 
 from heavytop.cases import Case
 from heavytop.comparison.verdicts import size
-from heavytop.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip
+from heavytop.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip, short
 from heavytop.document.document import Table as Cells
-from heavytop.document.names import short
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind

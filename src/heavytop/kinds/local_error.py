@@ -7,9 +7,8 @@ from fractions import Fraction
 
 import msgspec
 
-from heavytop.document.document import Block, Cell, Headline, In, Note, Value, clip
+from heavytop.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.document.document import Table as Cells
-from heavytop.document.names import computed_by, short
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kinds.base import Kind

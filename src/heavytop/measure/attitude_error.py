@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
@@ -14,11 +14,21 @@ from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import FUNCTIONS, ball, whole_evaluation, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, largest, relative_error, root
-from heavytop.measure.scorer import SOLUTION_ERROR, Drift, Running, Scorer, parameter_balls, split
+from heavytop.measure.scorer import (
+    SOLUTION_ERROR,
+    Drift,
+    DriftAndError,
+    Running,
+    Scorer,
+    Statistics,
+    TimeText,
+    parameter_balls,
+    split,
+)
 from heavytop.measure.truth import Truth, truth_with_attitude
-from heavytop.precision import Vector, dot, exact
-from heavytop.records import Against, Metric, Quantity, Series, by_name
-from heavytop.top.attitude import SEQUENCES, matrix_of_quaternion, rotated, rows_of, rows_of_euler
+from heavytop.precision import Vector, cross, dot, exact
+from heavytop.records import Metric, Quantity, Series
+from heavytop.top.attitude import SEQUENCES, Rows, matrix_of_quaternion, rotated, rows_of, rows_of_euler, transposed
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -27,9 +37,6 @@ from heavytop.top.heavy_top import HeavyTop, State
 # Here R takes components in body axes to components in the axes of space of the file; canonical axes of space are those
 # whose third points up.  A file's are turned into them by a signed permutation of determinant 1.
 
-
-Rows = Sequence[Sequence[Any]]
-"""Three rows of three numbers over any ring."""
 
 UPS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "z": ((0, 1, 2), (1, 1, 1)),
@@ -105,10 +112,8 @@ class Convention:
         return [_times(vector[place], sign) for place, sign in zip(places, signs, strict=True)]
 
 
-def _directed(rows: Rows, direction: str) -> list[list[Any]]:
-    if direction == "body_to_space":
-        return [list(row) for row in rows]
-    return [[rows[k][i] for k in range(3)] for i in range(3)]
+def _directed(rows: Rows[Any], direction: str) -> list[list[Any]]:
+    return [list(row) for row in (rows if direction == "body_to_space" else transposed(rows))]
 
 
 def _times(value: Any, sign: int) -> Any:
@@ -117,14 +122,9 @@ def _times(value: Any, sign: int) -> Any:
     return [-part for part in value] if isinstance(value, list | tuple) else -value
 
 
-def body_to_space(rows: Rows, vector: Sequence[Any]) -> list[Any]:
-    """R v over any ring."""
-    return [row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in rows]
-
-
-def space_to_body(rows: Rows, vector: Sequence[Any]) -> list[Any]:
+def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any]:
     """R^T v over any ring."""
-    return [rows[0][i] * vector[0] + rows[1][i] * vector[1] + rows[2][i] * vector[2] for i in range(3)]
+    return rotated(transposed(rows), vector)
 
 
 # Attitudes, positions and Ω in any axes, as a file gives them, compared with the true motion of the body.
@@ -171,7 +171,7 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
     return 2 * arb.atan2(root(square), root(_ONE - square))
 
 
-class ObservedErrors:
+class ObservedErrors(Statistics):
     """Errors of what one file gives, sample by sample.
 
     ``attitude_error``: the angle between the true attitude and the one given, in radians; ``position_error``: a length,
@@ -236,11 +236,11 @@ class ObservedErrors:
     def _errors(self, values: Values, true: Sequence[arb]) -> dict[Quantity, arb]:
         """Each error at one sample, at the working precision."""
         axes = [[ball(entry) for entry in row] for row in self.posed.axes]
-        omega, gamma = body_to_space(axes, true[:3]), body_to_space(axes, true[3:6])
-        rows: list[list[arb]] | None = None
+        omega, gamma = rotated(axes, true[:3]), rotated(axes, true[3:6])
+        rows: Rows[arb] | None = None
         if len(true) > 6:
-            along = body_to_space(axes, true[6:9])
-            rows = [along, _cross(gamma, along), gamma]
+            along = rotated(axes, true[6:9])
+            rows = [along, cross(gamma, along), gamma]
         given = {name: [ball(value) for value in part] for name, part in values.items()}
         found: dict[Quantity, arb] = {}
         columns: list[arb] = []
@@ -252,14 +252,14 @@ class ObservedErrors:
         return found | {Quantity(SOLUTION_ERROR, "relative"): largest(columns)}
 
     def _of_columns(
-        self, name: str, part: list[arb], omega: list[arb], gamma: list[arb], rows: list[list[arb]] | None
+        self, name: str, part: list[arb], omega: Sequence[arb], gamma: Sequence[arb], rows: Rows[arb] | None
     ) -> dict[Quantity, arb]:
         relative = Quantity(SOLUTION_ERROR, "relative")
         if name in ("omega", "gamma"):
             return _vector_error(name, part, omega if name == "omega" else gamma)
         assert rows is not None
         if name == "omega_space":
-            return _vector_error("omega", self.said.upright(part), body_to_space(rows, omega))
+            return _vector_error("omega", self.said.upright(part), rotated(rows, omega))
         if name == "position":
             return self._position(part, rows)
         found = self.said.upright(self.said.rotation(name, part, ball_functions()))
@@ -273,10 +273,10 @@ class ObservedErrors:
             Quantity(SOLUTION_ERROR, "gamma"): third,
         }
 
-    def _position(self, part: list[arb], rows: list[list[arb]]) -> dict[Quantity, arb]:
+    def _position(self, part: list[arb], rows: Rows[arb]) -> dict[Quantity, arb]:
         pivot = [ball(value) for value in self.said.pivot]
         given = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
-        true = body_to_space(rows, [ball(value) for value in self.point])
+        true = rotated(rows, [ball(value) for value in self.point])
         off = [a - b for a, b in zip(given, true, strict=True)]
         length, relative = root(dot(off, off)), Quantity(SOLUTION_ERROR, "relative")
         if not self.distance_squared:
@@ -284,24 +284,13 @@ class ObservedErrors:
         part_of = length / ball(self.distance_squared).sqrt()
         return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, relative: part_of}
 
-    @whole_evaluation
-    def metrics(self) -> dict[str, Metric]:
-        """``attitude_error_max``, ``_rms``, ``_final``, ...; of the relative error of all columns the largest."""
-        with working_precision(self.bits):
-            found: dict[Quantity, Metric] = {}
-            for quantity, running in self.running.items():
-                every = running.metrics(quantity)
-                only = quantity == Quantity(SOLUTION_ERROR, "relative")
-                found |= {quantity.over("max"): every[quantity.over("max")]} if only else every
-            return by_name(found)
+    def quantities(self) -> dict[Quantity, Running]:
+        """What the columns give."""
+        return self.running
 
-    def series(self, time_text: TimeText) -> dict[str, Series]:
-        """The same over the kept times, but for relative errors."""
-        return {
-            quantity.text: running.series(quantity, time_text)
-            for quantity, running in self.running.items()
-            if quantity.component != "relative"
-        }
+    def largest_alone(self, quantity: Quantity) -> bool:
+        """So of the relative error of all columns."""
+        return quantity == Quantity(SOLUTION_ERROR, "relative")
 
 
 def _vector_error(name: str, given: Sequence[arb], true: Sequence[arb]) -> dict[Quantity, arb]:
@@ -310,10 +299,6 @@ def _vector_error(name: str, given: Sequence[arb], true: Sequence[arb]) -> dict[
         Quantity(SOLUTION_ERROR, name): largest(off),
         Quantity(SOLUTION_ERROR, "relative"): relative_error(off, true),
     }
-
-
-def _cross(a: Sequence[arb], b: Sequence[arb]) -> list[arb]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def whole(names: Sequence[str]) -> bool:
@@ -335,12 +320,12 @@ def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[
             omega = given["omega"]
         else:
             assert rows is not None
-            omega = space_to_body(rows, said.upright(given["omega_space"]))
+            omega = list(space_to_body(rows, said.upright(given["omega_space"])))
         axes = [[ball(entry) for entry in row] for row in posed.axes]
         return [*space_to_body(axes, omega), *space_to_body(axes, gamma)]
 
 
-class ObservedScorer:
+class ObservedScorer(DriftAndError):
     """Drift where the state is whole, errors where there is a reference."""
 
     def __init__(
@@ -356,7 +341,9 @@ class ObservedScorer:
         self.bits = problem.precision.bits + GUARD_BITS
         plain = replace(problem, xi=None)
         self.drift = Drift(plain, problem.integrals(), keep) if whole(names) else None
-        self.error = None if isinstance(truth, str) else ObservedErrors(problem, truth, posed, said, names, keep)
+        self.error: ObservedErrors | None = None
+        if not isinstance(truth, str):
+            self.error = ObservedErrors(problem, truth, posed, said, names, keep)
 
     @whole_evaluation
     def __call__(self, time: Fraction, values: Values) -> None:
@@ -367,25 +354,7 @@ class ObservedScorer:
         if self.error is not None:
             self.error(time, values, state)
 
-    @property
-    def against(self) -> Against:
-        """What the motion was compared with."""
-        if isinstance(self.truth, str):
-            return Against("none", reason=f"no reference: {self.truth}")
-        return self.truth.against
 
-    def metrics(self) -> dict[str, Metric]:
-        """``drift_NAME_max``, ... where the state is whole; the errors where there is a reference."""
-        drift = self.drift.metrics() if self.drift else {}
-        return drift | (self.error.metrics() if self.error else {})
-
-    def series(self, time_text: TimeText) -> dict[str, Series]:
-        """The same over the kept times."""
-        drift = self.drift.series(time_text) if self.drift else {}
-        return drift | (self.error.series(time_text) if self.error else {})
-
-
-TimeText = Callable[[Fraction], str]
 ATTITUDE, POSITION = Quantity(ATTITUDE_ERROR), Quantity(POSITION_ERROR)
 _KEPT = (ATTITUDE_ERROR, POSITION_ERROR)
 

@@ -20,11 +20,10 @@ from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
-from heavytop.integrate.heyoka.motions import Observer
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.registry import Integrator, IntegratorSource, described, load
-from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
+from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction

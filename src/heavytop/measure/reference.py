@@ -28,6 +28,7 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.exact.solution import ExactSolution
+from heavytop.integrate.trajectory import InSpace
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.measure.motion import motion_texts, xi_texts
@@ -267,7 +268,7 @@ class Ball(msgspec.Struct, frozen=True):
     radius: str
 
 
-class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
+class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
     """Proven states; its JSON is that of ``heavytop reference``.
 
     written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
@@ -341,43 +342,6 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         """Evaluates them, so that they are there when they are asked for; raises OutOfReach as :meth:`balls` does."""
         for what in outputs:
             self._known().balls(what)
-
-    def quaternions(self) -> NDArray[np.float64]:
-        """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
-
-        The sign is continuous from one time to the next and w ≥ 0 at t = 0.
-        Raises InputError for a reference without attitude.
-        """
-        return self._in_double(output("quaternion"))
-
-    def matrices(self) -> NDArray[np.float64]:
-        """R at every time, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
-
-        Raises InputError for a reference without attitude.
-        """
-        return self._in_double(output("matrix"))
-
-    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
-        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
-
-        point: three exact numbers in body axes; None for the centre of mass.
-        pivot: where the fixed point stands in space; None for the origin.
-        Raises InputError for a reference without attitude.
-        """
-        return self._in_double(output("position", point, pivot))
-
-    def omega_space(self) -> NDArray[np.float64]:
-        """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a reference without attitude."""
-        return self._in_double(output("omega-space"))
-
-    def euler(self, sequence: str) -> NDArray[np.float64]:
-        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
-
-        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters; ``nan`` at gimbal lock, where a
-        and c are not defined.
-        Raises InputError for an unknown sequence and for a reference without attitude.
-        """
-        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
     def _in_double(self, what: Output) -> NDArray[np.float64]:
         import numpy

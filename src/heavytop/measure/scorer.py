@@ -21,7 +21,9 @@ from heavytop.top.equations import Integral, Parameters
 
 
 Sums = tuple[arb, arb, arb]
+TimeText = Callable[[Fraction], str]
 STATISTICS = ("max", "rms", "final")
+_RELATIVE = "relative"
 DRIFT = "drift"
 """The name of the quantity; its components are the first integrals."""
 
@@ -87,7 +89,45 @@ class Running:
         self.kept = {Fraction(time): ball_from(value) for time, value in content["kept"].items()}
 
 
-class Drift:
+class Statistics:
+    """Quantities of a motion whose statistics grow sample by sample.  bits: of the working precision."""
+
+    bits: int
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """The running values by what they are of."""
+        raise NotImplementedError
+
+    def largest_alone(self, quantity: Quantity) -> bool:
+        """Whether its maximum is all that is said of it: so of errors relative to the state."""
+        return quantity.component == _RELATIVE
+
+    @whole_evaluation
+    def metrics(self) -> dict[str, Metric]:
+        """``NAME_max``, ``_rms`` and ``_final`` of every quantity, or the first alone."""
+        with working_precision(self.bits):
+            found: dict[Quantity, Metric] = {}
+            for quantity, running in self.quantities().items():
+                every, largest = running.metrics(quantity), quantity.over("max")
+                found |= {largest: every[largest]} if self.largest_alone(quantity) else every
+            return by_name(found)
+
+    def series(self, time_text: TimeText) -> dict[str, Series]:
+        """``NAME`` over the kept times, but for relative errors."""
+        found = self.quantities().items()
+        return {each.text: run.series(each, time_text) for each, run in found if each.component != _RELATIVE}
+
+    def content(self) -> dict[str, Any]:
+        """What was taken in so far, by component, as plain text and integers, exact."""
+        return {quantity.component: run.content() for quantity, run in self.quantities().items()}
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Go on from that :meth:`content`."""
+        for quantity, run in self.quantities().items():
+            run.restore(content[quantity.component])
+
+
+class Drift(Statistics):
     """|I(t) − I(0)| of each integral, absolute, from the rounded start; evaluated with 64 guard bits.
 
     problem: what the integrator was given.  integrals: those that hold for the exact top and start.
@@ -134,28 +174,9 @@ class Drift:
             for name, value in self.functions.items()
         ]
 
-    @whole_evaluation
-    def metrics(self) -> dict[str, Metric]:
-        """``drift_NAME_max``, ``_rms``, ``_final`` for every integral."""
-        with working_precision(self.bits):
-            return by_name({q: m for each, run in self.quantities().items() for q, m in run.metrics(each).items()})
-
-    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
-        """``drift_NAME`` over the kept times."""
-        return {quantity.text: run.series(quantity, time_text) for quantity, run in self.quantities().items()}
-
     def quantities(self) -> dict[Quantity, Running]:
         """The running values by what they are of."""
         return {drift_of(name): values for name, values in self.running.items()}
-
-    def content(self) -> dict[str, Any]:
-        """What was taken in so far, as plain text and integers, exact."""
-        return {name: run.content() for name, run in self.running.items()}
-
-    def restore(self, content: dict[str, Any]) -> None:
-        """Go on from that :meth:`content`."""
-        for name, run in self.running.items():
-            run.restore(content[name])
 
 
 @whole_evaluation
@@ -178,13 +199,12 @@ def _xi_dot_gamma(_: Parameters, y: Any) -> Any:
 
 SOLUTION_ERROR = "solution_error"
 COMPONENTS = ("omega", "gamma", "along", "across")
-_RELATIVE = "relative"
 
 Errors = tuple[list[Sums], bool]
 """What :meth:`SolutionError.following` finds."""
 
 
-class SolutionError:
+class SolutionError(Statistics):
     """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
     relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
 
@@ -262,36 +282,18 @@ class SolutionError:
             omega, gamma = (self.running[part].final for part in ("omega", "gamma"))
             return float(largest((omega / rational(rate), gamma)).abs_upper())
 
-    @whole_evaluation
-    def metrics(self) -> dict[str, Metric]:
-        """``NAME_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``NAME_relative_max``."""
-        with working_precision(self.bits):
-            found = {q: m for part in COMPONENTS for q, m in self.running[part].metrics(self._of(part)).items()}
-            largest_relative = self._of(_RELATIVE).over("max")
-            relative = self.running[_RELATIVE].metrics(largest_relative)[largest_relative]
-            return by_name(found | {largest_relative: relative})
-
-    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
-        """The same over the kept times, but for the relative error."""
-        return {self._of(part).text: self.running[part].series(self._of(part), time_text) for part in COMPONENTS}
-
-    def _of(self, component: str) -> Quantity:
-        return Quantity(self.name, component)
-
     def quantities(self) -> dict[Quantity, Running]:
-        """The running values by what they are of."""
-        return {self._of(part): values for part, values in self.running.items()}
+        """``NAME_omega``, ``_gamma``, ``_along``, ``_across`` and ``_relative``."""
+        return {Quantity(self.name, part): values for part, values in self.running.items()}
 
     def content(self) -> dict[str, Any]:
-        """What was taken in so far, as plain text and integers, exact."""
-        running = {name: run.content() for name, run in self.running.items()}
-        return {"escape": None if self.escape is None else str(self.escape), **running}
+        """See :meth:`Statistics.content`; the escape time too."""
+        return {"escape": None if self.escape is None else str(self.escape), **super().content()}
 
     def restore(self, content: dict[str, Any]) -> None:
         """Go on from that :meth:`content`."""
         self.escape = None if content["escape"] is None else Fraction(content["escape"])
-        for name, run in self.running.items():
-            run.restore(content[name])
+        super().restore(content)
 
 
 def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
@@ -309,10 +311,40 @@ def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
     return dot(a[:3], b[:3]) + dot(a[3:], b[3:])
 
 
-TimeText = Callable[[Fraction], str]
+class DriftAndError:
+    """What the samples of a motion are worth: drift, where the state is whole, and error, where there is a reference.
+
+    truth: the true motion, or why there is none.
+    """
+
+    truth: Truth | str
+    drift: Drift | None
+    error: Statistics | None
+
+    @property
+    def against(self) -> Against:
+        """What the motion was compared with."""
+        if isinstance(self.truth, str):
+            return Against("none", reason=f"no reference: {self.truth}")
+        return self.truth.against
+
+    def _parts(self) -> list[Statistics]:
+        return [each for each in (self.drift, self.error) if each is not None]
+
+    def running(self) -> dict[Quantity, Running]:
+        """The running values of every drift and error by what they are of."""
+        return {quantity: run for each in self._parts() for quantity, run in each.quantities().items()}
+
+    def metrics(self) -> dict[str, Metric]:
+        """``drift_NAME_max``, ... for every integral; ``solution_error_omega_max``, ... where there is a reference."""
+        return {name: metric for each in self._parts() for name, metric in each.metrics().items()}
+
+    def series(self, time_text: TimeText) -> dict[str, Series]:
+        """The same over the kept times."""
+        return {name: series for each in self._parts() for name, series in each.series(time_text).items()}
 
 
-class Scorer:
+class Scorer(DriftAndError):
     """Takes in the states of one motion, one after the other, and holds what they are worth.
 
     problem: what the integrator was given.  truth: the true motion, or why there is none.
@@ -331,7 +363,7 @@ class Scorer:
         until: float = math.inf,
         name: str = SOLUTION_ERROR,
     ) -> None:
-        self.drift = Drift(problem, problem.integrals(), keep)
+        self.drift: Drift = Drift(problem, problem.integrals(), keep)
         self.truth = truth
         self.error: SolutionError | None = None
         if not isinstance(truth, str):
@@ -356,25 +388,6 @@ class Scorer:
         """Take in an array of native states, one at each of the exact times."""
         for time, state in zip(times, states, strict=True):
             self(time, state)
-
-    @property
-    def against(self) -> Against:
-        """What the motion was compared with."""
-        if isinstance(self.truth, str):
-            return Against("none", reason=f"no reference: {self.truth}")
-        return self.truth.against
-
-    def running(self) -> dict[Quantity, Running]:
-        """The running values of every drift and error by what they are of."""
-        return self.drift.quantities() | (self.error.quantities() if self.error else {})
-
-    def metrics(self) -> dict[str, Metric]:
-        """``drift_NAME_max``, ... for every integral; ``solution_error_omega_max``, ... where there is a reference."""
-        return self.drift.metrics() | (self.error.metrics() if self.error else {})
-
-    def series(self, time_text: TimeText) -> dict[str, Series]:
-        """The same over the kept times."""
-        return self.drift.series(time_text) | (self.error.series(time_text) if self.error else {})
 
     def content(self) -> dict[str, Any]:
         """What was taken in so far, as plain text and integers, exact."""

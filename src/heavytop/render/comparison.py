@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.comparison.compare import Differences
+from heavytop.comparison.compare import Differences, WorseMotions
 from heavytop.comparison.findings import line
-from heavytop.comparison.motions import WorseMotions
 from heavytop.comparison.rows import Finding
 from heavytop.comparison.verdicts import Verdict
-from heavytop.document.names import printable, row_name, short
+from heavytop.display import printable
+from heavytop.document.document import row_name, short
 from heavytop.render.text import table, wrapped
 
 _MOST = 200

@@ -21,9 +21,9 @@ from xml.etree import ElementTree
 from heavytop.comparison.compare import Differences
 from heavytop.comparison.findings import folded, line, statistics
 from heavytop.comparison.verdicts import Verdict
-from heavytop.document.document import Block, Card, Cell, Headline, In, Note, Table, Value, Word, cell_text
+from heavytop.display import printable
+from heavytop.document.document import Block, Card, Cell, Headline, In, Note, Table, Value, Word, cell_text, row_name
 from heavytop.document.kind import Kinds, document, headlines, kind_of
-from heavytop.document.names import printable, row_name
 from heavytop.errors import InputError, quoted
 from heavytop.measure.scalar import digits_kept
 from heavytop.records import UNSUPPORTED, Quantity, Report, Row

@@ -13,9 +13,9 @@ from rich.text import Text
 from heavytop.comparison.compare import compare
 from heavytop.comparison.noise import Policy
 from heavytop.comparison.verdicts import Verdict
-from heavytop.document.document import Key, Section, clip, draw, logarithm, numbered, scientific
+from heavytop.display import printable
+from heavytop.document.document import Key, Section, clip, draw, logarithm, numbered, row_name, scientific, short
 from heavytop.document.kind import Kinds
-from heavytop.document.names import printable, row_name, short
 from heavytop.document.svg import COLOURS, End, Picture, decades, finish, new_axes, quiet_style, room, spoken
 from heavytop.records import Identity
 from heavytop.render.text import table

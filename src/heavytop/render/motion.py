@@ -12,7 +12,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.document.names import printable, short
+from heavytop.display import printable
+from heavytop.document.document import short
 from heavytop.event_times.functions import Events, ReferenceEvents
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.certify import bits_of

@@ -32,11 +32,14 @@ from heavytop.document.document import (
     Value,
     cell_text,
     clip,
+    computed_by,
     logarithm,
+    row_name,
     scientific,
+    short,
+    with_source,
 )
 from heavytop.document.kind import Kinds, document, headlines, kind_of
-from heavytop.document.names import computed_by, row_name, short, with_source
 from heavytop.document.svg import quiet_style
 from heavytop.files import replace
 from heavytop.measure.integrator import HEYOKA, MULTIWORD

@@ -22,9 +22,11 @@ from heavytop.document.document import (
     logarithm,
     points,
     scientific,
+    short,
+    variant,
+    with_source,
 )
 from heavytop.document.kind import Kinds
-from heavytop.document.names import short, variant, with_source
 from heavytop.document.svg import (
     COLOURS,
     MARKERS,

@@ -31,8 +31,8 @@ from heavytop.document.document import (
     draw,
     logarithm,
     scientific,
+    short,
 )
-from heavytop.document.names import short
 from heavytop.document.svg import MARKERS, decades, finish, new_axes, spoken
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR

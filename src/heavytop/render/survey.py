@@ -8,8 +8,7 @@ from typing import Any
 import numpy
 from msgspec import UnsetType
 
-from heavytop.document.document import Keys, Section, Sources, clip, draw, left_out
-from heavytop.document.names import short
+from heavytop.document.document import Keys, Section, Sources, clip, draw, left_out, short
 from heavytop.document.svg import COLOURS, Picture, decades, finish, new_axes, spoken
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.motions import propagate

@@ -13,9 +13,9 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.text import Text
 
 from heavytop.comparison.verdicts import size
-from heavytop.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points
+from heavytop.display import printable
+from heavytop.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.document.kind import Kinds, document, headlines
-from heavytop.document.names import printable, short
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR

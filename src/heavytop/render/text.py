@@ -15,9 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.comparison.compare import Trial
-from heavytop.document.document import Cell, Value, Word, cell_text
+from heavytop.display import printable
+from heavytop.document.document import Cell, Value, Word, cell_text, computed_by
 from heavytop.document.kind import Kinds, kind_of
-from heavytop.document.names import computed_by, printable
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT
 from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row

@@ -22,8 +22,8 @@ from heavytop.document.document import (
     left_out,
     points,
     scientific,
+    short,
 )
-from heavytop.document.names import short
 from heavytop.document.svg import COLOURS, End, Picture, decades, finish, new_axes, room, spoken
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series

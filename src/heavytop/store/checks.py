@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy
 
+from heavytop.display import printable
+from heavytop.document.document import row_name
 from heavytop.document.kind import Kinds, ReportedKind, kind_of
-from heavytop.document.names import printable, row_name
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.growth import NEAR, Interval, bent, nearest_class

@@ -16,7 +16,7 @@ from heavytop.diagnose.diagnosis import Diagnosis, diagnose
 from heavytop.diagnose.readings import disagreement
 from heavytop.diagnose.samples import turning_rate
 from heavytop.errors import HeavyTopError, InputError, quoted
-from heavytop.exact.flint.balls import midpoint, working_precision
+from heavytop.exact.flint.balls import midpoint, whole_evaluation, working_precision
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import ObservedScorer, state_of
@@ -31,7 +31,7 @@ from heavytop.measure.scalar import (
     rounding,
     to_ball,
 )
-from heavytop.measure.scorer import SOLUTION_ERROR, Running, Scorer, SolutionError
+from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
 from heavytop.measure.truth import Truth, truth, truth_with_attitude
 from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, physical, round_to, shown, time_text
 from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
@@ -106,43 +106,6 @@ def scored(
 
 def _count(found: Observed) -> int:
     return min(map(len, found.columns.values()), default=0)
-
-
-def peer_metrics(
-    problem: Problem, truth: Truth, times: Sequence[Fraction], limit: int, progress: Callable[[], None]
-) -> tuple[dict[str, Metric], int] | None:
-    """heyoka's own run of the same problem rounded to the format: the metric of its digits, and its steps.
-
-    None where heyoka does not get there.
-    """
-    running, bits = Running(), problem.precision.bits + GUARD_BITS
-
-    def observe(time: Fraction, state: Sequence[object]) -> None:
-        if truth.covers(time):
-            true = truth.state(time, bits)[: len(state)]
-            with working_precision(bits):
-                off = [to_ball(value) - known for value, known in zip(state, true, strict=True)]
-                running.take(time, running.following(relative_error(off, true)), False)
-        progress()
-
-    try:
-        run = propagate(
-            problem.top,
-            problem.start,
-            times,
-            problem.precision,
-            system=problem.system,
-            xi=problem.xi,
-            step_limit=limit,
-            observer=observe,
-        )
-    except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
-        return None
-    if run.outcome is not Outcome.SUCCESS:
-        return None
-    with working_precision(bits):
-        found = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
-    return by_name({RELATIVE: found[RELATIVE]}), run.steps
 
 
 def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
@@ -317,7 +280,9 @@ def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessm
     diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row), errors)
     written = rounding(states, given.precision)
     single = written is not None and written.kind == "single"
-    return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed, single)
+    problem = Problem.of(given.top, given.start, given.precision, given.system)
+    peer = _peer(given, problem, scorer, len(states), progress)
+    return Assessment(row, peer, diagnoses, given.format_guessed, single)
 
 
 def _scored(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
@@ -381,14 +346,7 @@ def _assess_observed(given: GivenTrajectory, progress: Progress) -> Assessment:
     row, found = _observed_row(given, progress)
     count = len(_finite(given))
     told = diagnoses(given, _size(row), found.errors) if count else []
-    truth = found.scorer.truth
-    peer = None
-    if not isinstance(truth, str) and count and given.precision != DOUBLE_DOUBLE:
-        limit = max(1, int(_EFFORT / seconds_a_step(given.precision.bits)))
-        run = peer_metrics(found.problem, truth, given.times[:count], limit, progress)
-        digits = run and digits_kept(_Measured(given.precision.bits, run[0], found.scorer.against))
-        if run is not None and digits is not None:
-            peer = Peer(PEER, given.precision.name, digits, run[1])
+    peer = _peer(given, found.problem, found.scorer, count, progress)
     return Assessment(row, peer, told, given.format_guessed, False, used(given))
 
 
@@ -414,26 +372,41 @@ class _Measured:
     reference: Against
 
 
-def _peer(given: GivenTrajectory, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
-    """heyoka's own run over the same times, compared with the same known motion."""
-    precision = given.precision
-    if scorer.error is None or not count or precision == DOUBLE_DOUBLE:
-        return None
-    error = SolutionError(Problem.of(given.top, given.start, precision, given.system), scorer.error.truth)
-    limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
-    times = given.times[:count]
+def _peer(
+    given: GivenTrajectory, problem: Problem, scorer: DriftAndError, count: int, progress: Progress
+) -> Peer | None:
+    """heyoka's own run of the same problem over the same times, compared with the same known motion.
 
-    def observe(time: Fraction, state: Any) -> None:
-        error(time, state)
+    None without one, and where heyoka does not get there.
+    """
+    precision = given.precision
+    if isinstance(scorer.truth, str) or not count or precision == DOUBLE_DOUBLE:
+        return None
+    known: Truth = scorer.truth
+    running, bits = Running(), precision.bits + GUARD_BITS
+    limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
+
+    @whole_evaluation
+    def following(time: Fraction, state: Sequence[object]) -> Sums:
+        true = known.state(time, bits)[: len(state)]
+        with working_precision(bits):
+            off = [to_ball(value) - each for value, each in zip(state, true, strict=True)]
+            return running.following(relative_error(off, true))
+
+    def observe(time: Fraction, state: Sequence[object]) -> None:
+        if known.covers(time):
+            running.take(time, following(time, state), False)
         progress()
 
+    top, start = problem.given or (problem.top, problem.start)
+    options: dict[str, Any] = {"system": problem.system, "xi": problem.xi, "step_limit": limit, "observer": observe}
     try:
-        run = propagate(
-            given.top, given.start, times, precision, system=given.system, step_limit=limit, observer=observe
-        )
+        run = propagate(top, start, given.times[:count], precision, **options)
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
-    digits = digits_kept(_Measured(precision.bits, error.metrics(), scorer.against))
+    with working_precision(bits):
+        found = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
+    digits = digits_kept(_Measured(precision.bits, by_name({RELATIVE: found[RELATIVE]}), scorer.against))
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None
     return Peer(PEER, precision.name, digits, run.steps)

@@ -486,16 +486,12 @@ def _start(raw: RawStart, posed: Posed) -> GivenStart:
     if raw.form != "gamma":
         return GivenStart(raw.form, numpy.array([float(value) for value in raw.values]), omega, raw.in_space)
     assert posed.xi is not None
-    rows = [_given(posed, v) for v in (posed.xi, _cross(posed.start.gamma, posed.xi), posed.start.gamma)]
+    rows = [_given(posed, v) for v in (posed.xi, cross(posed.start.gamma, posed.xi), posed.start.gamma)]
     return GivenStart("rows", numpy.array(rows, dtype=float).reshape(-1), omega, raw.in_space)
 
 
 def _given(posed: Posed, principal_vector: Sequence[Fraction]) -> list[float]:
     return [float(sum(a * v for a, v in zip(row, principal_vector, strict=True))) for row in posed.axes]
-
-
-def _cross(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def posed(

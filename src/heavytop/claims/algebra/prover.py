@@ -15,7 +15,9 @@ from heavytop.claims.algebra.arcs import Arcs
 from heavytop.claims.algebra.conditions import (
     ConditionKind,
     Need,
+    for_no_parameters,
     is_exactly_zero,
+    is_never_zero,
     is_small_polynomial,
     on_conditions,
     written,
@@ -26,7 +28,6 @@ from heavytop.claims.algebra.rational import Quotient
 from heavytop.claims.algebra.signs import NUMBER_BITS, PLUS, Unprovable, used
 from heavytop.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
 from heavytop.claims.algebra.structure import sign_of
-from heavytop.claims.algebra.vanishing import for_no_parameters, is_never_zero
 from heavytop.exact.flint.balls import working_precision
 from heavytop.precision import shown
 

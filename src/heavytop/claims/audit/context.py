@@ -426,6 +426,16 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
     return tuple(Need(ConditionKind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
 
 
+def of_file(asked: System | None, written: str | None, usual: System) -> System:
+    """The system asked for, else the one written in a file, else the usual; raises InputError where two differ."""
+    own = None if written is None else system(written)
+    if asked is not None and own is not None and asked is not own:
+        raise InputError(
+            f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
+        )
+    return asked or own or usual
+
+
 @dataclass(frozen=True)
 class FileClaim:
     """A claim of a file."""
@@ -476,13 +486,7 @@ class FileClaim:
 
         Raises InputError where the file names another system, or gives another rotor than the system has.
         """
-        own = None if self.content.system is None else system(self.content.system)
-        if asked is not None and own is not None and asked is not own:
-            raise InputError(
-                f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
-            )
-        by_rotor = HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT
-        found = asked or own or by_rotor
+        found = of_file(asked, self.content.system, HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT)
         self.context.parameters(found)
         return found
 

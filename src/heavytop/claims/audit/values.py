@@ -251,14 +251,11 @@ class ValueClaim:
 
         Raises InputError where the file names another one, or the system does not admit the body.
         """
-        from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, require_no_other_rotor, system
+        from heavytop.claims.audit.context import of_file
+        from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, require_no_other_rotor
 
-        own = None if self.content.system is None else system(self.content.system)
-        if asked is not None and own is not None and asked is not own:
-            raise InputError(
-                f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
-            )
-        found = asked or own or (HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT)
+        usual = HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT
+        found = of_file(asked, self.content.system, usual)
         require_no_other_rotor(found, self.given[0])
         return found
 

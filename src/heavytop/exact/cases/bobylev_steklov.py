@@ -18,17 +18,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from flint import acb, arb
 
 from heavytop.errors import InputError
-from heavytop.exact.cases.lagrange import across
 from heavytop.exact.closed_form import (
     ClosedForm,
+    across,
     balls,
+    carried_xi,
     half_angle,
-    initial_xi,
     instant,
     kept,
     rotate,
@@ -152,18 +153,9 @@ class BobylevSteklov(ClosedForm):
         Raises InputError for γ = 0.
         """
 
-        def evaluate(_working: int) -> list[arb]:
-            start, gamma = initial_xi(self.start.gamma), self.start.gamma
-            basis = across(gamma)
-            exact, unit = balls(basis), [g / ball(dot(gamma, gamma)).sqrt() for g in balls(gamma)]
-            norm = ball(dot(basis, basis))
-            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
-            first, second = self._carried(basis, time)
-            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+        return to_bits(lambda _working: carried_xi(self.start.gamma, partial(self._carried, time)), bits, time, 2)
 
-        return to_bits(evaluate, bits, time, 2)
-
-    def _carried(self, basis: Vector, time: Fraction) -> tuple[list[arb], list[arb]]:
+    def _carried(self, time: Fraction, basis: Vector) -> tuple[list[arb], list[arb]]:
         """The vector :func:`across` γ, fixed in space, and γ × it/|γ| at ``time``."""
         with series_length(1):
             gamma = self.evaluate(time)[3:]

@@ -42,7 +42,7 @@ from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, 
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, initial_xi, instant, kept, tanh_sech
 from heavytop.exact.elliptic.quartic import PreparedMotion, QuarticMotion
 from heavytop.exact.flint.balls import Undecided, ball, coefficient, current_length, series_length, to_bits
-from heavytop.exact.separable.abel import Inversion
+from heavytop.exact.separable.abel import phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import SPIN_UPWARDS, XI, ExactRelation, apart, plane_top
 from heavytop.precision import shown
@@ -112,9 +112,7 @@ class DeloneAzimuth:
         state = _turned(level, state)
         azimuth = along_gamma(level) * moment / 2
         if self.integral is not None:
-            (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + moment])
-            if not phase.is_finite():
-                raise Undecided
+            phase, turns = phase_at(self.gap, self.origin + moment)
             azimuth += self.integral.at(phase, turns)
         return Bearing.of(level.in_body(state[3:]), level.in_body(level_vector(level, state)), azimuth)
 

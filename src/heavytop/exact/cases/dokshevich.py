@@ -29,7 +29,7 @@ from flint import acb, arb, arb_series
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import ClosedForm, kept, sign
 from heavytop.exact.flint.balls import Undecided, ball, current_length, exponent, midpoint, to_bits, whole_evaluation
-from heavytop.exact.separable.abel import Inversion, decide
+from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import (
     HESS,
@@ -113,10 +113,7 @@ class _Swing:
 
     def phase(self, time: arb) -> tuple[arb, int]:
         """θ and whole turns at a time in own units; raises Undecided where the working precision does not prove it."""
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
-        return phase, turns
+        return phase_at(self.gap, self.origin + time)
 
     def state(self, phase: Any) -> tuple[list[Any], list[Any]]:
         """M and −Γ along e1, e2, e3."""

@@ -23,14 +23,14 @@ Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechan
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from flint import acb, arb
 
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, kept, rotate, sign, unit
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, kept, rotate, sign, unit
 from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.elliptic.weierstrass import imag, real
 from heavytop.exact.flint.balls import ball
@@ -53,20 +53,11 @@ class Euler(WithAttitude):
         omega = self.start.omega
         return not any(cross(omega, self.top.angular_momentum(omega)))
 
-    def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self)
-        if lattice is None:
-            return WithAttitude.evaluate(self, time)
-        omega, place = lattice.motion(instant(time))
-        return [*omega, *place(lattice.gamma)]
-
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         if lattice is not None:
-            omega, place = lattice.motion(time)
-            return omega, lambda vector: place(lattice.held(vector))
+            return lattice.motion(time)
         return balls(self.start.omega), lambda vector: rotate(vector, self.start.omega, time)
 
 
@@ -76,7 +67,7 @@ class _Lattice:
 
     axes: (a, b, c).  shares: I/L.  amplitudes: A by axis.  rate: p.  origin: u0.  wave: the theta quotient of e^{iψ}.
     drift: μ, per unit of time.  frame: M/L, the projection of e_b across it and their cross product at t = 0.
-    turn: the length of that projection over the wave at t = 0.  gamma: what :meth:`held` says of γ.
+    turn: the length of that projection over the wave at t = 0.
     """
 
     axes: tuple[int, int, int]
@@ -89,10 +80,9 @@ class _Lattice:
     drift: arb
     frame: tuple[Sequence[Any], ...]
     turn: acb
-    gamma: tuple[arb, acb]
 
-    def motion(self, time: Any) -> tuple[list[Any], Callable[[tuple[arb, acb]], list[Any]]]:
-        """Ω, and what takes :meth:`held` of a vector to its components."""
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """Ω, and what carries vectors fixed in space."""
         a, b, c = self.axes
         u = self.rate * time + self.origin
         sn, cn, dn = self.functions.functions(u)
@@ -104,21 +94,17 @@ class _Lattice:
         along = [share * w for share, w in zip(self.shares, omega, strict=True)]
         square = along[i] * along[i] + along[j] * along[j]
 
-        def place(held: tuple[arb, acb]) -> list[Any]:
-            part, across = held
-            turned = across * turning
+        def carry(vector: Sequence[Any]) -> list[Any]:
+            # what stays: the part along M, and the one across as a factor of the wave
+            part, projection, across = (dot(vector, axis) for axis in self.frame)
+            turned = acb(projection, -across) * self.turn * turning
             x, y = real(turned), imag(turned) / square
             rest = part - x * along[b] / square
             result = [x + part * along[b]] * 3
             result[i], result[j] = along[i] * rest - along[j] * y, along[j] * rest + along[i] * y
             return result
 
-        return omega, place
-
-    def held(self, vector: Sequence[Any]) -> tuple[arb, acb]:
-        """What stays of a vector fixed in space: its part along M, and the one across as a factor of the wave."""
-        along, projection, across = (dot(vector, axis) for axis in self.frame)
-        return along, acb(projection, -across) * self.turn
+        return omega, carry
 
 
 @kept
@@ -150,7 +136,7 @@ def _lattice(case: Euler) -> _Lattice | None:
     drift = length * ball((energy - ib * ab) / (square - ib * ib * ab)) - rate * waved.rate()
     frame = _frame(balls(momentum), length, b)
     value, angle = waved.at(origin)
-    made = _Lattice(
+    return _Lattice(
         axes=(a, b, c),
         shares=[i / length for i in balls(inertia)],
         amplitudes={a: sign_a * ball(aa).sqrt(), b: sign_b * ball(ab).sqrt(), c: sign_c * ball(ac).sqrt()},
@@ -161,9 +147,7 @@ def _lattice(case: Euler) -> _Lattice | None:
         drift=drift,
         frame=frame,
         turn=frame[1][b] / (value * unit(angle)),
-        gamma=(arb(0), acb(0)),
     )
-    return replace(made, gamma=made.held(balls(case.start.gamma)))
 
 
 def _rotate(values: Sequence[Fraction], axis: int) -> tuple[Fraction, Fraction, Fraction]:

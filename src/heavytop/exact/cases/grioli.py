@@ -14,13 +14,12 @@ Source: G. Grioli, Ann. Mat. Pura Appl. 26 (1947) 271; Borisov and Mamaev, Rigid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, between, half_angle
 from heavytop.exact.flint.balls import ball
 from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
@@ -74,12 +73,7 @@ class Grioli(WithAttitude):
             [cosine * b + sine * r for b, r in zip(w, axis, strict=True)],
             [cosine * r - sine * b for b, r in zip(w, axis, strict=True)],
         )
-
-        def carry(vector: Sequence[Any]) -> list[Any]:
-            parts = dot(vector, u0), dot(vector, w0), dot(vector, axis)
-            return [sum(part * e[k] for part, e in zip(parts, space, strict=True)) for k in range(3)]
-
-        return [rate * (a + r) for a, r in zip(u, axis, strict=True)], carry
+        return [rate * (a + r) for a, r in zip(u, axis, strict=True)], between((u0, w0, axis), space)
 
 
 def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:

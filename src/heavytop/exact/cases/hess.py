@@ -24,7 +24,6 @@ Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -36,7 +35,7 @@ from heavytop.exact.cases.hess_transfer import System2, Transfer, plan
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.cases.pendulum import Swing, swing
-from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, constant, kept, sign, tanh_sech
+from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, between, constant, kept, sign, tanh_sech
 from heavytop.exact.flint.balls import (
     Undecided,
     ball,
@@ -46,7 +45,7 @@ from heavytop.exact.flint.balls import (
     unit_of_time,
     whole_evaluation,
 )
-from heavytop.exact.separable.abel import REMEDY, Inversion, decide
+from heavytop.exact.separable.abel import REMEDY, decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM, LEVEL_MOMENTUM, ExactRelation
 from heavytop.precision import cross, dot
@@ -243,10 +242,7 @@ class HessMotion:
         return self._state(*self._moving(phase, u * scale, v * scale))
 
     def _phase(self, time: arb) -> tuple[arb, int]:
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
-        return phase, turns
+        return phase_at(self.gap, self.origin + time)
 
     def azimuth(self) -> Azimuth:
         """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
@@ -348,12 +344,7 @@ class HessPendulum(WithAttitude):
         path, began = _path(self)
         frame, speed = path.at(time)
         size = path.inertia[1] * speed
-
-        def carry(vector: Sequence[Any]) -> list[Any]:
-            parts = [dot(vector, direction) for direction in began]
-            return [sum(part * e[k] for part, e in zip(parts, frame, strict=True)) for k in range(3)]
-
-        return [size * e / i for e, i in zip(frame[0], path.inertia, strict=True)], carry
+        return [size * e / i for e, i in zip(frame[0], path.inertia, strict=True)], between(began, frame)
 
 
 @kept

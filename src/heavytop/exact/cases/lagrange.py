@@ -31,11 +31,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any, Self
 
 from flint import acb, arb, arb_series, fmpq_poly
 
-from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor, turned
+from heavytop.exact.closed_form import (
+    ClosedForm,
+    across,
+    balls,
+    carried_xi,
+    initial_xi,
+    instant,
+    kept,
+    rotate,
+    taylor,
+    turned,
+)
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding, imag, real
 from heavytop.exact.flint.balls import ball, coefficient, current_length, exponent, rational, series_length, to_bits
@@ -125,22 +137,18 @@ class Lagrange(ClosedForm):
         """
 
         def evaluate(_working: int) -> list[arb]:
-            start = initial_xi(self.start.gamma)
-            if time == 0:
-                return start
-            # ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
-            basis = across(self.start.gamma)
-            exact, norm = balls(basis), ball(dot(basis, basis))
-            size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
-            with series_length(1):
-                now = self.evaluate(time)[3:]
-            unit, gamma = ([g / size for g in vector] for vector in (balls(self.start.gamma), now))
-            first = self._carried(basis, time)
-            second = cross(gamma, first)
-            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
-            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+            gamma = self.start.gamma
+            return carried_xi(gamma, partial(self._both, time)) if time else initial_xi(gamma)
 
         return to_bits(evaluate, bits, time, 2)
+
+    def _both(self, time: Fraction, basis: Vector) -> tuple[list[arb], Vector]:
+        """The vector ``basis`` and γ × basis/|γ|, fixed in space, at ``time``."""
+        size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
+        with series_length(1):
+            gamma = [g / size for g in self.evaluate(time)[3:]]
+        first = self._carried(basis, time)
+        return first, cross(gamma, first)
 
     def _carried(self, basis: Vector, time: Fraction) -> list[arb]:
         """The vector :func:`across` γ, fixed in space, at ``time``.
@@ -172,12 +180,6 @@ def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, 
     minus = h * g.conjugate() / (x - size)
     twist = minus * w - acb(0, 2) * slope
     return (twist * w - h * (x - size) * g) / weight, minus
-
-
-def across(gamma: Vector) -> Vector:
-    """An exact vector ⟂ γ, not 0."""
-    candidates = ((_ZERO, gamma[2], -gamma[1]), (-gamma[2], _ZERO, gamma[0]))
-    return candidates[0] if any(candidates[0]) else candidates[1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
-from heavytop.exact.separable.abel import Inversion, decide
+from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
 from heavytop.precision import shown
@@ -184,10 +184,7 @@ class OneGapMotion:
         return self._state(self._moving(phase), turns)
 
     def _phase(self, time: arb) -> tuple[arb, int]:
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
-        return phase, turns
+        return phase_at(self.gap, self.origin + time)
 
     def azimuth(self) -> Azimuth:
         """That of the level part of M about γ; see :meth:`Curve.turning`."""

@@ -18,14 +18,14 @@ Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from flint import arb
 
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, kept, sign
+from heavytop.exact.closed_form import Carry, WithAttitude, about, kept, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import ball, whole
 from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
@@ -78,14 +78,6 @@ class Pendulum(WithAttitude):
     def steady(self) -> bool:
         """It stands still: at rest where no torque acts."""
         return not any(self.axis)
-
-    def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self)
-        if lattice is None:
-            return WithAttitude.evaluate(self, time)
-        omega, carry = lattice.motion(instant(time))
-        return [*omega, *carry(lattice.gamma)]
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -160,22 +152,12 @@ class _Lattice:
     axis: list[arb]
     swing: Swing
     half: tuple[arb, arb]
-    gamma: list[arb]
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         sine, cosine, speed = self.swing.at(time)
         cosine0, sine0 = self.half
         c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0
-        cosine, sine = c * c - s * s, 2 * c * s
-
-        def carry(vector: Sequence[Any]) -> list[Any]:
-            along, across = dot(self.axis, vector), cross(self.axis, vector)
-            return [
-                along * e + cosine * (v - along * e) + sine * w
-                for e, v, w in zip(self.axis, vector, across, strict=True)
-            ]
-
-        return [-speed * e for e in self.axis], carry
+        return [-speed * e for e in self.axis], partial(about, self.axis, c * c - s * s, -2 * c * s)
 
 
 @kept
@@ -192,7 +174,7 @@ def _lattice(case: Pendulum) -> _Lattice | None:
     square = dot(n, n) * dot(gamma, gamma)
     moving, half = swing(inertia, kinetic, dot(n, gamma), square, sign(-rate), sign(torque))
     size = ball(length).sqrt()
-    return _Lattice([ball(component) / size for component in axis], moving, half, balls(gamma))
+    return _Lattice([ball(component) / size for component in axis], moving, half)
 
 
 def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:

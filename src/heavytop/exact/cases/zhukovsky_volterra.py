@@ -34,7 +34,7 @@ from typing import Any
 from flint import arb, arb_mat, fmpq_mat
 
 from heavytop.errors import LevelNotDone
-from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor
+from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor, without_turning
 from heavytop.exact.elliptic.quartic import lift
 from heavytop.exact.elliptic.weierstrass import (
     Lattice,
@@ -376,7 +376,7 @@ def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
     for real_part, imaginary in zip(_body_series(case, across), _body_series(case, beside), strict=True):
         rows = [_times_taylor(exact.series, part) for part in (real_part, imaginary)]
         # Φ^(k) begins with (−1)^k k!/t^(k + 1)
-        parts = enumerate(reversed(_without_turning(rows[0], rows[1], winding)[:_POLE]))
+        parts = enumerate(reversed(without_turning(rows[0], rows[1], winding)[:_POLE]))
         scaled = [(a * (-1) ** k / factorial(k), b * (-1) ** k / factorial(k)) for k, (a, b) in parts]
         factors.append([*(ball(a) for a, _ in scaled[:order]), *(ball(-b) * root for _, b in scaled[:order])])
     return _Fixed(ball(share), second_kind(_lattice(case), winding), arb_mat(factors), invariant, order)
@@ -386,18 +386,3 @@ def _body_series(case: ZhukovskyVolterra, fixed: Vector) -> list[list[Fraction]]
     """The Taylor coefficients of a vector fixed in space in body axes, up to t^4."""
     rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), (*case.start.omega, *fixed), _POLE)[3:]
     return [[c / factorial(n) for n, c in enumerate(row)] for row in rows]
-
-
-def _without_turning(
-    one: Sequence[Fraction], other: Sequence[Fraction], winding: Winding
-) -> list[tuple[Fraction, Fraction]]:
-    """e^(−iκt) (one + i √square other), coefficient by coefficient as (real, imaginary/√square)."""
-    found = []
-    for place in range(len(one)):
-        a = b = Fraction(0)
-        for n in range(place + 1):
-            weight = (-winding.rate) ** n * (-winding.square) ** (n // 2) / factorial(n)
-            u, v = one[place - n], other[place - n]
-            a, b = (a + weight * u, b + weight * v) if n % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
-        found.append((a, b))
-    return found

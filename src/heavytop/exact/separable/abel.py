@@ -195,6 +195,14 @@ class Inversion:
         return [arb("nan")] * len(near)
 
 
+def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
+    """θ and whole turns of a single variable whose G is ``moment``; raises Undecided where that is not proven."""
+    (phase,), (turns,) = Inversion((variable,), (1,)).phases([moment])
+    if not phase.is_finite():
+        raise Undecided
+    return phase, turns
+
+
 # One of two variables rests at a double root of the polynomial: what is left of Abel's integrals for the other.
 #
 # Where v_o rests at a double root e the integrand v^j/√g of the other has a pole at e, and with G_j = ε F_j + (...)

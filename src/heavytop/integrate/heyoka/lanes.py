@@ -72,6 +72,41 @@ class Work:
             self.check()
         self.send((index, time, state))
 
+    def keep(self, run: OnTheWay, state: Any) -> None:
+        """Send the run's next sample to the observer, or keep it."""
+        time = self.times[len(run.times)]
+        run.times.append(time)
+        if self.observed:
+            self.observe(run.index, time, state)
+        else:
+            run.states.append(state)
+
+    def end(
+        self,
+        run: OnTheWay,
+        integrator: str,
+        outcome: Outcome,
+        reached: Fraction,
+        steps: int,
+        order: int,
+        compiling: float,
+        flags: dict[str, str],
+    ) -> None:
+        """Hand in a motion of a lane; reached: its time, unless it came to its last sample."""
+        ended = Trajectory(
+            run.problem,
+            integrator,
+            tuple(run.times),
+            tuple(run.states),
+            outcome,
+            run.times[-1] if outcome is Outcome.SUCCESS else reached,
+            steps,
+            order,
+            {"compile": compiling, "run": perf_counter() - run.began},
+            flags,
+        )
+        self.finish(run.index, ended)
+
     def finish(self, index: int, run: Trajectory) -> None:
         """Hand in a motion that ended, behind its samples."""
         self.send((index, run))
@@ -83,16 +118,22 @@ class Work:
 
 
 @dataclass(slots=True, eq=False)
-class _Run:
-    """A problem in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
+class OnTheWay:
+    """A problem of an ensemble that is being computed, and its samples so far."""
 
     index: int
     problem: Problem
-    parameters: Any
     began: float
+    times: list[Fraction] = field(default_factory=list, kw_only=True)
+    states: list[Any] = field(default_factory=list, kw_only=True)
+
+
+@dataclass(slots=True, eq=False)
+class _Run(OnTheWay):
+    """One in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
+
+    parameters: Any
     asked: int = 0
-    times: list[Fraction] = field(default_factory=list)
-    states: list[Any] = field(default_factory=list)
 
 
 class _Ends(NamedTuple):
@@ -150,9 +191,9 @@ class Lanes:
         """Put the next problem into the lane; when there is none, a dummy motion."""
         taken = self.work.take()
         parameters, state = arrays(taken[1]) if taken else _DUMMY
-        run = _Run(*taken, parameters, perf_counter()) if taken else None
+        run = _Run(*taken, perf_counter(), parameters) if taken else None
         if run and self.work.times[0] == 0:
-            self._keep(run, state)
+            self.work.keep(run, state)
         high, low = (word.copy() for word in self.mover.dtime)
         high[lane] = low[lane] = 0.0
         self.mover.set_dtime(high, low)
@@ -263,9 +304,9 @@ class Lanes:
         states = sampler.state.T.copy()
         for sample, state, (*_, steps) in zip(batch, states, sampler.propagate_res, strict=False):
             run = sample.run
-            self._keep(run, state)
+            self.work.keep(run, state)
             if len(run.times) == len(self.work.times):
-                self._finish(run, Outcome.SUCCESS, run.times[-1], int(sample.before.steps[sample.lane]) + steps)
+                self._finish(run, Outcome.SUCCESS, Fraction(0), int(sample.before.steps[sample.lane]) + steps)
 
     def _stop(self, lane: int, outcome: Outcome, time: OrderedRing, steps: Any, rest: Any = None) -> None:
         """End the run in the lane; SUCCESS where it is an equilibrium, ``rest``."""
@@ -273,34 +314,13 @@ class Lanes:
             self._take_samples()
         if run := self.runs[lane]:
             while outcome is Outcome.SUCCESS and len(run.times) < len(self.work.times):
-                self._keep(run, rest.copy())
-            self._finish(run, outcome, run.times[-1] if outcome is Outcome.SUCCESS else exact(time), int(steps))
+                self.work.keep(run, rest.copy())
+            self._finish(run, outcome, Fraction(0) if outcome is Outcome.SUCCESS else exact(time), int(steps))
         self._load(lane)
-
-    def _keep(self, run: _Run, state: Any) -> None:
-        """Send the run's next sample to the observer, or keep it."""
-        time = self.work.times[len(run.times)]
-        run.times.append(time)
-        if self.work.observed:
-            self.work.observe(run.index, time, state)
-        else:
-            run.states.append(state)
 
     def _finish(self, run: _Run, outcome: Outcome, reached: Fraction, steps: int) -> None:
         tool = self.work.tool
-        ended = Trajectory(
-            run.problem,
-            "heyoka:batch",
-            tuple(run.times),
-            tuple(run.states),
-            outcome,
-            reached,
-            steps,
-            self.mover.order,
-            {"compile": tool.seconds, "run": perf_counter() - run.began},
-            tool.flags,
-        )
-        self.work.finish(run.index, ended)
+        self.work.end(run, "heyoka:batch", outcome, reached, steps, self.mover.order, tool.seconds, tool.flags)
 
 
 # Many short motions of one system at the same times, as arrays: heyoka's lanes, one call for eight motions.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
-from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
+from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, TaylorStep, Trajectory, sampled
 from heavytop.precision import OrderedRing, Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
@@ -69,7 +69,7 @@ class Stepper:
                 return outcome
         return Outcome.SUCCESS
 
-    def at(self, target: Any) -> tuple[Outcome, Any]:
+    def at(self, target: Any, time: Fraction | None = None) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach` and, where that is success, the state there."""
         if target == 0:
             return Outcome.SUCCESS, self.engine.state.copy()
@@ -143,13 +143,19 @@ class Stepper:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
         return self.engine.tc.copy()
 
-    def begin(self, place: Place) -> None:
-        """Go on from there; raises ValueError for a state of another length."""
+    def take_up(self, place: Place, covered: Any) -> None:
+        """Go on from there and take the step again that covers the last sample.
+
+        Raises ValueError for a state of another length.
+        """
         if len(place.state) != len(self.engine.state):
             raise ValueError(f"a state of {len(place.state)} numbers")
         self.engine.state[:] = numpy.array(place.state)
         self.engine.dtime = place.time
         self.steps, self.time = place.steps, self.engine.time
+        self.reach(covered)
+        if self.rest is None:
+            place.require_covered(self.steps)
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
         """Where the last step began."""
@@ -209,9 +215,6 @@ def far(forwards: bool, precision: Precision) -> Any:
 def at_rest(state: Any, coefficients: Any) -> bool:
     """Whether a motion is constant: at an equilibrium every Taylor coefficient is 0 and heyoka finds no step."""
     return bool(numpy.isfinite(state).all()) and not coefficients[:, 1:].any()
-
-
-Observer = Callable[[Fraction, Any], None]
 
 
 def propagate(
@@ -283,31 +286,8 @@ def follow(
     load(engine, problem)
     forwards = bool(targets[-1] >= 0)
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
-    kept_times: list[Fraction] = []
-    kept_states: list[Any] = []
-    outcome, done, began = Outcome.SUCCESS, 0, perf_counter()
-    if place is not None:
-        place.require_same(tool.flags)
-        stepper.begin(place)
-        done, began = place.samples, began - place.seconds
-        kept_times = [exact(target) for target in targets[:done]]
-        stepper.reach(targets[done - 1])
-        if stepper.rest is None:
-            place.require_covered(stepper.steps)
-    for target in targets[done:]:
-        outcome, state = stepper.at(target)
-        if outcome is not Outcome.SUCCESS:
-            break
-        done += 1
-        kept_times.append(exact(target))
-        if observer is None:
-            kept_states.append(state)
-        else:
-            observer(kept_times[-1], state)
-        if mark is not None and target != 0:
-            mark(stepper.place(done, perf_counter() - began, tool.flags))
     return _trajectory(
-        tool, engine, problem, stepper, tuple(kept_times), tuple(kept_states), outcome, perf_counter() - began
+        tool, engine, problem, stepper, *sampled(stepper, targets, tool.flags, perf_counter(), observer, place, mark)
     )
 
 

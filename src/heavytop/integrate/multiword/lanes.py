@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from itertools import permutations
@@ -20,7 +20,7 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind, processors
-from heavytop.integrate.heyoka.lanes import Work
+from heavytop.integrate.heyoka.lanes import OnTheWay, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import CHUNK_SECONDS, OUTCOMES, follow, native_state, sums_of_two
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -43,18 +43,13 @@ _RISE = 2
 
 
 @dataclass(slots=True, eq=False)
-class _Motion:
+class _Motion(OnTheWay):
     """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
 
-    index: int
-    problem: Problem
     scaled: Scaled
     exponents: tuple[int, ...]
     targets: list[Fraction]
-    began: float
     moved: tuple[Doubles, Doubles] | None = None
-    times: list[Fraction] = field(default_factory=list)
-    states: list[Any] = field(default_factory=list)
 
     @property
     def target(self) -> Fraction:
@@ -142,7 +137,7 @@ class WordsLanes:
                 continue
             if scaled.rate not in self.targets:
                 self.targets[scaled.rate] = [abs(time) * scaled.rate for time in self.work.times]
-            motion = _Motion(index, problem, scaled, scaled.exponents, self.targets[scaled.rate], perf_counter())
+            motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.targets[scaled.rate])
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
@@ -197,12 +192,7 @@ class WordsLanes:
         """Keep a sample, or send it to the observer; False where there is none, being too large for the format."""
         if native is None:
             return False
-        time = self.work.times[len(motion.times)]
-        motion.times.append(time)
-        if self.work.observed:
-            self.work.observe(motion.index, time, native)
-        else:
-            motion.states.append(native)
+        self.work.keep(motion, native)
         return True
 
     def _leave(self, eight: Eight, lane: int, outcome: Outcome, steps: int) -> None:
@@ -212,21 +202,8 @@ class WordsLanes:
         self._finish(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
 
     def _finish(self, motion: _Motion, outcome: Outcome, reached: Fraction, steps: int) -> None:
-        self.work.finish(
-            motion.index,
-            Trajectory(
-                motion.problem,
-                "multiword",
-                tuple(motion.times),
-                tuple(motion.states),
-                outcome,
-                motion.times[-1] if outcome is Outcome.SUCCESS else reached,
-                steps,
-                self.arithmetic.in_lanes.order,
-                {"compile": self.seconds, "run": perf_counter() - motion.began},
-                self.arithmetic.flags | self._own_flags(),
-            ),
-        )
+        order, flags = self.arithmetic.in_lanes.order, self.arithmetic.flags | self._own_flags()
+        self.work.end(motion, "multiword", outcome, reached, steps, order, self.seconds, flags)
 
 
 # Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.

@@ -11,7 +11,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate.multiword.engines import choose, compiled
-from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
+from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, Trajectory, sampled
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
@@ -20,8 +20,6 @@ from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
-
-Observer = Callable[[Fraction, Any], None]
 
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
@@ -90,59 +88,23 @@ def follow(
     flags = arithmetic.flags
     forwards = bool(targets[-1] >= 0)
     began = perf_counter()
-    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, step_limit, between)
-    kept_times: list[Fraction] = []
-    kept_states: list[Any] = []
-    outcome, done = Outcome.SUCCESS, 0
+    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, problem.precision, step_limit, between)
     if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
         outcome, states = pace.sampled(targets, problem.precision)
-        seconds = {"compile": compiling, "run": perf_counter() - began}
-        times = RoundedTimes(targets[: len(states)])
-        return _trajectory(problem, pace, flags, times, states, outcome, seconds)
-    if place is not None:
-        place.require_same(flags)
-        done, began = place.samples, began - place.seconds
-        kept_times = [exact(target) for target in targets[:done]]
-        pace.take_up(place, kept_times[-1])
-    for target in map(exact, targets[done:]):
-        outcome = pace.reach(target)
-        if outcome is not Outcome.SUCCESS:
-            break
-        outcome, state = pace.native(target, problem.precision)
-        if outcome is not Outcome.SUCCESS:
-            break
-        done += 1
-        kept_times.append(target)
-        if observer is None:
-            kept_states.append(state)
-        else:
-            observer(target, state)
-        if mark is not None and target != 0:
-            mark(pace.place(done, perf_counter() - began, flags))
-    seconds = {"compile": compiling, "run": perf_counter() - began}
-    return _trajectory(problem, pace, flags, kept_times, kept_states, outcome, seconds)
-
-
-def _trajectory(
-    problem: Problem,
-    pace: _Pace,
-    flags: dict[str, str],
-    times: Sequence[Fraction],
-    states: Any,
-    outcome: Outcome,
-    seconds: dict[str, float],
-) -> Trajectory:
-    reached = times[-1] if outcome is Outcome.SUCCESS and times else pace.time
+        times: Sequence[Fraction] = RoundedTimes(targets[: len(states)])
+        seconds = perf_counter() - began
+    else:
+        times, states, outcome, seconds = sampled(pace, targets, flags, began, observer, place, mark)
     return Trajectory(
         problem,
         "multiword",
-        times if isinstance(times, RoundedTimes) else tuple(times),
+        times,
         states,
         outcome,
-        reached,
+        times[-1] if outcome is Outcome.SUCCESS and times else pace.time,
         pace.run.steps,
         pace.run.order,
-        seconds,
+        {"compile": compiling, "run": seconds},
         flags,
     )
 
@@ -284,6 +246,7 @@ class _Pace:
 
     run: ResumableRun
     scaled: Scaled
+    precision: Precision
     step_limit: int | None
     between: Callable[[], None] | None
     _chunk: int = _FIRST_CHUNK
@@ -359,19 +322,22 @@ class _Pace:
                 others[row] = tuple(sum(map(Fraction, column), Fraction(0)) for column in words[row].T.tolist())
         return status, states, others
 
-    def native(self, target: Fraction, precision: Precision) -> tuple[Outcome, Any]:
-        """The state at ``target``, inside the last step, rounded; None where it cannot be given."""
+    def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
+        """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""
         import numpy
 
-        if isinstance(self.run, Floating) and not self.scaled.rest and target != 0:
-            words = self.run.words_at(abs(target) * self.scaled.rate).tolist()
+        outcome, precision = self.reach(time), self.precision
+        if outcome is not Outcome.SUCCESS:
+            return outcome, None
+        if isinstance(self.run, Floating) and not self.scaled.rest and time != 0:
+            words = self.run.words_at(abs(time) * self.scaled.rate).tolist()
             pairs = (
                 (words[at], words[at + 8], power) for at, power in zip(PLACES, self.scaled.exponents, strict=False)
             )
             state = sums_of_two(pairs, precision)
             if state is not None:
                 return Outcome.SUCCESS, numpy.array(state)
-        sample = self.sample(target)
+        sample = self.sample(time)
         if sample is None:
             return Outcome.CAPACITY, None
         rounded = native_state(sample, precision)
@@ -388,11 +354,11 @@ class _Pace:
         words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
         return Place(samples, (), (), steps, seconds, flags, words)
 
-    def take_up(self, place: Place, covered: Fraction) -> None:
+    def take_up(self, place: Place, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
         if place.words:
             self.run.restore(place.words, place.steps)
-            self.reach(covered)
+            self.reach(exact(covered))
             place.require_covered(self.run.steps)
             if self.run.place() != place.words:
                 raise ValueError("words that are no state of this arithmetic")
