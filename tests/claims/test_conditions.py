@@ -236,7 +236,7 @@ LOOSE = {
 }
 
 
-def test_an_undecided_claim_says_which_assumption_would_decide_it_and_that_one_does() -> None:
+def test_an_undecided_claim_says_which_assumption_would_decide_it_and_that_one_does(unhurried) -> None:
     report = audit_claim(claim_from_table(LOOSE, "claim"))
     assert report.verdict == "undecided"
     assert dict(report.deciding)["a > 0"] == "holds"

@@ -564,11 +564,15 @@ def _neighbours(
     given: Examined, kind: str, off: int, beyond: Fraction
 ) -> tuple[TimesHypothesis, Examined, list[Fraction]]:
     """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
-    left: else it is that at ``beyond``.
+    left that are about as wrong as all: else it is that at ``beyond``.
     """
     inside = range(len(given.all_times))
     rows = [row for row in given.rows if row + off in inside]
-    at = given.at(rows) if len(rows) >= _FEWEST_ROWS else given
+    at = given
+    if _FEWEST_ROWS <= len(rows) < len(given.rows):
+        fewer = given.at(rows)
+        wrong, wrong_of_all = (each.error(each.supposed(each.times)) for each in (fewer, given))
+        at = fewer if ALIKE * wrong >= wrong_of_all else given
     times = [given.all_times[row + off] if row + off in inside else beyond for row in at.rows]
     return TimesHypothesis(kind), at, times
 
