@@ -372,7 +372,7 @@ class Step:
         frame, turned, slack = transfer or self.transfer()
         radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
-        rounding = float(np.ldexp(0.5, max(dropped - errors.exponent, -1000))) if dropped else 0.0
+        rounding = float(np.ldexp(0.5, dropped - errors.exponent)) if dropped else 0.0
         radii = (radii + reach * (self.local + rounding)) * _UP
         exponent = errors.exponent
         if radii.max() > 2.0**400:
