@@ -30,13 +30,13 @@ T = TypeVar("T")
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Python's own: a file such as random.py in the working directory is not taken for a module."""
-_FAREWELL = 1.0
-"""Seconds that a process which has broken its pipe has to end."""
+_LAST_SECONDS = 1.0
+"""That a process has to end once it has closed its pipe."""
 _starting = Lock()
 
 
 class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
-    """A process that begins with :data:`SAFE_PATH`, and goes on without it where this process has none.
+    """A process that is started with :data:`SAFE_PATH`, and runs without it where this process has none.
 
     It ends with its parent, however that ends, so that a daemon of multiprocessing may start one, such as the worker of
     Dask.
@@ -121,7 +121,9 @@ class ChildContext(LokyContext):  # type: ignore[misc]
     def ending(self) -> str:
         """How its last process ended by itself; empty where the system does not say."""
         child = self._children[-1]
-        child.join(_FAREWELL)
+        if child.pid is None:
+            return ""
+        child.join(_LAST_SECONDS)
         return "" if child.exitcode is None else how_it_ended(child.exitcode)
 
     def kill(self) -> None:

@@ -8,7 +8,7 @@ from decimal import Decimal
 from fractions import Fraction
 from math import isqrt
 from operator import lt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import (
@@ -27,9 +27,6 @@ from heavytop.precision import (
     vector,
 )
 from heavytop.top.attitude import Attitude, rotated, transposed
-
-if TYPE_CHECKING:
-    pass
 
 _SHOWN_BITS = 64
 _ATTITUDE_BITS = 256

@@ -7,16 +7,13 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from heavytop import written_numbers
 from heavytop.errors import InputError, quoted
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
 from heavytop.precision import Vector, exact, vector
 from heavytop.trajectories.observed import RawStart
-
-if TYPE_CHECKING:
-    pass
 
 REMEDY = "`heavytop docs score` lists the columns that are understood."
 _DEGREES = re.compile(r"[\[(/]?\s*(deg|degrees?|°)\s*[\])]?$", re.IGNORECASE)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
 
@@ -16,9 +16,6 @@ from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, Tay
 from heavytop.precision import OrderedRing, Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
-
-if TYPE_CHECKING:
-    pass
 
 # One run of a compiled integrator, step by step.
 #
