@@ -83,6 +83,14 @@ def test_centres_on_an_axis_and_constant_gamma_leave_nothing_to_fit() -> None:
             scored(states, TIMES[:8], top=top, start=start)
 
 
+@pytest.mark.parametrize(("kind", "off"), [("rows_late", 1), ("rows_off_by_one", -1)])
+def test_states_a_row_late_or_early_are_named_where_times_are_uneven(kind: str, off: int) -> None:
+    times = [Fraction(k * k + 3 * k, 40) for k in range(1, 17)]
+    states = np.roll(motion(TOP, START, HEAVY_TOP, times), off, axis=0)
+    states[0 if off > 0 else -1] = states[off if off > 0 else -2]  # the end has no neighbour
+    assert kinds(scored(states, times))[0] == kind
+
+
 @pytest.mark.parametrize("row", [0, 41, 98, 99])
 def test_one_state_among_a_hundred_is_named(row: int) -> None:
     times = [Fraction(k, 2) for k in range(1, 101)]
