@@ -8,7 +8,7 @@ are taken on the expression before.  Reduction to 0 is a proof; anything else pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -330,7 +330,7 @@ class Field:
 
     def expression(self, value: Quotient) -> sympy.Expr:
         """The quotient as an expression, in factors."""
-        fraction = sympy.factor(_polynomial(value.numerator) / _polynomial(value.denominator))
+        fraction = sympy.Mul(*_factors(value.numerator), *(1 / factor for factor in _factors(value.denominator)))
         occurring = used(value.numerator) | used(value.denominator)
         return fraction.xreplace({_placeholder(index): self.meaning(index) for index in occurring})
 
@@ -349,6 +349,24 @@ def _index(value: Quotient) -> int:
 
 def _placeholder(index: int) -> sympy.Symbol:
     return sympy.Symbol(f"x{index}", real=True)
+
+
+def _factors(p: fmpq_mpoly) -> Iterator[sympy.Expr]:
+    """A number and powers of factors, by FLINT: SymPy may take minutes.  A factor has no content, and its leading
+    coefficient, in SymPy's order, is positive.
+    """
+    if not p:
+        yield sympy.Integer(0)
+        return
+    number, factors = p.factor()
+    number = sympy.Rational(int(number.p), int(number.q))
+    for factor, power in factors:
+        content, part = sympy.Poly(_polynomial(factor), domain="QQ").primitive()
+        if part.LC() < 0:
+            content, part = -content, -part
+        number *= content ** int(power)
+        yield part.as_expr() ** int(power)
+    yield number
 
 
 def _polynomial(p: fmpq_mpoly) -> sympy.Expr:
