@@ -167,11 +167,12 @@ def test_sums_have_room_for_the_largest_products_between_two_looks() -> None:
         assert (certified.bound(numpy.zeros((2, 3, 8)), added, 2, 1.0) is not None) is fine
 
 
-@pytest.mark.parametrize(("words", "vectors"), [(3, 1), (4, 2), (24, 1)])
+@pytest.mark.parametrize(("words", "vectors"), [(3, 1), (4, 2), (24, 1), (45, 2)])
 def test_how_large_words_are_is_measured_on_the_words_themselves(words: int, vectors: int) -> None:
     """y as the lanes give it, from random words of y; against sums and maxima of exact fractions."""
     random, grid, orders = numpy.random.default_rng(words), grid_of(words, whole=True), 5
-    units = 2.0 ** (-grid.bits * numpy.arange(1.0, words + 1))[:, None]
+    units = numpy.array([grid.unit(k) for k in range(words)])[:, None]
+    places = [Fraction(1, 2 ** (grid.bits * (k + 1))) / Fraction(grid.unit(k)) for k in range(words)]
     y = numpy.rint(random.normal(0, 2.0 ** (grid.bits - 2), (orders + 1, vectors, words, 8))) * units
     y[..., 6:] = 0
     right, *left = (
@@ -181,19 +182,64 @@ def test_how_large_words_are_is_measured_on_the_words_themselves(words: int, vec
     rows = doubles((orders + 1) * (1 + vectors) * words * 8)
     table = rows.reshape(orders + 1, 1 + vectors, words, 8)
     table[:] = numpy.stack([right, *left], axis=1)
-    found = [doubles(8 * count) for count in (*[vectors * (orders + 1)] * 2, (1 + vectors) * words, vectors * words)]
-    arithmetic.machine(words, vectors).functions["extents"](pointer(rows), orders, *map(pointer, found))
-    values, sizes, widest, added = (array.reshape(-1, 8) for array in found)
+    found = [doubles(8 * count) for count in (*[vectors * (orders + 1)] * 3, (1 + vectors) * words, vectors * words)]
+    arithmetic.machine(grid, vectors).functions["extents"](pointer(rows), orders, *map(pointer, found))
+    values, sizes, behind, widest, added = (array.reshape(-1, 8) for array in found)
     assert (widest.reshape(table.shape[1:]) == numpy.abs(table).max(axis=0)).all()
     for n, block in enumerate(y.reshape(-1, words, 8)):
         for lane in range(8):
-            exactly = [Fraction(float(word)) for word in block[:, lane]]
+            exactly = [Fraction(float(word)) * place for word, place in zip(block[:, lane], places, strict=True)]
             size = sum(map(abs, exactly))
+            if grid.relative:
+                far = sum(map(abs, exactly[arithmetic.FIRST_BEHIND :]))
+                shown = Fraction(float(behind[n, lane])) / 2 ** (grid.bits * (arithmetic.FIRST_BEHIND + 1))
+                assert abs(shown - far) <= far / 2**46
             assert abs(Fraction(float(values[n, lane])) - sum(exactly)) <= size / 2**50
             assert abs(Fraction(float(sizes[n, lane])) - size) <= size / 2**48
     for index, each in enumerate(y.transpose(1, 2, 3, 0).reshape(-1, orders + 1)):
         total = sum(abs(Fraction(float(word))) for word in each)
         assert abs(Fraction(float(added.ravel()[index])) - total) <= total / 2**48
+
+
+@pytest.mark.parametrize(("words", "system", "attitude"), [(3, HEAVY_TOP, False), (6, HEAVY_GYROSTAT, True)])
+def test_words_over_their_own_units_are_the_same_numbers(words: int, system, attitude: bool) -> None:
+    """What many words are kept as, with few: coefficients, bound and sizes are those of words that are doubles."""
+    random, plain = Random(words), grid_of(words, whole=True)
+    relative = Grid(words, plain.bits, whole=True, relative=True)
+    for _ in range(3):
+        motion = some_motion(random, system, attitude)
+        series = [CertifiedSeries(motion.scaled, grid, motion.forwards) for grid in (plain, relative)]
+        for centre in (rounded(motion, plain), extreme_centre(random, plain, len(motion.scaled.state))):
+            one, other = ([each.series(centre, halvings) for halvings in range(2, 9)] for each in series)
+            assert any(one)
+            for a, b in zip(one, other, strict=True):
+                if a is None or b is None:
+                    assert a is b
+                    continue
+                assert a.values == b.values
+                assert list(a.total) == list(b.total)
+                assert a.nearest.tolist() == b.nearest.tolist()
+                assert a.scaled(3).tolist() == pytest.approx(b.scaled(3).tolist(), rel=2.0**-50, abs=2.0**-900)
+                assert a.rounding <= b.rounding <= a.rounding * 1.01
+
+
+def test_more_bits_than_the_exponents_of_doubles_reach_are_within_the_bound() -> None:
+    """1,204 bits, a coefficient below 2^-1200: its size is bounded at any power."""
+    grid, random = grid_of(28, whole=True), Random(28)
+    motion = some_motion(random)
+    certified = CertifiedSeries(motion.scaled, grid, motion.forwards)
+    centre = extreme_centre(random, grid, 6)
+    halvings = next(h for h in range(2, 9) if certified.series(centre, h) is not None)
+    share = used(motion, certified, centre, halvings)
+    assert share is not None
+    assert 1e-6 < share <= 1
+    series = certified.series(centre, halvings)
+    assert series is not None
+    for n, (column, size) in enumerate(zip(zip(*series.values, strict=True), series.scaled(2), strict=True)):
+        largest = max(map(abs, column))
+        assert Fraction(largest << 2 * n, 2**grid.total) <= Fraction(size)
+        assert Fraction(size) <= 8 * Fraction((largest + 8) << 2 * n, 2**grid.total)
+    assert largest < 8
 
 
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:

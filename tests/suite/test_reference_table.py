@@ -56,6 +56,7 @@ def test_closed_forms_reach_a_million():
     assert near == {
         "generic asymmetric",
         "generic asymmetric, far",
+        "generic asymmetric, farthest",
         "paper data, I1/I3 = 6",
         "beside goryachev",
         "beside kowalewski",

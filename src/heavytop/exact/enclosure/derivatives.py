@@ -481,7 +481,8 @@ def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: b
     together = Together.of(motion.field, [datum.field for datum in data_of])
     lanes = [given for _, given in found if given is not None]
     certified = columns = None
-    if in_words and len(lanes) == len(found):
+    grid = motion.grid(precision) if in_words else None
+    if grid is not None and not grid.relative and len(lanes) == len(found):
         certified = motion.certified(precision)
         columns = CertifiedColumns(certified, lanes)
     tangent = Tangent(motion.field, precision, together, certified, columns, data_of)

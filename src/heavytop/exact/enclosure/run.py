@@ -13,7 +13,7 @@ depend on what was asked before; what was computed before is only found faster.
 
 Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
 60 digits at t = 8 in 0.02 s; 30 digits at t = 100 in 0.1 s, at t = 1000 in 1.5 s; about 0.17 bits are lost a unit of
-time, so that t = 10,000 would need some 1,900 bits, more than there are words for, and is refused by default.
+time, so that t = 10,000 takes 1,935 bits at the beginning, the most that words have, and a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -236,7 +236,7 @@ def _times_as_far(span: Fraction, reached: Fraction) -> float:
 # A motion in units in which it is of ordinary size, and the arithmetic that carries its Taylor coefficients.
 
 
-_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24))
+_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24, 28, 32, 36, 40, 45))
 """Few of those that there are: each is compiled at its first use."""
 _STEPS_A_WORD = 2
 """Fewer steps than that are not worth the machine code."""
@@ -309,22 +309,24 @@ class ScaledMotion:
 
     def certified_at(self, precision: int) -> CertifiedSeries | None:
         """The Taylor coefficients in ``precision`` bits; None where they are exact integers."""
-        return self.certified(precision) if self._has_words(precision) else None
+        return None if self.grid(precision) is None else self.certified(precision)
 
-    def _has_words(self, precision: int) -> bool:
-        return self.in_words and any(grid.total == precision for grid in _GRIDS)
+    def grid(self, precision: int) -> Grid | None:
+        """That of so many bits; None where there is none."""
+        return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
         """Of the model of the cost, where ``lost`` bits are lost evenly on so many steps."""
         begun, in_words = planned
         precisions = [self.fewer(begun, lost * i / _PLACES) for i in range(_PLACES)]
-        words = [in_words if p == begun else self._has_words(p) for p in precisions]
+        words = [in_words if p == begun else self.grid(p) is not None for p in precisions]
         return steps / _PLACES * sum(map(seconds_a_step, precisions, words))
 
     def certified(self, precision: int) -> CertifiedSeries:
         """The Taylor coefficients in ``precision`` bits, one of those that words have."""
         if precision not in self._certified:
-            grid = next(grid for grid in _GRIDS if grid.total == precision)
+            grid = self.grid(precision)
+            assert grid is not None
             certified = CertifiedSeries(self.scaled, grid, self.forwards)
             self._require_right(certified)
             self._certified[precision] = certified

@@ -10,14 +10,18 @@ with i + j = k:
 d and l are exact, and l is a multiple of g_(k+1): nothing is lost but in the last level, as long as each S_k stays
 between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the bits of
 S ^ C are gathered, and a set exponent bit says that the step must not stand.
+
+Where K b bits are more than a double's exponents reach, each word is kept over its own unit, as an integer, and S_k
+over g_(k+1).  Then what goes on to the next word is multiplied by 2^b on its way, and a carry by 2^-b: the operations
+are the same, and as exact (:attr:`Grid.relative`).
 """
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ldexp
 
 import numpy
 from llvmlite import ir
@@ -26,6 +30,7 @@ from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
     INT_VECTOR,
+    LANES,
     POINTER,
     VECTOR,
     Code,
@@ -48,6 +53,8 @@ _HEAD, _EXCESS = 4, 2
 class Grid:
     """words: K.  bits: b, of each.
 
+    relative: whether word k is kept over its unit g_k; only where the grid is whole.
+
     whole: whether the last word is a whole multiple of its unit too, as proofs need it.  Else its sums begin at 0: it
     keeps some bits below the unit, and coefficients below the unit are not rounded away, which would err in the same
     way at every step.
@@ -56,6 +63,7 @@ class Grid:
     words: int
     bits: int
     whole: bool = False
+    relative: bool = False
 
     @property
     def bounded(self) -> bool:
@@ -76,7 +84,7 @@ class Grid:
 
     @property
     def smallest(self) -> float:
-        """What two coefficients in a row are below where the series ends."""
+        """What two coefficients in a row are below where the series ends, as the last word is kept."""
         return self.unit(self.words - 1) * (2.0 if self.whole else 2.0**-12)
 
     @property
@@ -84,15 +92,24 @@ class Grid:
         """Bits of a number behind the binary point."""
         return self.words * self.bits
 
+    @property
+    def apart(self) -> float:
+        """What a number counts for in the next word, over what it counts for in this one."""
+        return float(2.0**self.bits) if self.relative else 1.0
+
     def unit(self, k: int) -> float:
-        """g_k."""
-        return float(2.0 ** (-self.bits * (k + 1)))
+        """g_k, as word k is kept."""
+        return 1.0 if self.relative else float(2.0 ** (-self.bits * (k + 1)))
 
     def centre(self, k: int) -> float:
-        """C_k, to which a sum for level k is added."""
+        """What is added to word k and taken away again where it is rounded to its unit."""
         if k == self.words - 1 and not self.whole:
             return 0.0
         return 1.5 * 2.0**52 * self.unit(k)
+
+    def coarse(self, k: int) -> float:
+        """C_k, at which a sum for level k begins, as it is kept: over the unit of the next level where words are."""
+        return self.centre(k) * self.apart
 
 
 @dataclass(slots=True)
@@ -132,8 +149,10 @@ class Accumulator:
             low = in_pairs(code, lows)
             if k + 1 < last:
                 self.look(k + 1)
-                self.sums[k + 1] = code.add(self.sums[k + 1], low)
+                self.sums[k + 1] = passed_on(code, self.grid, low, self.sums[k + 1])
                 self.look(k + 1)
+        if self.grid.relative:
+            low = code.multiply(low, code.constant(self.grid.apart))
         pairs = [(i, last - i) for i in range(last + 1)] + [(i, last + 1 - i) for i in range(1, last + 1) if below]
         for i, j in pairs:
             low = code.fma(a[i], b[j], low)
@@ -144,7 +163,7 @@ class Accumulator:
         level = self.base + k
         if level < self.grid.words - 1:
             b = self.code.builder
-            centre = int(numpy.float64(self.grid.centre(level)).view(numpy.int64))
+            centre = int(numpy.float64(self.grid.coarse(level)).view(numpy.int64))
             centres = ir.Constant(INT_VECTOR, [ir.Constant(INT, centre)] * 8)
             self.seen = b.or_(self.seen, b.xor(b.bitcast(self.sums[k], INT_VECTOR), centres))
 
@@ -197,6 +216,76 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Value:
     return made
 
 
+_UNROLLED = 4
+"""Products of a level that are written out one after another."""
+
+
+def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> Value:
+    """The functions of :func:`write_kernels` as one, (left, right, count, sums, seen, levels), of a relative grid.
+
+    It is a loop over the products of a level: written out, its code would not stay in the processor's cache.  Levels do
+    not wait for each other: what is left of a level is added behind the products of the next, between two looks.
+    """
+    arguments = [POINTER, POINTER, INT, POINTER, POINTER, INT]
+    made, code = function(module, "long_products", ir.VoidType(), arguments)
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, terms, sums, seen, levels = made.args
+    b, one, lanes = code.builder, code.integer(1), code.integer(LANES)
+    last, apart = b.sub(levels, one), code.constant(grid.apart)
+    bits = ir.Constant(INT, int(numpy.float64(grid.coarse(0)).view(numpy.int64)))
+    centre = ir.Constant(INT_VECTOR, [bits] * LANES)
+
+    def look(found: Value, total: Value) -> Value:
+        return b.or_(found, b.xor(b.bitcast(total, INT_VECTOR), centre))
+
+    def exact_product(a: Value, c: Value, values: list[Value]) -> list[Value]:
+        total = code.fma(a, c, values[0])
+        low = code.fma(a, c, code.negative(code.subtract(total, values[0])))
+        return [total, code.add(values[1], low)]
+
+    def rounded_product(a: Value, c: Value, values: list[Value]) -> list[Value]:
+        return [code.fma(a, c, values[0])]
+
+    def term(m: Value, values: list[Value]) -> list[Value]:
+        ahead = code.address(left, b.mul(m, code.integer(row)))
+        behind = code.address(right, b.mul(m, code.integer(-row)))
+
+        def level(k: Value, product: Callable[..., list[Value]], found: list[Value]) -> list[Value]:
+            end, count = b.mul(k, lanes), b.add(k, one)
+
+            def some(start: Value, width: int, found: list[Value]) -> list[Value]:
+                for j in range(width):
+                    place = b.mul(b.add(start, code.integer(j)), lanes)
+                    pair = code.load(ahead, place), code.load(behind, b.sub(end, place))
+                    found = product(*pair, found)
+                return found
+
+            groups = b.sdiv(count, code.integer(_UNROLLED))
+            whole = b.mul(groups, code.integer(_UNROLLED))
+            found = code.loop(0, groups, lambda g, v: some(b.mul(g, code.integer(_UNROLLED)), _UNROLLED, v), found)
+            return code.loop(whole, count, lambda i, v: some(i, 1, v), found)
+
+        def exact_level(k: Value, values: list[Value]) -> list[Value]:
+            place = b.mul(k, lanes)
+            total, lows = level(k, exact_product, [code.load(sums, place), code.zero])
+            found = look(values[1], total)
+            total = code.fma(values[0], apart, total)
+            code.store(total, sums, place)
+            return [lows, look(found, total)]
+
+        lows, found = code.loop(0, last, exact_level, [code.zero, values[0]])
+        low = level(last, rounded_product, [code.multiply(lows, apart)])[0]
+        place = b.mul(last, lanes)
+        code.store(code.add(code.load(sums, place), low), sums, place)
+        return [found]
+
+    found = code.loop(0, terms, term, [b.bitcast(code.load(seen, 0), INT_VECTOR)])[0]
+    code.store(b.bitcast(found, VECTOR), seen, 0)
+    b.ret_void()
+    return made
+
+
 def bounded_product(code: Code, grid: Grid, a: list[Value], b: list[Value]) -> list[Value]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
 
@@ -221,21 +310,37 @@ def bounded_product(code: Code, grid: Grid, a: list[Value], b: list[Value]) -> l
     return [found[0], *(code.add(found[k], in_pairs(code, lows[k])) for k in range(1, last + 1))]
 
 
+def passed_on(code: Code, grid: Grid, left: Value, word: Value) -> Value:
+    """``word`` and what is ``left`` of the word before it."""
+    return code.fma(left, code.constant(grid.apart), word) if grid.relative else code.add(word, left)
+
+
+def carried_over(code: Code, grid: Grid, carry: Value, word: Value) -> Value:
+    """``word`` and the ``carry`` of the word behind it."""
+    return code.fma(carry, code.constant(1 / grid.apart), word) if grid.relative else code.add(word, carry)
+
+
 def centred(code: Code, grid: Grid, count: int) -> list[Value]:
     """The beginning of all sums."""
-    return [code.constant(grid.centre(k)) for k in range(count)]
+    return [code.constant(grid.coarse(k)) for k in range(count)]
+
+
+def summed(code: Code, grid: Grid, sums: list[Value]) -> list[Value]:
+    """Sums that began there, as words."""
+    words = [code.subtract(s, c) for s, c in zip(sums, centred(code, grid, len(sums)), strict=True)]
+    return [code.multiply(word, code.constant(1 / grid.apart)) for word in words] if grid.relative else words
 
 
 def carried(code: Code, grid: Grid, words: list[Value]) -> list[Value]:
     """The same number with each word but the first near b bits wide again."""
     carries = [None]
     for k in range(1, grid.words):
-        big = code.constant(grid.centre(k - 1))
+        big = code.constant(grid.coarse(k - 1))
         carries.append(code.subtract(code.add(words[k], big), big))
     found = []
     for k, word in enumerate(words):
         value = word if k == 0 else code.subtract(word, carries[k])
-        found.append(code.add(value, carries[k + 1]) if k + 1 < grid.words else value)
+        found.append(carried_over(code, grid, carries[k + 1], value) if k + 1 < grid.words else value)
     return found
 
 
@@ -243,15 +348,16 @@ def carried(code: Code, grid: Grid, words: list[Value]) -> list[Value]:
 
 
 # words up to which so many bits are safe in each: products of a few hundred orders stay inside the sums
-_BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (24, 43))
+_BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (45, 43))
 MOST_WORDS = 24
+"""Up to which every unit is a double."""
 _NARROWER = 2
 """By so many bits words are narrower where that is enough: fewer bits take fewer orders."""
 
 
 def grid_of(words: int, whole: bool = False) -> Grid:
-    """The grid of so many words, 2 to 24; whole: as in :class:`heavytop.multiword.fixed_point.arithmetic.Grid`."""
-    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most), whole)
+    """The grid of so many words, 2 to 24, or to 45 where it is ``whole``, as in :class:`Grid`."""
+    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most), whole, words > MOST_WORDS)
 
 
 def grid_for(bits: int) -> Grid | None:
@@ -278,7 +384,7 @@ def words_of(whole: int, grid: Grid) -> list[float]:
         shift = grid.bits * (grid.words - 1 - k)
         digit = (whole + (1 << shift >> 1)) >> shift if k < grid.words - 1 else whole
         whole -= digit << shift
-        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
+        found.append(float(digit) * grid.unit(k))
     return found
 
 
@@ -297,17 +403,23 @@ def exact(words: Doubles) -> Fraction:
 _FIRST, _SECOND = (2, 0, 1, 4, 5, 3, 8, 8), (8, 8, 8, 5, 5, 5, 8, 8)
 
 
+FIRST_BEHIND = 20
+"""The first word of those whose sizes are kept apart: what lies before it is a double far above the smallest."""
+
+
 @once
-def machine(words: int, vectors: int) -> Machine:
-    """extents(rows, orders, values, sizes, widest, added) for rows of R and L of each vector, K words each.
+def machine(grid: Grid, vectors: int) -> Machine:
+    """extents(rows, orders, values, sizes, behind, widest, added) for rows of R and L of each vector, K words each.
 
     values, sizes: for each order and vector Σ_k y_k and Σ_k |word k of y|, eight doubles each; the smallest words are
-    added first, so that a value is right to 2^-50 of its size.  widest: max_n |word k| of R and of each L.
+    added first, so that a value is right to 2^-50 of its size.  behind: of a relative grid, the sizes from word
+    :data:`FIRST_BEHIND` on, over its unit.  widest: max_n |word k| of R and of each L.
     added: Σ_n |word k of y| of each vector.
     """
+    words, coarser = grid.words, 1 / grid.apart
     module = ir.Module("extents")
-    made, code = function(module, "extents", ir.VoidType(), [POINTER, INT, *[POINTER] * 4])
-    rows, orders, values, sizes, widest, added = made.args
+    made, code = function(module, "extents", ir.VoidType(), [POINTER, INT, *[POINTER] * 5])
+    rows, orders, values, sizes, behind, widest, added = made.args
     b, row = code.builder, words * (1 + vectors)
     for k in range(row):
         code.store(code.zero, widest, 8 * k)
@@ -320,19 +432,22 @@ def machine(words: int, vectors: int) -> Machine:
         for k, word in enumerate(side):
             code.store(code.larger(code.absolute(word), code.load(widest, 8 * k)), widest, 8 * k)
         for v in range(vectors):
-            value = size = code.zero
+            value = size = far = code.zero
             for k in reversed(range(words)):
                 y = component(code, side[words * (1 + v) + k])
                 magnitude, place = code.absolute(y), 8 * (words * v + k)
                 code.store(code.add(code.load(added, place), magnitude), added, place)
-                value, size = code.add(value, y), code.add(size, magnitude)
+                value, size = (carried_over(code, grid, *pair) for pair in ((value, y), (size, magnitude)))
+                far = size if k == FIRST_BEHIND else far
             place = b.mul(b.add(b.mul(n, code.integer(vectors)), code.integer(v)), code.integer(8))
-            code.store(value, code.address(values, place), 0)
-            code.store(size, code.address(sizes, place), 0)
+            code.store(code.multiply(value, code.constant(coarser)), code.address(values, place), 0)
+            code.store(code.multiply(size, code.constant(coarser)), code.address(sizes, place), 0)
+            if grid.relative:
+                code.store(far, code.address(behind, place), 0)
 
     code.loop(0, b.add(orders, code.integer(1)), order, [])
     b.ret_void()
-    return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 4])})
+    return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 5])})
 
 
 def component(code: Code, left: Value) -> Value:

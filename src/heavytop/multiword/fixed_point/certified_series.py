@@ -33,8 +33,8 @@ left out.  So the error is at most ε(T) = T ((K + 1) 2^-53 B + Σ_(i+j≥K) m_i
 multiple of g_k below 2^52 g_k, so d is exact without (1).  ε' is ε(T) for T sources.  The coefficients are at most 1,
 rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are looked at afterwards, and
 the gathered sums, whose first word is below 2^51 g_0 (it is watched) and whose others are, after their carries, at most
-4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+16) g.  Up to four sums are gathered in a lane, and there A = ½: hence
-2 ε_n.  The coefficients are wrong by g/2 at most, the sources below 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
+4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+c) g, c = 16, or 18 on a relative grid.  Up to four sums are gathered in
+a lane, and there A = ½: hence 2 ε_n.  The coefficients are wrong by g/2 at most, the sources below 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
 
 *The rest.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched for the
 first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly where
@@ -60,12 +60,16 @@ from numpy.typing import NDArray
 from heavytop.multiword.codegen.machine_code import Doubles, Integers, Processor, doubles, pointer
 from heavytop.multiword.codegen.recurrence import turned
 from heavytop.multiword.fixed_point import arithmetic, fixed_point_run
-from heavytop.multiword.fixed_point.arithmetic import Grid
+from heavytop.multiword.fixed_point.arithmetic import Grid, words_of
 from heavytop.multiword.fixed_point.steps import UNSETTLED, most_orders, raises_of, size_of
 from heavytop.multiword.problem import Scaled
 
 _UP = 1 + 2.0**-40
 _ROOM = 1 - 2.0**-20
+_BEHIND_ALONE = 2.0**-880
+"""What has no words before those is smaller."""
+_UNDERFLOW = 2.0**-1000
+"""More than sizes lose below the smallest double."""
 
 
 class Total(Sequence[int]):
@@ -91,7 +95,9 @@ class WordSeries:
     """b_0, …, b_N of six or nine components, in words: those of ``certified`` from ``centre`` with h = 2^-halvings.
 
     total: Σ b_n.  rounding: Σ_(n < N) of (2) in ulps, which bounds the integral of the defect of all orders below N.
-    sizes: upper bounds of |b_n|, shape (N + 1,).  nearest: b_n within 2^-50 of ``sizes``, shape (N + 1, components).
+    sizes: upper bounds of |b_n|, shape (N + 1,).  behind: of a relative grid, of what lies behind its first words
+    (:data:`heavytop.multiword.fixed_point.arithmetic.FIRST_BEHIND`), over the unit of the first of these.
+    nearest: b_n within 2^-50 of ``sizes``, shape (N + 1, components).
     """
 
     certified: CertifiedSeries
@@ -100,6 +106,7 @@ class WordSeries:
     total: Total
     rounding: float
     sizes: Doubles
+    behind: Doubles | None
     nearest: Doubles
 
     @property
@@ -119,7 +126,13 @@ class WordSeries:
 
     def scaled(self, rate: int) -> Doubles:
         """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
-        return numpy.ldexp(self.sizes, rate * numpy.arange(len(self.sizes)))
+        exponents = rate * numpy.arange(len(self.sizes))
+        found: Doubles = numpy.ldexp(self.sizes, exponents)
+        if self.behind is not None:
+            grid = self.certified.grid
+            far = numpy.ldexp(self.behind, exponents - grid.bits * (arithmetic.FIRST_BEHIND + 1))
+            found = numpy.where(self.sizes < _BEHIND_ALONE, far, found)
+        return found
 
     def rounded(self, orders: int) -> Doubles:
         """b_0 to b_orders of ``nearest``, as many as there are."""
@@ -135,7 +148,7 @@ class CertifiedSeries:
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
         self.vectors = 1 if len(problem.state) == 6 else 2
         self.machine = fixed_point_run.machine(grid, problem.system, self.vectors == 2, processor)
-        self.extents = arithmetic.machine(grid.words, self.vectors).functions["extents"]
+        self.extents = arithmetic.machine(grid, self.vectors).functions["extents"]
         self.problem, self.grid, self.sign = problem, grid, 1.0 if forwards else -1.0
         self.excess = fixed_point_run.excess(problem)
         self.constants, self.inverses = (
@@ -145,7 +158,7 @@ class CertifiedSeries:
         self._own = (problem, grid, forwards, processor)
         self._sources = 1 + len(turned(problem.system))
         self._of_constants = [self._error_of_constants(count * self._sources) for count in (1, 2)]
-        self._exponents = grid.bits * numpy.arange(1, grid.words + 1)[:, None]
+        self._units = numpy.array([grid.unit(k) for k in range(grid.words)])[:, None]
         self._threads = local()
         self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
         first = numpy.array([lane % 8 + 8 * grid.words * (lane // 8) for lane in self._columns])
@@ -165,9 +178,12 @@ class CertifiedSeries:
         if rounding is None:
             return None
         size = 8 * self.vectors
-        sizes = numpy.maximum.reduce(scratch.sizes[: length * size].reshape(length, size), 1) * _UP
+        sizes = _largest(scratch.sizes, length, size)
+        behind = None
+        if self.grid.relative:
+            sizes, behind = sizes + _UNDERFLOW, _largest(scratch.behind, length, size)
         nearest = scratch.values[: length * size].reshape(length, size)[:, self._columns]
-        return WordSeries(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
+        return WordSeries(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, behind, nearest)
 
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
         """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
@@ -192,7 +208,7 @@ class CertifiedSeries:
         if isinstance(centre, Total):
             scratch.state[:] = centre.words
         else:
-            scratch.state[self.places] = [_words(value, self.grid) for value in centre]
+            scratch.state[self.places] = [words_of(value, self.grid) for value in centre]
         found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
         return int(found)
 
@@ -211,7 +227,7 @@ class CertifiedSeries:
         (vectors, K, 8).  products: of an order, times n + 1.  fields: how often the sources are those of the field.
         """
         grid = self.grid
-        wide = numpy.ldexp(widest, self._exponents)
+        wide = widest / self._units
         left, right = numpy.maximum.reduce(wide[1:]), wide[0]
         one, levels = _levels(grid, right, left)
         sums = levels[: grid.words - 1] + 3 * one[: grid.words - 1]
@@ -220,10 +236,10 @@ class CertifiedSeries:
         term, once = _error(grid, levels, products * orders)
         limits = (
             (float(sums.max()), 2.0**52 * _ROOM),
-            (float(numpy.ldexp(added, self._exponents).max()), 2.0**52),
+            (float((added / self._units).max()), 2.0**52),
             (state[0], 2.0**51),
             (max(state[1:]), 2.0 ** (grid.bits + 2)),
-            (once, 2.0 ** (grid.bits + 16 - 53)),
+            (once, 2.0 ** (grid.bits + _carried_bits(grid) - 53)),
         )
         if not all(found <= limit for found, limit in limits):
             return None
@@ -236,10 +252,15 @@ class CertifiedSeries:
         grid = self.grid
         constants = numpy.full((grid.words, 1), 2.0 ** (grid.bits - 1))
         constants[0] = 2.0**grid.bits
-        sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0**16))
+        sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0 ** _carried_bits(grid)))
         sources[0] = 2.0**51
         each, once = _error(grid, _levels(grid, constants, sources)[1], count)
         return count * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
+
+
+def _largest(sizes: Doubles, length: int, size: int) -> Doubles:
+    """An upper bound of the sizes of each order."""
+    return numpy.asarray(numpy.maximum.reduce(sizes[: length * size].reshape(length, size), 1) * _UP)
 
 
 class _Scratch:
@@ -256,8 +277,14 @@ class _Scratch:
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
         self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
         widest, added = doubles(8 * words * (1 + vectors)), doubles(size)
-        self.measures = [pointer(array) for array in (self.values, self.sizes, widest, added)]
+        self.behind = doubles(8 * vectors * orders if certified.grid.relative else 0)
+        self.measures = [pointer(array) for array in (self.values, self.sizes, self.behind, widest, added)]
         self.widest, self.added = widest.reshape(-1, words, 8), added.reshape(-1, words, 8)
+
+
+def _carried_bits(grid: Grid) -> int:
+    """c: log2 of what the last word may carry over."""
+    return 18 if grid.relative else 16
 
 
 def _levels(grid: Grid, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
@@ -288,17 +315,6 @@ def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
     return (words + 1) * rounding + dropped, rounding
 
 
-def _words(value: int, grid: Grid) -> list[float]:
-    """An integral number of ulps as words, exactly."""
-    found = []
-    for k in range(grid.words - 1):
-        shift = grid.bits * (grid.words - 1 - k)
-        digit = (value + (1 << (shift - 1))) >> shift
-        value -= digit << shift
-        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
-    return [*found, ldexp(float(value), -grid.total)]
-
-
 def components(left: Doubles) -> list[Doubles]:
     """The words of y, exactly, out of those of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …) along the last axis."""
     middle = left[..., 5] / 2
@@ -307,7 +323,8 @@ def components(left: Doubles) -> list[Doubles]:
 
 def whole(words: Doubles, grid: Grid) -> Any:
     """What words add to along the last axis, in ulps: an array of integers."""
-    digits = numpy.ldexp(words, grid.bits * numpy.arange(1, grid.words + 1)).astype(numpy.int64).astype(object)
+    units = [grid.unit(k) for k in range(grid.words)]
+    digits = (words / units).astype(numpy.int64).astype(object)
     total = digits[..., 0]
     for k in range(1, grid.words):
         total = (total << grid.bits) + digits[..., k]

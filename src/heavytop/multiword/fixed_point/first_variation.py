@@ -18,7 +18,7 @@ products bound both.  Hence, with T = 2 or 3 times n + 1,
     |v_(n+1) − h (…)_n/(n + 1)| ≤ (H (2 ε(T) + ε' + κ) + ½ g)/(n + 1) + ¾ g.
 
 A column need not become smaller from its first orders on, as a motion does: its leading words count as 0 where they
-were 0 in several orders one after another.
+were 0 in several orders one after another.  The grid is one whose units are doubles.
 """
 
 from __future__ import annotations
@@ -312,8 +312,10 @@ class _Scratch:
         self.widest: Doubles = doubles(16 * grid.words * count).reshape(count, 2, grid.words, 8)
         self.added: Doubles = doubles(8 * grid.words * count).reshape(count, grid.words, 8)
         self.ends = [self.results[k].ctypes.data_as(DOUBLES) for k in range(count)]
-        arrays, near = (self.sizes, self.widest, self.added), pointer(nearest)
-        self.measures = [[near, *(pointer(array[k]) for array in arrays)] for k in range(count)]
+        arrays, near, behind = (self.widest, self.added), pointer(nearest), pointer(doubles(0))
+        self.measures = [
+            [near, pointer(self.sizes[k]), behind, *(pointer(array[k]) for array in arrays)] for k in range(count)
+        ]
 
     def of_motion(self, certified: CertifiedSeries, order: int) -> Doubles:
         """The largest words of R and L of the motion."""

@@ -23,7 +23,17 @@ from heavytop.multiword.codegen.machine_code import (
     function,
 )
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Sum
-from heavytop.multiword.fixed_point.arithmetic import WIDEST, Accumulator, Grid, centred, exact, write_kernels
+from heavytop.multiword.fixed_point.arithmetic import (
+    WIDEST,
+    Accumulator,
+    Grid,
+    centred,
+    exact,
+    passed_on,
+    summed,
+    write_kernels,
+    write_long_kernel,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,13 +104,13 @@ class Rows(ABC):
         return [_side(self.code, parts[0], RIGHT), *(_side(self.code, part, LEFT) for part in parts)]
 
     def largest_sum(self, y: list[Value]) -> Value:
-        """The largest sum of |words| of a component, a double."""
+        """The largest sum of |words| of a component, a double, as the last word is kept; infinite beyond a double."""
         code, words = self.code, self.grid.words
         largest = code.zero
         for v in range(self.vectors):
             one = code.absolute(y[words * v])
             for word in y[words * v + 1 : words * (v + 1)]:
-                one = code.add(one, code.absolute(word))
+                one = passed_on(code, self.grid, one, code.absolute(word))
             largest = code.larger(one, largest)
         return code.largest(largest)
 
@@ -501,7 +511,7 @@ class WordRows(Rows):
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
-        return write_kernels(module, grid, row)
+        return [write_long_kernel(module, grid, row)] if grid.relative else write_kernels(module, grid, row)
 
     @staticmethod
     def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
@@ -605,11 +615,14 @@ class WordRows(Rows):
         watched = Accumulator(code, self.grid, 0, found, b.bitcast(code.load(seen, 0), INT_VECTOR))
         watched.look_at_all()
         code.store(b.bitcast(watched.seen, VECTOR), seen, 0)
-        return [code.subtract(s, c) for s, c in zip(found, centred(code, self.grid, words), strict=True)]
+        return summed(code, self.grid, found)
 
     def _call(self, skipped: Value, arguments: list[Value]) -> None:
         """The kernel for the levels behind ``skipped`` leading zero words."""
         b, words = self.code.builder, self.grid.words
+        if self.grid.relative:
+            b.call(self.kernels[0], [*arguments, b.sub(self.code.integer(words), skipped)])
+            return
         end = b.append_basic_block("called")
         switch = b.switch(skipped, end)
         for k in range(words):
@@ -637,7 +650,7 @@ class WordRows(Rows):
         code, b = self.code, self.code.builder
         found, left = [], code.zero
         for k, word in enumerate(y):
-            value = code.add(word, left)
+            value = passed_on(code, self.grid, left, word)
             wide = self.watch(wide, value, k, self.grid.most_bits(k))
             skipped = b.icmp_signed("<", code.integer(k), zeros)
             found.append(b.select(skipped, code.zero, value))

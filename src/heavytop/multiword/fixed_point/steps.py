@@ -9,7 +9,9 @@ coefficients and sum their products. The series ends where two coefficients in a
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from llvmlite import ir
 
@@ -39,6 +41,8 @@ from heavytop.multiword.fixed_point.arithmetic import (
     bounded_product,
     carried,
     centred,
+    passed_on,
+    summed,
 )
 from heavytop.multiword.fixed_point.products import DigitRows, ProductSize, Rows, WordRows
 from heavytop.top.equations import System
@@ -207,7 +211,7 @@ class SeriesCode:
             result.add_product(factors, source, each=True, below=not grid.whole)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
-        return [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, grid.words), strict=True)]
+        return summed(code, grid, result.sums)
 
     def sources(self, vector: int, gathered: list[Value], y: list[Value]) -> list[tuple[list[Value], list[Value]]]:
         """The words of A and each B, and what they are multiplied by."""
@@ -250,7 +254,7 @@ class SeriesCode:
             big = code.constant(self.grid.centre(k))
             high = code.subtract(code.fma(word, factor, big), big)
             low = code.fma(word, factor, code.negative(high))
-            found.append(high if left is None else code.add(high, left))
+            found.append(high if left is None else passed_on(code, self.grid, left, high))
             left = low
         return found
 
@@ -261,7 +265,7 @@ class SeriesCode:
         divisor, inverse = code.spread(after), code.spread(b.load(code.address(self.made.args[2], n)))
         found, rest = [], None
         for k, word in enumerate(words):
-            value = word if rest is None else code.add(word, rest)
+            value = word if rest is None else passed_on(code, self.grid, rest, word)
             wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else WIDEST)
             big = code.constant(self.grid.centre(k))
             quotient = code.subtract(code.fma(value, inverse, big), big)
@@ -343,27 +347,24 @@ _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
 def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
-    """``advance``, ``series`` and ``samples`` for this system.
+    """``series`` for this system and, unless the grid is relative, ``advance`` and ``samples``.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
     """
     module = ir.Module("grid")
     series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
-    made = series.write()
-    _Advance(module, grid, series.vectors, made).write()
-    write_samples(module, grid, series.vectors)
+    made, integer = series.write(), ctypes.c_int64
     pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
-    integer = ctypes.c_int64
-    return compiled(
-        module,
-        {
-            "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
-            "advance": (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer]),
-            "samples": (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES]),
-        },
-        processor,
-    )
+    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
+        "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
+    }
+    if not grid.relative:
+        _Advance(module, grid, series.vectors, made).write()
+        write_samples(module, grid, series.vectors)
+        signatures["advance"] = (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer])
+        signatures["samples"] = (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES])
+    return compiled(module, signatures, processor)
 
 
 class _Advance(Stepping):
