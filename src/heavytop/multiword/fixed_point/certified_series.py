@@ -34,7 +34,8 @@ multiple of g_k below 2^52 g_k, so d is exact without (1).  ε' is ε(T) for T s
 rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are looked at afterwards, and
 the gathered sums, whose first word is below 2^51 g_0 (it is watched) and whose others are, after their carries, at most
 4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+c) g, c = 16, or 18 on a relative grid.  Up to four sums are gathered in
-a lane, and there A = ½: hence 2 ε_n.  The coefficients are wrong by g/2 at most, the sources below 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
+a lane, and there A = ½: hence 2 ε_n.  The coefficients are wrong by g/2 at most, the sources below
+2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
 
 *The rest.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched for the
 first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly where
