@@ -190,7 +190,7 @@ class Fixed(ResumableRun):
             done, taken = map(int, progress)
             if are_doubles:
                 status = self._follow(ceilings, at, progress, found)
-                if tuple(progress) != (done, taken) or status is not Status.FINE:
+                if [*map(int, progress)] != [done, taken] or status is not Status.FINE:
                     continue
             covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
             if covered <= done:
