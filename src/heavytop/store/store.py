@@ -132,6 +132,13 @@ def read_brief(path: Path, kinds: Kinds) -> Brief:
     return Brief(*_read(path, _Parts), kinds)
 
 
+def whole(report: AnyReport) -> Report:
+    """The report with all of its rows."""
+    if isinstance(report, Report):
+        return report
+    return Report(SCHEMA, report.plan, report.environment, list(report.rows))
+
+
 def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     file = path
     try:
