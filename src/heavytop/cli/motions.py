@@ -5,12 +5,11 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
@@ -170,8 +169,7 @@ _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class _Options:
+class _Options(NamedTuple):
     """The options that `propagate` and `reference` share: which motion, and what is written of it where."""
 
     inertia: Inertia = None
@@ -201,7 +199,7 @@ class _Options:
     json: Json = False
 
 
-_SHARED = [field.name for field in fields(_Options)]
+_SHARED = list(_Options._fields)
 _DATA = _SHARED[: _SHARED.index("case")]
 """Options of body and start, by the keys of a plan."""
 
@@ -264,10 +262,9 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
         shared = _Options(**{name: options.pop(name) for name in _SHARED})
         return function(_Asked(times, shared), **options)
 
+    hints = get_type_hints(_Options, include_extras=True) | get_type_hints(function, include_extras=True)
     given = {
-        each.name: each.replace(
-            kind=Parameter.KEYWORD_ONLY, annotation=get_type_hints(source, include_extras=True)[each.name]
-        )
+        each.name: each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
         for source in (function, _Options)
         for each in signature(source).parameters.values()
     }
