@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 
-class Report(Tabular, records.Report):
+class Report(Tabular, records.Report, frozen=True):
     """A run of a plan: ``schema``, ``plan``, ``environment`` and ``rows``, in the plan's order."""
 
     @property
