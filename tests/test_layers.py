@@ -44,7 +44,7 @@ MAY_IMPORT = {
     "precision": {"errors"},
     "guard": set(),
     "processes": {"guard"},
-    "records": set(),
+    "records": {"errors", "precision"},
     "version": set(),
     "written_numbers": {"errors", "precision"},
 } | {room: GROUND.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms}

@@ -5,17 +5,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.api.integrators import case_document, check_integrator, listing, new_integrator
 from heavytop.api.pages import page
-from heavytop.cases import case
+from heavytop.api.scores import read_trajectory, scored
+from heavytop.cases import CASES, case
 from heavytop.cli import app
 from heavytop.errors import HeavyTopError
-from heavytop.suite.score import required
-from heavytop.trajectories.files import read
 
 DATA = {
     "inertia": "3,2,1",
@@ -216,7 +216,8 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
     ),
     "show of no report": (["show", "nowhere"], lambda: ht.read_report("nowhere")),
     "export of no report": (["export", "nowhere", "--to", "csv"], lambda: ht.read_report("nowhere")),
-    "history of no report": (["history", "nowhere", "nowhere"], lambda: ht.read_report("nowhere")),
+    "history of no report": (["history", "nowhere", "nowhere"], lambda: ht.history(["nowhere", "nowhere"])),
+    "history of one report": (["history", "nowhere"], lambda: ht.history(["nowhere"])),
     "figures of no report": (["figures", "--out", "new", "--report", "nowhere"], lambda: ht.read_report("nowhere")),
     "run of no plan": (["run", "--plan", "nobody"], lambda: ht.run("nobody")),
     "run of no file": (["run", "--plan", "nowhere.toml"], lambda: ht.run("nowhere.toml")),
@@ -246,8 +247,12 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
     ),
     "list of no case": (["list", "--case", "nobody"], lambda: case("nobody")),
     "docs of nothing": (["docs", "nothing"], lambda: page("nothing")),
-    "score to no digits": (["score", "nowhere.csv", "--require", "-1"], lambda: required("-1")),
-    "score of no file": (["score", "nowhere.csv"], lambda: read(Path("nowhere.csv"), None, False)),
+    "score to no digits": (
+        ["score", "nowhere.csv", "--require", "-1"],
+        lambda: read_trajectory("nowhere.csv", require="-1"),
+    ),
+    "score of no file": (["score", "nowhere.csv"], lambda: read_trajectory("nowhere.csv")),
+    "score of no case": (["score", "nowhere.csv", "--case", "none"], lambda: read_trajectory("nowhere.csv", "none")),
 }
 
 
@@ -261,6 +266,95 @@ def test_bad_input_of_every_other_command_is_the_same_error(
     assert isinstance(said, tuple)
     assert said == outcome(call)
     assert list(tmp_path.iterdir()) == []
+
+
+RESULTS = Path(__file__).parents[1] / "results"
+COMPARED: Mapping[str, tuple[list[str], Mapping[str, Any]]] = {
+    "itself": (["claims", "claims"], {}),
+    "itself, with limits": (["claims", "claims", "--floor", "4", "--loss", "1/2"], {"floor": 4, "loss": "1/2"}),
+    "another plan": (["claims", "default"], {}),
+}
+
+
+@pytest.mark.parametrize("name", COMPARED)
+def test_a_comparison_is_the_same(name: str, tmp_path: Path) -> None:
+    (old, new, *options), limits = COMPARED[name]
+    files = {kind: tmp_path / f"comparison.{kind}" for kind in ("junit", "markdown")}
+    folders = [str(RESULTS / each) for each in (old, new)]
+    words = [part for kind, file in files.items() for part in (f"--{kind}", str(file))]
+    done = CliRunner().invoke(app, ["compare", *folders, *options, *words, "--json"], catch_exceptions=False)
+    found = ht.compare(*folders, **limits)
+    assert json.loads(done.stdout) == json.loads(json.dumps(found.to_json()))
+    assert done.exit_code == found.exit_code
+    assert files["junit"].read_text("utf-8") == found.to_junit()
+    assert files["markdown"].read_text("utf-8") == found.to_markdown()
+    read = [ht.read_report(folder) for folder in folders]
+    assert ht.compare(*read, **limits).to_json() == found.to_json()
+
+
+def test_the_page_of_a_comparison_is_the_same(tmp_path: Path) -> None:
+    folders = [str(RESULTS / "claims")] * 2
+    CliRunner().invoke(app, ["compare", *folders, "--html", str(tmp_path / "page.html")], catch_exceptions=False)
+    assert (tmp_path / "page.html").read_text("utf-8") == ht.compare(*folders).to_html()
+
+
+SCORED: Mapping[str, tuple[list[str], Mapping[str, Any]]] = {
+    "as it is": ([], {}),
+    "enough digits": (["--require", "5"], {"require": 5}),
+    "too few digits": (["--require", "15.5"], {"require": "15.5"}),
+    "a case": (["--case", "generic"], {"case": "generic"}),
+    "another case": (["--case", "euler"], {"case": "euler"}),
+}
+
+
+@pytest.fixture(scope="module")
+def trajectory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the case generic whose last state has 8 digits."""
+    known = CASES["generic"]
+    run = ht.propagate(known.top, known.start, [1, 2], "double")
+    states = run.texts()
+    states[-1] = [f"{float(value):.8g}" for value in states[-1]]
+    file = tmp_path_factory.mktemp("scored") / "mine.json"
+    data = {"inertia": known.top.inertia, "weight": known.top.weight, "centre": known.top.centre}
+    start = {"omega": known.start.omega, "gamma": known.start.gamma}
+    texts = {key: list(map(str, value)) if isinstance(value, tuple) else str(value) for key, value in data.items()}
+    texts |= {key: list(map(str, value)) for key, value in start.items()}
+    document = {"precision": "double", **texts, "times": ["1", "2"], "states": states}
+    file.write_text(json.dumps(document), "utf-8")
+    return file
+
+
+@pytest.mark.parametrize("name", SCORED)
+def test_a_score_is_the_same_or_the_same_error(name: str, trajectory: Path) -> None:
+    words, options = SCORED[name]
+
+    def printed() -> Any:
+        done = CliRunner().invoke(
+            app, ["score", str(trajectory), *words, "--json"], catch_exceptions=False, standalone_mode=False
+        )
+        return json.loads(done.stdout), done.return_value
+
+    def computed() -> Any:
+        found = scored(*read_trajectory(trajectory, **options))
+        return json.loads(json.dumps(found.to_json())), found.exit_code
+
+    said, known = outcome(printed), outcome(computed)
+    assert said == known
+    assert len(known) == (3 if name == "another case" else 2)
+    if name == "as it is":
+        top, start = CASES["generic"].top, CASES["generic"].start
+        given = json.loads(trajectory.read_text("utf-8"))
+        arrays = ht.score(given["times"], given["states"], top=top, start=start, precision="double")
+        assert arrays.to_json()["metrics"] == known[0]["metrics"]
+        assert arrays.digits_right == known[0]["digits_right"]
+
+
+def test_the_report_and_the_page_of_a_score_are_the_same(trajectory: Path, tmp_path: Path) -> None:
+    words = ["score", str(trajectory), "--out", str(tmp_path / "new"), "--html", str(tmp_path / "page.html")]
+    CliRunner().invoke(app, words, catch_exceptions=False)
+    found = scored(*read_trajectory(trajectory))
+    assert (tmp_path / "page.html").read_text("utf-8") == found.to_html()
+    assert ht.compare(tmp_path / "new", ht.Report(*msgspec.structs.astuple(found.report()))).verdict == "same"
 
 
 def test_every_command_is_in_a_table() -> None:

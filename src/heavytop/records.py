@@ -6,12 +6,16 @@ Numbers that measure something are decimal text with their log10 beside them, so
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
+from operator import ge, gt, le, lt
 from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
+
+from heavytop.precision import log10 as log10_of
 
 SCHEMA = "heavytop-report/2"
 
@@ -80,34 +84,60 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
 
     def __float__(self) -> float:
         """The nearest double, 0 where that is too small; the bound of what is unresolved, nan for the other words."""
-        try:
-            return float(self.bound if self.bound is not None else self.value)
-        except ValueError:
-            return math.inf if self.value == "never" else math.nan
-
-    def __lt__(self, other: SupportsFloat) -> bool:
-        """By the numbers, exactly: 1e-997 is less than 1e-996.  Metrics that are equal are neither less nor greater."""
-        return self != other and self._number < _number_of(other)
-
-    def __le__(self, other: SupportsFloat) -> bool:
-        return self == other or self._number <= _number_of(other)
-
-    def __gt__(self, other: SupportsFloat) -> bool:
-        return self != other and self._number > _number_of(other)
-
-    def __ge__(self, other: SupportsFloat) -> bool:
-        return self == other or self._number >= _number_of(other)
+        return float(self.number)
 
     @property
-    def _number(self) -> Fraction | float:
-        try:
-            return Fraction(self.bound if self.bound is not None else self.value)
-        except ValueError:
-            return float(self)
+    def number(self) -> Fraction | float:
+        """Its value exactly, of what is unresolved the bound; ``never`` is infinite, the other words are nan."""
+        return _parsed(self.value if self.bound is None else self.bound)
+
+    @property
+    def size(self) -> float | None:
+        """log10 of its absolute value, of what is unresolved that of the bound; None for 0 and for the other words."""
+        if self.bound is None:
+            return self.log10
+        return log10_of(self.number) if isinstance(self.number, Fraction) else None
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all fields are the same, or of a plain number whether it is that number."""
+        if isinstance(other, Metric):
+            return super().__eq__(other)
+        return isinstance(other, int | float | Fraction) and self.number == other
+
+    def __hash__(self) -> int:
+        return hash(self.number)
+
+    @property
+    def _rank(self) -> tuple[bool, Fraction | float, bytes]:
+        """What metrics are ordered by: the number, nan last; among equal ones the fields, as equality is by all."""
+        number = self.number
+        unknown = number != number
+        return unknown, 0 if unknown else number, msgspec.json.encode(self)
+
+    def _is(self, less: Callable[[Any, Any], bool], other: SupportsFloat) -> bool:
+        return less(self._rank, other._rank) if isinstance(other, Metric) else less(self.number, float(other))
+
+    def __lt__(self, other: SupportsFloat) -> bool:
+        """By the numbers, exactly: 1e-997 is less than 1e-996.  Of two metrics just one is less, or they are equal."""
+        return self._is(lt, other)
+
+    def __le__(self, other: SupportsFloat) -> bool:
+        return self._is(le, other)
+
+    def __gt__(self, other: SupportsFloat) -> bool:
+        return self._is(gt, other)
+
+    def __ge__(self, other: SupportsFloat) -> bool:
+        return self._is(ge, other)
 
 
-def _number_of(other: SupportsFloat) -> Fraction | float:
-    return other._number if isinstance(other, Metric) else float(other)
+@lru_cache(1 << 14)
+def _parsed(text: str) -> Fraction | float:
+    """The number of a text, which is read once however often it is compared."""
+    try:
+        return Fraction(text)
+    except ValueError:
+        return math.inf if text == "never" else math.nan
 
 
 def by_name(found: Mapping[Quantity, Metric]) -> dict[str, Metric]:
@@ -426,7 +456,7 @@ class Beside(msgspec.Struct, frozen=True, gc=False):
     remarks: tuple[str, ...]
 
 
-class Report(msgspec.Struct, omit_defaults=True):
+class Report(msgspec.Struct, frozen=True, omit_defaults=True):
     """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order.
 
     beside: of a report that `score` wrote.

@@ -4,6 +4,7 @@ import cProfile
 import pstats
 import random
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.multiword import motions as multiword_motions
 from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Trajectory
+from heavytop.multiword.fixed_point import fixed_point_run, steps
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
@@ -79,6 +82,25 @@ def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, 
 def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
     times = [sign * float(time) / 20 for time in irregular(200, 60, 3)]
     require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
+
+
+def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = [float(time) / 20 for time in irregular(100, 60, 5)]
+    usual = propagate_words(CASE.top, CASE.start, times, QUAD)
+    for module in (steps, fixed_point_run):
+        monkeypatch.setattr(module, "most_of", lambda _: 1.0)  # what sums of this motion now and then exceed
+    monkeypatch.setattr(fixed_point_run, "machine", lru_cache(steps.build))
+    moved: list[Fraction] = []
+    move = Fixed._moved
+    monkeypatch.setattr(
+        Fixed, "_moved", lambda run, words, span, left: moved.append(span) or move(run, words, span, left)
+    )
+    found = propagate_words(CASE.top, CASE.start, times, QUAD)
+    assert 0 < len(moved) < len(times)
+    require_same(found, one_by_one(propagate_words, times, QUAD))
+    assert all(
+        abs(exact(a) - exact(b)) <= 4 * QUAD.eps for a, b in zip(found.states.flat, usual.states.flat, strict=True)
+    )
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

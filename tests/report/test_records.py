@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import product
+from pathlib import Path
+from random import Random
 
+import msgspec
 import pytest
 
+import heavytop as ht
 from heavytop.records import Law, Metric, Quantity, Series, by_name
 from support.small_reports import row
 
@@ -30,12 +35,48 @@ def test_no_field_of_a_record_can_be_set(record: object) -> None:
 
 @pytest.mark.parametrize(("a", "b"), list(product(METRICS, METRICS)))
 def test_equality_and_order_of_metrics_agree(a: Metric, b: Metric) -> None:
-    if a == b:
-        assert a <= b
-        assert a >= b
-    assert (a == b) + (a < b) + (a > b) <= 1
+    assert (a == b) + (a < b) + (a > b) == 1
     assert (a < b) == (b > a)
-    assert (a <= b) == (b >= a)
+    assert (a <= b) == (b >= a) == (a < b or a == b)
+    assert a != b or hash(a) == hash(b)
+
+
+@pytest.mark.parametrize("order", range(4))
+def test_metrics_have_one_order_however_they_came(order: int) -> None:
+    found = list(METRICS)
+    Random(order).shuffle(found)
+    assert sorted(found) == sorted(METRICS)
+    assert sorted(found)[-1].value == "missing"
+
+
+@pytest.mark.parametrize("number", [0, 2.5, Fraction(5, 2), 3, float("inf"), float("nan")])
+@pytest.mark.parametrize("metric", METRICS)
+def test_a_metric_compares_with_a_number_as_its_value_does(metric: Metric, number: float) -> None:
+    assert (metric == number) == (metric.number == number)
+    assert metric != number or hash(metric) == hash(number)
+    assert [metric < number, metric <= number, metric > number, metric >= number] == [
+        metric.number < number,
+        metric.number <= number,
+        metric.number > number,
+        metric.number >= number,
+    ]
+
+
+def test_the_size_of_what_is_unresolved_is_that_of_its_bound() -> None:
+    assert [metric.size for metric in METRICS] == [-997.0, -996.0, None, 0.4, 0.4, None, None, -20.0]
+
+
+def test_a_report_is_a_value_too(tmp_path: Path) -> None:
+    """Comparing it, and every document of it, leave each of its rows as it was."""
+    report = ht.read_report(Path(__file__).parents[2] / "results/claims")
+    before = msgspec.json.encode(report)
+    report.to_html()
+    report.to_markdown()
+    report.export("asv")
+    ht.compare(report, report).to_html()
+    assert msgspec.json.encode(report) == before
+    with pytest.raises(AttributeError):
+        report.rows = []  # type: ignore[misc]
 
 
 def test_errors_smaller_than_any_float_have_an_order() -> None:

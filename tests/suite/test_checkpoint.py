@@ -1,5 +1,6 @@
 """What a run keeps on disk: taken up again to the same bytes, refused where it does not belong, never half written."""
 
+import io
 import json
 import random
 import resource
@@ -433,8 +434,18 @@ def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, m
     rows = Checkpoint.rows
     monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])
     monkeypatch.setattr("heavytop.render.page.write_report", lambda report, path, kinds: path.touch())
+    opened: list[str] = []
+    opens = io.open
+
+    def counted(file: object, *given: object, **more: object) -> object:
+        opened.append(str(file))
+        return opens(file, *given, **more)
+
+    monkeypatch.setattr(io, "open", counted)
     run = prepare(str(tmp_path / "plan.toml"), tmp_path / "out", workers=1)
     assert run.measure().good
+    assert opened.count(str(tmp_path / "out" / "rows.jsonl")) == 2  # one adds rows, the other reads them
+    assert str(tmp_path / "out" / "report.json") not in opened
     assert read == list(range(len(run.tasks)))
     laws = [each for each in store.read(tmp_path / "out").rows if each.key.kind == "break_away_law"]
     assert [law.precision for law in laws] == ["double,extended", "double,extended"]

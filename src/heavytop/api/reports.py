@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from heavytop import records
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 
-class Report(Tabular, records.Report):
+class Report(Tabular, records.Report, frozen=True):
     """A run of a plan: ``schema``, ``plan``, ``environment`` and ``rows``, in the plan's order."""
 
     @property
@@ -90,18 +90,32 @@ class Report(Tabular, records.Report):
         return TitledTable(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
 
 
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison(Tabular, comparing.Differences):
-    """Two reports compared: ``verdict`` (same, better, worse, incomparable), ``changed``, ``tally``, ``to_json()``."""
+    """Two reports compared: ``verdict`` (same, better, worse, incomparable), ``changed``, ``tally``, ``to_json()``.
 
-    __slots__ = ()
+    reports: the baseline and the candidate.
+    """
+
+    reports: tuple[store.AnyReport, store.AnyReport] = field(kw_only=True, compare=False)
+
+    def to_html(self) -> str:
+        """The page of `compare --html`, with both reports on the same axes; their rows are read for it."""
+        from heavytop.render.page import comparison_page
+
+        old, new = (store.whole(report) for report in self.reports)
+        return comparison_page(old, new, self, KINDS)
 
     def to_junit(self) -> str:
         """What `compare --junit` writes: a test case a metric."""
         return exports.comparison_junit(self)
 
-    def to_markdown(self) -> str:
-        """What `compare --markdown` writes: the findings, then a line for each row that changed."""
-        return exports.comparison_markdown(self)
+    def to_markdown(self, page: PathLike | None = None) -> str:
+        """What `compare --markdown` writes: the findings, then a line for each row that changed.
+
+        page: the file of :meth:`to_html`, which is named at the end.
+        """
+        return exports.comparison_markdown(self, None if page is None else arguments.path(page, "page"))
 
     def _table(self) -> TitledTable:
         body = [
@@ -241,14 +255,29 @@ def compare(
     Raises:
         InputError: for what is no report or policy, and where there is nothing to compare.
     """
+    return compared(baseline, candidate, policy, floor, loss)
+
+
+def compared(
+    baseline: records.Report | PathLike,
+    candidate: records.Report | PathLike,
+    policy: PathLike | None,
+    floor: Number | None,
+    loss: Number | None,
+    list_same: bool = True,
+    read: Callable[[], None] = lambda: None,
+) -> Comparison:
+    """The same.  list_same: False to count what plainly stayed the same.  read: called after each report is read."""
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
-    old, new = _report(baseline, "baseline"), _report(candidate, "candidate")
+    old, new = _report(baseline, "baseline", read), _report(candidate, "candidate", read)
     surveys = None
     if not isinstance(baseline, records.Report) and not isinstance(candidate, records.Report):
         surveys = beside(arguments.path(baseline, "baseline")), beside(arguments.path(candidate, "candidate"))
-    found = comparing.compare(old, new, rules, KINDS, surveys=surveys)
-    return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
+    found = comparing.compare(old, new, rules, KINDS, list_same=list_same, surveys=surveys)
+    return Comparison(
+        **{each.name: getattr(found, each.name) for each in fields(found) if each.init}, reports=(old, new)
+    )
 
 
 def history(
@@ -286,16 +315,16 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
     for number, each in enumerate(given, 1):
         ready = isinstance(each, records.Report)
         names.append(f"report {number}" if ready else str(arguments.path(each, "reports")))
-        found.append(each if ready else store.read_brief(arguments.path(each, "reports"), KINDS))
-        read()
+        found.append(_report(each, "reports", read))
     tracks = over.history(found, rules, KINDS)
     tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
     return History(names, [track for track in tracks if metric or track.steps], found)
 
 
-def _report(given: Any, what: str) -> records.Report:
-    if isinstance(given, records.Report):
-        return given
-    if not isinstance(given, str | os.PathLike):
+def _report(given: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
+    """A report, or that of a path, whose rows are read as they are gone through; then ``read`` is called."""
+    if not isinstance(given, records.Report | str | os.PathLike):
         raise InputError(f"{what} = {quoted(given)} is no report.", "Give a Report, or the path of one.")
-    return store.read(arguments.path(given, what), KINDS)
+    found = given if isinstance(given, records.Report) else store.read_brief(arguments.path(given, what), KINDS)
+    read()
+    return found

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NamedTuple, cast
@@ -17,14 +18,16 @@ from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR, WIDT
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Drift
 from heavytop.precision import Precision, ordered, vector
-from heavytop.records import Metric, Peer, Row
-from heavytop.render.score import diagnosis_text
+from heavytop.records import Metric, Peer, Report, Row
+from heavytop.render.score import diagnosis_text, score_report, to_json
 from heavytop.suite.score import Assessment, assess, passed, required
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.trajectories.observed import GivenTrajectory, of_arrays, of_observed_arrays, raw_start, require_system
+
+PathLike = str | os.PathLike[str]
 
 # Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.
 
@@ -154,6 +157,7 @@ class Score(Tabular):
     passed: whether as many digits are right as were required; None, which is no pass, where the run ended early or that
     is not known.
     used: which columns were scored, in a sentence, where these are not Ω and γ in principal axes.
+    assessment, needed, sha256: what all of it is made of, the digits required, and the checksum of the file.
     """
 
     outcome: str
@@ -165,8 +169,33 @@ class Score(Tabular):
     of_digits: int
     peer: Peer | None
     diagnosis: tuple[str, ...]
-    passed: bool | None = None
-    used: str = ""
+    passed: bool | None
+    used: str
+    assessment: Assessment = field(repr=False)
+    needed: Fraction | None = field(repr=False)
+    sha256: str = field(repr=False)
+
+    @property
+    def exit_code(self) -> int:
+        """0, 1 where fewer digits are right than were required, 3 where that is not known or the run ended early."""
+        return 3 if self.passed is None else 0 if self.passed else 1
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `score --json`."""
+        return to_json(self.assessment) | ({} if self.needed is None else {"passed": self.passed})
+
+    def to_html(self) -> str:
+        """The page of `score --html`."""
+        from heavytop.kinds import KINDS
+        from heavytop.render.page import report_page
+
+        return report_page(self.report(), KINDS)
+
+    def report(self) -> Report:
+        """A report with the row alone, as `score --out` writes it."""
+        from heavytop.store.store import environment
+
+        return score_report(self.assessment, environment(), self.sha256)
 
     @property
     def digits_right(self) -> float | None:
@@ -270,10 +299,33 @@ def score(
     else:
         said = convention(quaternion_order, quaternion, matrix, sequence, angles, up, pivot, point)
         given = observed_arrays(top, start, about, said, instants, arrays, form, names, normalize)
-    return _scored(assess(given), needed)
+    return scored(given, needed)
 
 
-def _scored(found: Assessment, needed: Fraction | None) -> Score:
+def read_trajectory(
+    path: PathLike, case: str | None = None, *, require: Number | None = None, normalize: bool = False
+) -> tuple[GivenTrajectory, Fraction | None]:
+    """What :func:`scored` takes, from the file of a trajectory (`heavytop docs score`).
+
+    Arguments:
+        path: a .json or .csv file; ``-`` for standard input.
+        case: a built-in case of its top and start.
+        require, normalize: as in :func:`score`.
+
+    Raises:
+        InputError: for a file that is no trajectory, an unknown case, and digits that are no positive number.
+    """
+    from heavytop.cases import case as case_named
+    from heavytop.trajectories.files import read
+
+    needed = None if require is None else required(require)
+    about = None if case is None else case_named(arguments.text(case, "case"))
+    return read(arguments.path(path, "path"), about, bool(arguments.flag(normalize, "normalize"))), needed
+
+
+def scored(given: GivenTrajectory, needed: Fraction | None, progress: Callable[[], None] = lambda: None) -> Score:
+    """The score of a trajectory of any source.  progress: called twice for each of its states, as they are compared."""
+    found = assess(given, progress)
     row = found.row
     distance = {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS}
     for name, label in ((ATTITUDE_ERROR, "attitude"), (POSITION_ERROR, "position")):
@@ -291,6 +343,9 @@ def _scored(found: Assessment, needed: Fraction | None) -> Score:
         tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
         passed(row, needed),
         found.used,
+        found,
+        needed,
+        given.sha256,
     )
 
 

@@ -6,8 +6,10 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
@@ -61,17 +63,16 @@ def write_motion(
     document: Callable[[], dict[str, Any]],
     make_table: Callable[[], MotionTable],
     text: Callable[[MotionTable], RenderableType],
-    csv: Path | None,
-    latex: Path | None,
-    json: bool,
+    options: _Options,
 ) -> None:
     """Write the files asked for, and one document on standard output: JSON, CSV, LaTeX or the table.
 
     Raises InputError for a file that cannot be written.
     """
-    table = None if json and csv is None and latex is None else make_table()
+    only_json = options.json and options.csv is None and options.latex is None
+    table = None if only_json else make_table().of_case(options.case)
     screen = None
-    for path, make in ((csv, "csv"), (latex, "latex")):
+    for path, make in ((options.csv, "csv"), (options.latex, "latex")):
         if path is None or table is None:
             continue
         content = getattr(table, make)()
@@ -80,7 +81,7 @@ def write_motion(
         else:
             _write_text(path, content)
             say(f"wrote {path}")
-    if json:
+    if options.json:
         command, version = made_by()
         print_json({**document(), "command": command, "version": version})
     elif screen is not None:
@@ -127,48 +128,6 @@ def farthest(times: Sequence[str]) -> Fraction:
     return max(map(exact, times), key=abs)
 
 
-def of_motion(
-    functions: Sequence[str],
-    direction: int,
-    top: Any,
-    start: Any,
-    times: Sequence[str],
-    system: str | None,
-    reached: Callable[[Fraction], None],
-    settings: dict[str, Any],
-) -> list[Any]:
-    """The events of each function up to the time farthest from 0; settings: of :func:`heavytop.api.events.events`."""
-    if not functions:
-        return []
-    from heavytop.api.events import events
-
-    until = farthest(times)
-    return [
-        events(top, start, until, function, direction, system=system, reached=reached, **settings)
-        for function in functions
-    ]
-
-
-def with_events(
-    document: Callable[[], dict[str, Any]], table: Any, text: Callable[[Any], Any], found: Sequence[Any]
-) -> tuple[Callable[[], dict[str, Any]], Any, Callable[[Any], Any]]:
-    """The document, the table and the text of a motion, with the events behind, where any were asked for."""
-    if not found:
-        return document, table, text
-
-    def text_with_events(shown: Any) -> Any:
-        from rich.console import Group
-
-        from heavytop.render.motion import events_text
-
-        return Group(text(shown), events_text(found))
-
-    def document_with_events() -> dict[str, Any]:
-        return {**document(), "events": [each.to_json() if hasattr(each, "to_json") else each for each in found]}
-
-    return document_with_events, table, text_with_events
-
-
 Inertia = Annotated[
     str | None,
     typer.Option(help="Principal moments A,B,C at the fixed point; with --mass 3, 6 (11,22,33,12,13,23) or 9 numbers."),
@@ -210,41 +169,123 @@ _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
 
+class _Options(NamedTuple):
+    """The options that `propagate` and `reference` share: which motion, and what is written of it where."""
+
+    inertia: Inertia = None
+    weight: Weight = None
+    centre: Centre = None
+    omega: Omega = None
+    gamma: Gamma = None
+    mass: Mass = None
+    gravity: Gravity = None
+    about: About = None
+    omega_space: OmegaSpace = None
+    quaternion: Quaternion = None
+    euler: Euler = None
+    matrix: Matrix = None
+    axis_angle: AxisAngle = None
+    rotor: Rotor = None
+    case: CaseName = None
+    system: SystemName = None
+    normalize: Normalize = False
+    events: Events = None
+    event_direction: EventDirection = 0
+    show: Show = None
+    point: Point = None
+    pivot: Pivot = None
+    csv: Csv = None
+    latex: Latex = None
+    json: Json = False
+
+
+_SHARED = list(_Options._fields)
+_DATA = _SHARED[: _SHARED.index("case")]
+"""Options of body and start, by the keys of a plan."""
+
+
+class _Asked:
+    """What is asked for, read before anything is computed; raises InputError for what cannot be read."""
+
+    def __init__(self, times: str, options: _Options) -> None:
+        require_one_output(options.csv, options.latex, options.json)
+        given = {name: getattr(options, name) for name in _DATA}
+        self.options = options
+        self.top, self.start, self.system = _motion(given, options.case, options.system, options.normalize)
+        self.outputs, self.times = _outputs(options.show, options.point, options.pivot), numbers(times)
+        self.functions = requested(options.events, options.event_direction)
+
+    def events(self, expected: float, **settings: Any) -> list[Any]:
+        """The events of each function up to the time farthest from 0.
+
+        expected: seconds.  settings: of :func:`heavytop.api.events.events`.
+        """
+        if not self.functions:
+            return []
+        from heavytop.api.events import events
+
+        where, direction = (self.top, self.start, farthest(self.times)), self.options.event_direction
+        with reaching("events", expected) as reach:
+            settings |= {"system": self.system, "reached": _part_of(self.times, reach)}
+            return [events(*where, function, direction, **settings) for function in self.functions]
+
+    def write(
+        self,
+        document: Callable[[], dict[str, Any]],
+        table: Callable[[], MotionTable],
+        text: Callable[[MotionTable], RenderableType],
+        events: Sequence[Any],
+    ) -> None:
+        """The motion with its events behind, as asked for."""
+
+        def text_with_events(shown: MotionTable) -> RenderableType:
+            from rich.console import Group
+
+            from heavytop.render.motion import events_text
+
+            return Group(text(shown), events_text(events))
+
+        def document_with_events() -> dict[str, Any]:
+            return {**document(), "events": [each.to_json() if hasattr(each, "to_json") else each for each in events]}
+
+        if events:
+            write_motion(document_with_events, table, text_with_events, self.options)
+        else:
+            write_motion(document, table, text, self.options)
+
+
+def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
+    """The command with the times and the options that say which motion before its own, and the others behind."""
+
+    @wraps(function)
+    def with_options(times: str, **options: Any) -> int:
+        shared = _Options(**{name: options.pop(name) for name in _SHARED})
+        return function(_Asked(times, shared), **options)
+
+    hints = get_type_hints(_Options, include_extras=True) | get_type_hints(function, include_extras=True)
+    given = {
+        each.name: each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
+        for source in (function, _Options)
+        for each in signature(source).parameters.values()
+    }
+    own = [name for name in signature(function).parameters if name != "asked"]
+    which, where = _SHARED[: _SHARED.index("events")], _SHARED[_SHARED.index("events") :]
+    times = Parameter("times", Parameter.KEYWORD_ONLY, annotation=Times)
+    vars(with_options)["__signature__"] = Signature([times, *(given[name] for name in (*which, *own, *where))])
+    return with_options
+
+
 @command
+@_of_a_motion
 def propagate(
-    times: Times,
-    inertia: Inertia = None,
-    weight: Weight = None,
-    centre: Centre = None,
-    omega: Omega = None,
-    gamma: Gamma = None,
-    case: CaseName = None,
-    mass: Mass = None,
-    gravity: Gravity = None,
-    about: About = None,
-    omega_space: OmegaSpace = None,
-    quaternion: Quaternion = None,
-    euler: Euler = None,
-    matrix: Matrix = None,
-    axis_angle: AxisAngle = None,
+    asked: _Asked,
     precision: Annotated[
         str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
-    rotor: Rotor = None,
-    system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
-    normalize: Normalize = False,
     tolerance: Annotated[str | None, typer.Option(help="Of the integrator; the eps of the format without it.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
-    events: Events = None,
-    event_direction: EventDirection = 0,
-    show: Show = None,
-    point: Point = None,
-    pivot: Pivot = None,
-    csv: Csv = None,
-    latex: Latex = None,
-    json: Json = False,
 ) -> int:
     """Integrate one motion and print its states.
 
@@ -253,93 +294,45 @@ def propagate(
     """
     from heavytop.api.motions import motion as computed_motion
 
-    given = {
-        "inertia": inertia,
-        "weight": weight,
-        "centre": centre,
-        "mass": mass,
-        "gravity": gravity,
-        "about": about,
-        "rotor": rotor,
-        "omega": omega,
-        "omega_space": omega_space,
-        "gamma": gamma,
-        "quaternion": quaternion,
-        "euler": euler,
-        "matrix": matrix,
-        "axis_angle": axis_angle,
-    }
-    require_one_output(csv, latex, json)
-    top, start, which = _motion(given, case, system, normalize)
-    wanted, instants = _outputs(show, point, pivot), numbers(times)
     say_former([integrator])
     _warn_of_cost(precision, integrator)
-    functions = requested(events, event_direction)
+    settings: dict[str, Any] = {"integrator": integrator, "tolerance": tolerance, "step_limit": max_steps}
     with reaching("integration", _PROPAGATE_SECONDS) as reach:
         motion = computed_motion(
-            top,
-            start,
-            instants,
+            asked.top,
+            asked.start,
+            asked.times,
             precision,
-            integrator=integrator,
-            system=which,
+            system=asked.system,
             angles=attitude,
-            outputs=wanted,
-            tolerance=tolerance,
-            step_limit=max_steps,
-            reached=_part_of(instants, reach),
+            outputs=asked.outputs,
+            reached=_part_of(asked.times, reach),
+            **settings,
         )
 
     def table() -> MotionTable:
-        from heavytop.render.motion import of_motion as table_of
+        from heavytop.render.motion import of_motion
 
-        return table_of(motion, *made_by()).of_case(case)
+        return of_motion(motion, *made_by())
 
     def text(shown: MotionTable) -> RenderableType:
         from heavytop.render.motion import motion_text
 
         return motion_text(motion, shown)
 
-    with reaching("events", _PROPAGATE_SECONDS) as reach:
-        settings = {"precision": precision, "integrator": integrator, "tolerance": tolerance, "step_limit": max_steps}
-        found = of_motion(functions, event_direction, top, start, instants, which, _part_of(instants, reach), settings)
-    write_motion(*with_events(motion.to_json, table, text, found), csv, latex, json)
+    asked.write(motion.to_json, table, text, asked.events(_PROPAGATE_SECONDS, precision=precision, **settings))
     return 0 if motion.complete else 3
 
 
 @command
+@_of_a_motion
 def reference(
-    times: Times,
-    inertia: Inertia = None,
-    weight: Weight = None,
-    centre: Centre = None,
-    omega: Omega = None,
-    gamma: Gamma = None,
-    case: CaseName = None,
-    mass: Mass = None,
-    gravity: Gravity = None,
-    about: About = None,
-    omega_space: OmegaSpace = None,
-    quaternion: Quaternion = None,
-    euler: Euler = None,
-    matrix: Matrix = None,
-    axis_angle: AxisAngle = None,
+    asked: _Asked,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
-    rotor: Rotor = None,
-    system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     derivatives: Annotated[
         str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,
-    normalize: Normalize = False,
-    events: Events = None,
-    event_direction: EventDirection = 0,
-    show: Show = None,
-    point: Point = None,
-    pivot: Pivot = None,
-    csv: Csv = None,
-    latex: Latex = None,
-    json: Json = False,
 ) -> int:
     """Print proven states of one motion.
 
@@ -349,45 +342,22 @@ def reference(
     """
     from heavytop.api.motions import known
 
-    given = {
-        "inertia": inertia,
-        "weight": weight,
-        "centre": centre,
-        "mass": mass,
-        "gravity": gravity,
-        "about": about,
-        "rotor": rotor,
-        "omega": omega,
-        "omega_space": omega_space,
-        "gamma": gamma,
-        "quaternion": quaternion,
-        "euler": euler,
-        "matrix": matrix,
-        "axis_angle": axis_angle,
-    }
-    require_one_output(csv, latex, json)
-    top, start, which = _motion(given, case, system, normalize)
-    wanted, instants = _outputs(show, point, pivot), numbers(times)
-    functions = requested(events, event_direction)
-    watch, told = _Watch(instants), True if attitude or wanted else None
+    watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = known(top, start, instants, digits, which, told, derivatives, watch.find)
-        found.require_outputs(wanted)
+        found = known(asked.top, asked.start, asked.times, digits, asked.system, told, derivatives, watch.find)
+        found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:
         from heavytop.render.motion import of_reference
 
-        return of_reference(found, wanted, *made_by()).of_case(case)
+        return of_reference(found, asked.outputs, *made_by())
 
     def text(shown: MotionTable) -> RenderableType:
         from heavytop.render.motion import reference_text
 
         return reference_text(found, shown)
 
-    with reaching("events", _REFERENCE_SECONDS) as reach:
-        part, settings = _part_of(instants, reach), {"digits": digits}
-        crossed = of_motion(functions, event_direction, top, start, instants, which, part, settings)
-    write_motion(*with_events(lambda: found.document(wanted), table, text, crossed), csv, latex, json)
+    asked.write(lambda: found.document(asked.outputs), table, text, asked.events(_REFERENCE_SECONDS, digits=digits))
     return 0
 
 

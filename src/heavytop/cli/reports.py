@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,9 @@ from heavytop.cli.app import Json, absolute, cases, command, plans, print_json, 
 from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
 from heavytop.render import FORMATS
+
+if TYPE_CHECKING:
+    from heavytop.records import Report
 
 _REPORT_SECONDS = 0.1
 """Expected of reading one."""
@@ -39,39 +42,25 @@ def compare(
 
     Else exit 3 if anything is missing or incomparable, else 0.
     """
-    from heavytop.comparison.compare import beside
-    from heavytop.comparison.compare import compare as compare_reports
-    from heavytop.kinds import KINDS
-    from heavytop.store import store
+    from heavytop.api.reports import compared
 
-    rules, surveys = _policy(policy, floor, loss), (beside(baseline), beside(candidate))
+    with counted("comparing", 2, "reports read", _REPORT_SECONDS) as advance:
+        found = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
     files: list[tuple[Path, str]] = []
     if html is not None:
-        from heavytop.render.page import comparison_page
-
-        old, new = _read([baseline, candidate], store.read)
-        result = compare_reports(old, new, rules, KINDS, surveys=surveys)
-        files.append((html, comparison_page(old, new, result, KINDS)))
-    else:
-        all_of_them = json or junit is not None
-        before, after = _read([baseline, candidate], store.read_brief)
-        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them, surveys=surveys)
+        files.append((html, found.to_html()))
     if markdown is not None:
-        from heavytop.render.export import comparison_markdown
-
-        files.append((markdown, comparison_markdown(result, html)))
+        files.append((markdown, found.to_markdown(html)))
     if junit is not None:
-        from heavytop.render.export import comparison_junit
-
-        files.append((junit, comparison_junit(result)))
+        files.append((junit, found.to_junit()))
     _write(files)
     if json:
-        print_json(result.to_json())
+        print_json(found.to_json())
     else:
         from heavytop.render.comparison import comparison
 
-        show_on_terminal(comparison(result, full))
-    return result.exit_code
+        show_on_terminal(comparison(found, full))
+    return found.exit_code
 
 
 @command
@@ -96,25 +85,6 @@ def history(
     else:
         show_on_terminal(history_text(found.names, found.tracks))
     return 0
-
-
-def _read(paths: list[Path], reader: Callable[..., Any]) -> list[Any]:
-    """What ``reader`` makes of each report."""
-    from heavytop.kinds import KINDS
-
-    found = []
-    with counted("reading", len(paths), "reports", _REPORT_SECONDS) as advance:
-        for path in paths:
-            found.append(reader(path, KINDS))
-            advance()
-    return found
-
-
-def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
-    """The policy of a file or the default one; the options count before either."""
-    from heavytop.comparison.noise import Policy, adjusted, load
-
-    return adjusted(Policy() if file is None else load(file), floor, loss)
 
 
 def _write(files: list[tuple[Path, str]]) -> None:
@@ -325,52 +295,40 @@ def score(
     first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
     Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
     """
-    from heavytop.cases import case as case_named
-    from heavytop.suite.score import assess, passed, required
-    from heavytop.trajectories.files import read
+    from heavytop.api.scores import read_trajectory, scored
 
     if out is not None:
         out = absolute(out)
         require_new(out)
-    needed = None if require is None else required(require)
-    given = read(trajectory, None if case is None else case_named(case), normalize)
+    page = None if html is None else absolute(html)
+    given, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
     for warning in given.warnings():
         say(f"warning: {warning}")
     with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
-        found = assess(given, advance)
-    if out is not None or html is not None:
-        _write_score(found, given.sha256, out, None if html is None else absolute(html))
-    if json:
-        from heavytop.render.score import to_json
-
-        print_json(to_json(found) if needed is None else to_json(found) | {"passed": passed(found.row, needed)})
-    else:
-        from heavytop.render.score import requirement, score_text
-
-        show_on_terminal(score_text(found))
-        if html is not None:
-            print(f"\nPage: {html}")
-    good = passed(found.row, needed)
-    if needed is not None and not json:
-        print(f"\n{requirement(found.row, needed)}")
-    return 3 if good is None else 0 if good else 1
-
-
-def _write_score(found: Any, sha256: str, out: Path | None, html: Path | None) -> None:
-    """The report that `compare` and `show` read, and its page."""
-    from heavytop.kinds import KINDS
-    from heavytop.render.page import write_report
-    from heavytop.render.score import score_report
-    from heavytop.store import store
-    from heavytop.store.store import environment
-
-    report = score_report(found, environment(), sha256)
+        found = scored(given, needed, advance)
     if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            store.write(report, out)
-        except OSError as error:
-            raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
+        _write_report(found.report(), out)
+    if page is not None:
+        _write([(page, found.to_html())])
+    if json:
+        print_json(found.to_json())
+        return found.exit_code
+    from heavytop.render.score import requirement, score_text
+
+    show_on_terminal(score_text(found.assessment))
     if html is not None:
-        with writing():
-            write_report(report, html, KINDS)
+        print(f"\nPage: {html}")
+    if needed is not None:
+        print(f"\n{requirement(found.row, needed)}")
+    return found.exit_code
+
+
+def _write_report(report: Report, out: Path) -> None:
+    """The report that `compare` and `show` read."""
+    from heavytop.store import store
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        store.write(report, out)
+    except OSError as error:
+        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None

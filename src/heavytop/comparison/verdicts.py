@@ -101,13 +101,7 @@ def _no_number(old: Metric, new: Metric, limits: Limits) -> Judged | None:
 
 def size(metric: Metric) -> float:
     """log10 of an error, or of its bound where it is unresolved; -inf for 0 and for words such as nan."""
-    if metric.log10 is not None:
-        return metric.log10
-    try:
-        found = log10(exact(metric.bound or "0" if metric.value == UNRESOLVED else metric.value))
-    except InputError:
-        return -math.inf
-    return -math.inf if found is None else found
+    return -math.inf if metric.size is None else metric.size
 
 
 def _errors(
@@ -201,7 +195,7 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
     differs = Verdict.WORSE, "a value that must agree does not"
     if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return differs
-    a, b = exact(old.value), exact(new.value)
+    a, b = exact(old.number), exact(new.number)
     off = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
     return SAME if abs(a - b) <= Fraction(off) * max(abs(a), abs(b)) else differs
 

@@ -120,7 +120,7 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             place = _case(row), row.key.direction, source
             if row.outcome == "success" and (metric := row.metrics.get(ESCAPE.text)):
                 if metric.log10 is not None and metric.log10 < _LARGEST:
-                    found.setdefault(place, {})[row.bits] = exact(metric.value)
+                    found.setdefault(place, {})[row.bits] = exact(metric.number)
             elif row.key.kind == NAME and row.metrics:
                 slopes[place] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
     if not found:

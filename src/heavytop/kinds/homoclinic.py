@@ -128,7 +128,7 @@ class Homoclinic(Kind):
     def contradictions(self, row: Row) -> Iterator[str]:
         """A motion escapes before the run ends."""
         away = row.metrics.get(ESCAPE.text)
-        if away is not None and away.log10 is not None and abs(exact(away.value)) > abs(exact(row.horizon)):
+        if away is not None and away.log10 is not None and abs(exact(away.number)) > abs(exact(row.horizon)):
             yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:

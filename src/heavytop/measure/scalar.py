@@ -155,9 +155,8 @@ def digits_right(row: Measured) -> float | None:
         return None
     if row.reference.until:
         return 0.0
-    size = metric.log10 if metric.bound is None else log10(exact(metric.bound))
     most = row.bits * math.log10(2)
-    return most if size is None else min(most, -size)
+    return most if metric.size is None else min(most, -metric.size)
 
 
 def digits_text(kept: float) -> str:

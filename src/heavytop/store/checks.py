@@ -199,7 +199,7 @@ def bound(metric: Metric) -> float:
     if metric.log10 is not None:
         return metric.log10
     if metric.value == UNRESOLVED and metric.bound:
-        return _floor(log10(exact(metric.bound))) + 0.01
+        return _floor(metric.size) + 0.01
     return -1e9 if metric.value == "0" else 1e9
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec.structs import replace as replace_struct
 
 from heavytop import records
 from heavytop.document.kind import Kinds
@@ -67,7 +68,7 @@ class Brief:
         self.rows = _Rows(file, parts.rows, kinds)
 
 
-class _Parts(msgspec.Struct):
+class _Parts(msgspec.Struct, frozen=True):
     schema: str
     plan: dict[str, str]
     environment: dict[str, Any]
@@ -121,7 +122,7 @@ def read(path: Path, kinds: Kinds) -> Report:
     (where its checksum lies beside it), or inconsistent in itself.
     """
     file, report = _read(path, Report)
-    report.rows = [records.of_row(row) for row in report.rows]
+    report = replace_struct(report, rows=[records.of_row(row) for row in report.rows])
     check_keys(file, report.rows)
     check_rows(file, report.rows, kinds)
     return report
@@ -130,6 +131,13 @@ def read(path: Path, kinds: Kinds) -> Report:
 def read_brief(path: Path, kinds: Kinds) -> Brief:
     """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
     return Brief(*_read(path, _Parts), kinds)
+
+
+def whole(report: AnyReport) -> Report:
+    """The report with all of its rows."""
+    if isinstance(report, Report):
+        return report
+    return Report(SCHEMA, report.plan, report.environment, list(report.rows))
 
 
 def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
@@ -157,8 +165,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         _check_repeats(file, content)
     if not isinstance(report.environment.get("packages", {}), dict):
         raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
-    report.plan = records.of_plan(report.plan)
-    return file, report
+    return file, replace_struct(report, plan=records.of_plan(report.plan))
 
 
 class _Schema(msgspec.Struct):

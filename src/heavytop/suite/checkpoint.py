@@ -103,6 +103,7 @@ class Checkpoint:
         self.offsets: dict[int, int] = {}
         self._digest = hashlib.sha256(msgspec.json.encode(identity)).hexdigest()
         self._file: BinaryIO
+        self._reader: BinaryIO
         self._synced = 0.0
 
     def __enter__(self) -> Checkpoint:
@@ -115,32 +116,31 @@ class Checkpoint:
             if not self.path.exists():
                 replace(self.path, [line(msgspec.json.encode(self.identity))])
             # unbuffered: a row is with the system when add returns, and a failed write leaves nothing to fail again
-            self._file = self.path.open("r+b", buffering=0)
+            self._file = cleanup_on_error.enter_context(self.path.open("r+b", buffering=0))
+            self._reader = cleanup_on_error.enter_context(self.path.open("rb"))
             self._read()
-            cleanup_on_error.pop_all()
+            self._open = cleanup_on_error.pop_all()
         return self
 
     def _read(self) -> None:
-        end = 0
-        with self.path.open("rb") as file:
-            first = verified(file.readline().removesuffix(b"\n"))
-            if first is None:
-                raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
-            try:
-                there = msgspec.json.decode(first, type=dict[str, str])
-                require_same(records.of_identity(there), self.identity, self.path)
-            except msgspec.MsgspecError:
-                raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
-            end = file.tell()
-            for whole in file:
-                content = verified(whole[:-1]) if whole.endswith(b"\n") else None
-                if content is not None:
-                    with suppress(msgspec.MsgspecError):
-                        index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
-                        self.offsets[index] = end
-                elif not whole.endswith(b"\n"):
-                    break
-                end += len(whole)
+        first = verified(self._reader.readline().removesuffix(b"\n"))
+        if first is None:
+            raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
+        try:
+            there = msgspec.json.decode(first, type=dict[str, str])
+            require_same(records.of_identity(there), self.identity, self.path)
+        except msgspec.MsgspecError:
+            raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
+        end = self._reader.tell()
+        for whole in self._reader:
+            content = verified(whole[:-1]) if whole.endswith(b"\n") else None
+            if content is not None:
+                with suppress(msgspec.MsgspecError):
+                    index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
+                    self.offsets[index] = end
+            elif not whole.endswith(b"\n"):
+                break
+            end += len(whole)
         # what a kill cut short goes, so that the next line starts on its own
         self._file.truncate(end)
         self._file.seek(end)
@@ -167,16 +167,15 @@ class Checkpoint:
 
     def rows(self, indices: range | list[int]) -> Iterator[Row]:
         """The finished rows of those indices, one after the other from the disk."""
-        with self.path.open("rb") as file:
-            for index in indices:
-                file.seek(self.offsets[index])
-                content = verified(file.readline().removesuffix(b"\n"))
-                if content is None:
-                    raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
-                try:
-                    yield records.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
-                except msgspec.MsgspecError as error:
-                    raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
+        for index in indices:
+            self._reader.seek(self.offsets[index])
+            content = verified(self._reader.readline().removesuffix(b"\n"))
+            if content is None:
+                raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
+            try:
+                yield records.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
+            except msgspec.MsgspecError as error:
+                raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
@@ -185,11 +184,9 @@ class Checkpoint:
             self.path.unlink(missing_ok=True)
             for partial in self.directory.glob("row-*.partial"):
                 partial.unlink(missing_ok=True)
-        self._leave()
+        self._open.close()
 
     def _leave(self) -> None:
-        if hasattr(self, "_file"):
-            self._file.close()
         name = self.directory / ".lock"
         try:
             # while the lock is held: whoever waits for this file finds that it is no longer the one

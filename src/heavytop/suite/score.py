@@ -242,7 +242,7 @@ def direction(row: Row) -> str | None:
     along, across = (row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
     if along is None or across is None or not (_is_number(along) and _is_number(across)):
         return None
-    sizes = [exact(along.value), exact(across.value)]
+    sizes = [along.number, across.number]
     if not any(sizes):
         return None
     if sizes[0] > _MOSTLY * sizes[1]:

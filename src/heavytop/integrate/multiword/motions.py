@@ -164,11 +164,14 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
 
 def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
     """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
+    import numpy
+
     totals = abs(highs + lows)
     odd = ((totals <= 1 / _LARGE) & (totals > 0)) | ~(totals < _LARGE)
     if precision.family in ("double", "extended"):
-        zero = _widening(precision)(0.0)
-        return (zero + highs + lows) * sizes, odd.any(axis=1)
+        # a zero has no sign
+        found = numpy.add(highs + 0.0, lows, dtype="longdouble" if precision.family == "extended" else float)
+        return found if (sizes == 1).all() else found * sizes, odd.any(axis=1)
     lows = lows * sizes
     odd |= (lows != 0) & ~(abs(lows) > _LEAST_LOW)
     return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd.any(axis=1)
@@ -216,16 +219,15 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
         found *= scale
         return found, numpy.zeros(len(words), bool)
     # two words fill a quad, and what the others add to is added to them at once
-    first, second, rest, *smaller = (word.astype(heyoka.real128) for word in each)
+    scaled = (word * sizes for k, word in enumerate(each) if k < 3 or word.any())
+    first, second, rest, *smaller = (word.astype(heyoka.real128) for word in scaled)
     odd = numpy.zeros(words.shape[::2], bool)
     for word in smaller:
         total = rest + word
-        part = total - rest
-        odd |= (rest - (total - part)) + (word - part) != 0
+        odd |= (total - rest != word) | (total - word != rest)
         rest = total
     first += second
     first += rest
-    first *= sizes.astype(heyoka.real128)
     return first, odd.any(axis=1)
 
 
@@ -301,7 +303,7 @@ class _Pace:
         highs = times.astype(float)
         status, words = self.run.sampled(highs * rate, (times - highs).astype(float) * rate)
         places = list(PLACES[: len(self.scaled.sizes)])
-        pairs = words[:, places], words[:, [place + 8 for place in places]]
+        pairs = words.take(places, 1), words.take([place + 8 for place in places], 1)
         states, odd = _sums_of_columns(*pairs, sizes, precision)
         others = {row: self.run.exact_state(words[row]) for row in map(int, numpy.flatnonzero(odd))}
         return status, states, others

@@ -199,6 +199,10 @@ class Code:
         """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
         return self._call("llvm.fmuladd.v8f64", VECTOR, (a, b, c))
 
+    def floor(self, a: Value) -> Value:
+        """The largest integer that is not above a double, a double."""
+        return self._call("llvm.floor.f64", DOUBLE, (a,))
+
     def absolute(self, a: Value) -> Value:
         """|a|."""
         return self._call("llvm.fabs.v8f64", VECTOR, (a,))
@@ -206,6 +210,10 @@ class Code:
     def larger(self, a: Value, b: Value) -> Value:
         """max(a, b) lane by lane, for numbers that are not NaN."""
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
+
+    def least(self, a: Value, b: Value) -> Value:
+        """min(a, b) of two integers."""
+        return self.builder.select(self.builder.icmp_signed("<", a, b), a, b)
 
     def largest(self, a: Value) -> Value:
         """The largest |lane|, a double; NaN lanes are passed over."""

@@ -111,17 +111,34 @@ def behind(code: Code, time: Pair, began: Pair, sign: Value) -> tuple[Pair, Valu
     return (code.multiply(high, sign), code.multiply(low, sign)), sure
 
 
-def polynomial(code: Code, order: Value, at: Pair, count: int, row: Callable[[Value], list[Pair]]) -> list[Value]:
-    """The words of Σ row(n) at^n, for each of the ``count`` numbers of a row, from the highest order."""
+def polynomials(
+    code: Code, orders: Pair, places: Sequence[Pair], count: int, row: Callable[[Value], list[Pair]]
+) -> list[list[Value]]:
+    """For each place, the words of Σ row(n) place^n for each of the ``count`` numbers of a row, from the highest order.
+
+    orders: the last of those in double-double, and the highest; between them it goes on in plain doubles.
+    The sums of one place wait for each other, those of several do not.
+    """
+    (low_order, order), b = orders, code.builder
+
+    def plain(k: Value, sums: list[Value]) -> list[Value]:
+        highs = [high for high, _ in row(b.sub(order, k))]
+        both = [(at, high) for at, _ in places for high in highs]
+        return [code.fma(total, at, high) for total, (at, high) in zip(sums, both, strict=True)]
 
     def term(k: Value, words: list[Value]) -> list[Value]:
         found: list[Value] = []
-        for i, coefficient in enumerate(row(code.builder.sub(order, k))):
-            total = multiply(code, (words[2 * i], words[2 * i + 1]), at)
-            found += code.quick_two_sum(*add(code, total, coefficient))
+        coefficients = row(b.sub(low_order, k))
+        for at in places:
+            for coefficient in coefficients:
+                total = multiply(code, (words[len(found)], words[len(found) + 1]), at)
+                found += code.quick_two_sum(*add(code, total, coefficient))
         return found
 
-    return code.loop(0, code.builder.add(order, code.integer(1)), term, [code.zero] * (2 * count))
+    sums = code.loop(0, b.sub(order, low_order), plain, [code.zero] * (count * len(places)))
+    begin = [word for total in sums for word in (total, code.zero)]
+    words, width = code.loop(0, b.add(low_order, code.integer(1)), term, begin), 2 * count
+    return [words[width * i : width * (i + 1)] for i in range(len(places))]
 
 
 def step_length(code: Code, radii: Sequence[Value], reach: Value) -> Value:

@@ -166,7 +166,8 @@ class Floating(ResumableRun):
         """The words of the state at ``time``, inside the last step."""
         behind = time - self._time(dd.BEGAN)
         series, found = self.sampling
-        self.machine.functions["sample"](series, self.order, *split(behind if self.forwards else -behind), found)
+        orders = int(self.counts[dd.USED]), self.order
+        self.machine.functions["sample"](series, *orders, *split(behind if self.forwards else -behind), found)
         return self.found.copy()
 
     def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
@@ -178,7 +179,7 @@ class Floating(ResumableRun):
         a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
         """
         row, count, status = 16 * self.layout.vectors, len(highs), Status.FINE
-        found, progress = doubles(row * count), numpy.zeros(2, numpy.int64)
+        found, progress = doubles(row * (count + dd.AT_ONCE)), numpy.zeros(2, numpy.int64)
         own = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         arrays, result = [*own, pointer(highs), pointer(lows), pointer(progress)], pointer(found)
         while progress[0] < count and status is Status.FINE:

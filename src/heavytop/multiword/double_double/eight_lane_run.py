@@ -37,7 +37,7 @@ from heavytop.multiword.double_double.arithmetic import (
     covered,
     later,
     log2,
-    polynomial,
+    polynomials,
     split,
     split_constant,
     split_ratio,
@@ -109,7 +109,7 @@ def _write_sample(module: ir.Module) -> None:
         at = code.address(scratch, b.mul(n, code.integer(ROW)))
         return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
-    words = polynomial(code, order, (code.load(times_, 0), code.load(times_, 8)), 6, row)
+    words = polynomials(code, (order, order), [(code.load(times_, 0), code.load(times_, 8))], 6, row)[0]
     for index, word in enumerate(words):
         code.store(word, result, ROW * (index % 2) + LANES * (index // 2))
     b.ret_void()

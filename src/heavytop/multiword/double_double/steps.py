@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from llvmlite import ir
@@ -44,7 +45,7 @@ from heavytop.multiword.double_double.arithmetic import (
     covered,
     later,
     log2,
-    polynomial,
+    polynomials,
     step_length,
     times,
 )
@@ -342,6 +343,8 @@ ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOP
 """Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step
 was tried in split coefficients, and the slope of their units; the same of the last step."""
 FINE, NON_FINITE, TOO_SMALL = range(3)
+AT_ONCE = 4
+"""Samples that are taken side by side: the operations of one wait for each other."""
 _HYSTERESIS = 3.0
 _TOLERATED = 1.0
 
@@ -351,7 +354,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
 
     advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
     their number.  The scratch holds the coefficients of the last one.
-    sample(scratch, order, high, low, result): the polynomial of the last step at a time behind its beginning.
+    sample(scratch, n0, order, high, low, result): the polynomial of the last step at a time behind its beginning.
     follow(state, clock, counts, table, scratch, highs, lows, progress, times, steps, result): steps and a row of the
     result for each time that they cover, until all are or so many steps are taken.  The times |τ| > 0 in two words.
     progress: times and steps done; it ends, too, at a time whose distance from the beginning of its step takes exact
@@ -368,7 +371,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
         module,
         {
             "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
-            "sample": (None, [DOUBLES, integer, double, double, DOUBLES]),
+            "sample": (None, [DOUBLES, integer, integer, double, double, DOUBLES]),
             "follow": (None, [*[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 4, INTEGERS, integer, integer, DOUBLES]),
         },
         processor,
@@ -377,21 +380,25 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
 
 
 def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
-    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, DOUBLE, DOUBLE, POINTER])
-    scratch, order, high, low, result = made.args
-    _put_sample(Recurrence(code, layout, system, None, scratch), layout, order, (high, low), result)
+    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, INT, DOUBLE, DOUBLE, POINTER])
+    scratch, low_order, order, high, low, result = made.args
+    _put_samples(Recurrence(code, layout, system, None, scratch), (low_order, order), [(high, low)], result)
     code.builder.ret_void()
 
 
-def _put_sample(rows: Recurrence, layout: Layout, order: Value, time: Pair, result: Value) -> None:
-    """The polynomial of the last step, at a time behind its beginning."""
+def _put_samples(rows: Recurrence, orders: Pair, times: Sequence[Pair], result: Value) -> None:
+    """The polynomial of the last step, at times behind its beginning; a row of the result for each.
+
+    orders: its n0, above which doubles are enough here as they are in the sum at the end of the step, and its N.
+    """
 
     def row(n: Value) -> list[Pair]:
         place = rows.row(n)
-        return [rows.pair(place, layout.value(v)) for v in rows.vectors]
+        return [rows.pair(place, rows.layout.value(v)) for v in rows.vectors]
 
-    at = rows.code.spread(time[0]), rows.code.spread(time[1])
-    for index, word in enumerate(polynomial(rows.code, order, at, layout.vectors, row)):
+    spread = [(rows.code.spread(high), rows.code.spread(low)) for high, low in times]
+    words = [word for sample in polynomials(rows.code, orders, spread, len(rows.vectors), row) for word in sample]
+    for index, word in enumerate(words):
         rows.code.store(word, result, 8 * index)
 
 
@@ -408,7 +415,7 @@ class _Follow:
     def write(self) -> None:
         """The loop over times and steps."""
         code, b = self.code, self.code.builder
-        head, inside, step, sample, put, out = map(b.append_basic_block, ("head", "in", "step", "at", "put", "out"))
+        head, inside, step, sample, one, out = map(b.append_basic_block, ("head", "in", "step", "at", "one", "out"))
         b.branch(head)
         b.position_at_end(head)
         done, taken = (self._word(self.progress, place) for place in range(2))
@@ -416,24 +423,47 @@ class _Follow:
         left = b.and_(b.icmp_signed("<", done, self.count), b.icmp_signed("<", taken, self.most))
         b.cbranch(b.and_(running, left), inside, out)
         b.position_at_end(inside)
-        target = self._word(self.times[0], done), self._word(self.times[1], done)
-        b.cbranch(covered(code, (self._clock(TIME), self._clock(TIME_LOW)), target), sample, step)
+        b.cbranch(self._covered(done), sample, step)
         b.position_at_end(step)
-        for word, place in zip(target, (TARGET, TARGET_LOW), strict=True):
+        for word, place in zip(self._target(done), (TARGET, TARGET_LOW), strict=True):
             b.store(word, code.address(self.arrays[1], place))
         more = b.call(self.advance, [*self.arrays, b.sub(self.most, taken)])
         b.store(b.add(taken, more), code.address(self.progress, 1))
         b.branch(head)
         b.position_at_end(sample)
-        at, sure = behind(code, target, (self._clock(BEGAN), self._clock(BEGAN_LOW)), self._clock(SIGN))
-        b.cbranch(sure, put, out)
-        b.position_at_end(put)
-        result = code.address(self.result, b.mul(done, code.integer(16 * self.layout.vectors)))
-        _put_sample(self.rows, self.layout, self._word(self.arrays[2], ORDER), at, result)
-        b.store(b.add(done, code.integer(1)), code.address(self.progress, 0))
-        b.branch(head)
+        self._put(done, AT_ONCE, head, one)
+        b.position_at_end(one)
+        self._put(done, 1, head, out)
         b.position_at_end(out)
         b.ret_void()
+
+    def _put(self, done: Value, count: int, head: Value, otherwise: Value) -> None:
+        """Put so many rows of the result, of which those count whose times are covered, and go to the head; or nothing,
+        where one of these times takes exact numbers.
+        """
+        code, b = self.code, self.code.builder
+        began, put = (self._clock(BEGAN), self._clock(BEGAN_LOW)), b.append_basic_block("put")
+        sure, times, end = ir.Constant(ir.IntType(1), 1), [], done
+        for k in range(count):
+            place = code.least(b.add(done, code.integer(k)), b.sub(self.count, code.integer(1)))
+            at, known = behind(code, self._target(place), began, self._clock(SIGN))
+            is_covered = self._covered(place)
+            sure = b.and_(sure, b.or_(known, b.not_(is_covered)))
+            end = b.add(end, b.zext(is_covered, INT))
+            times.append(at)
+        b.cbranch(sure, put, otherwise)
+        b.position_at_end(put)
+        result = code.address(self.result, b.mul(done, code.integer(16 * self.layout.vectors)))
+        low_order, order = (self._word(self.arrays[2], place) for place in (USED, ORDER))
+        _put_samples(self.rows, (low_order, order), times, result)
+        b.store(code.least(end, self.count), code.address(self.progress, 0))
+        b.branch(head)
+
+    def _target(self, place: Value) -> Pair:
+        return self._word(self.times[0], place), self._word(self.times[1], place)
+
+    def _covered(self, place: Value) -> Value:
+        return covered(self.code, (self._clock(TIME), self._clock(TIME_LOW)), self._target(place))
 
     def _clock(self, place: int) -> Value:
         return self._word(self.arrays[1], place)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -179,68 +179,64 @@ class Fixed(ResumableRun):
         The states that were reached, in K + 1 words, shape (samples, K + 1, 6 or 9); and by their places those states
         that these words cannot hold, None where nothing can.
         """
-        if isinstance(times, numpy.ndarray):
-            ceilings, inside = times, self._doubles_inside(times)
-        else:
-            ceilings, inside = numpy.array([_not_before(time) for time in times]), self._inside(times)
-        done, status, limit, words = 0, Status.FINE, most_of(self.grid), self.grid.words
-        at, found = doubles(words * len(times)), doubles(sample_row(self.grid, self.vectors) * len(times))
+        are_doubles = isinstance(times, numpy.ndarray)
+        ceilings = times if isinstance(times, numpy.ndarray) else numpy.array([_not_before(time) for time in times])
+        count, status, limit, words = len(times), Status.FINE, most_of(self.grid), self.grid.words
+        at, found = doubles(words * count), doubles(sample_row(self.grid, self.vectors) * count)
         pointers = pointer(self.rows), pointer(at), pointer(found)
-        table, others = found.reshape(len(times), -1), dict[int, tuple[Fraction, ...] | None]()
-        while done < len(times) and status is Status.FINE:
+        table, others = found.reshape(count, -1), dict[int, tuple[Fraction, ...] | None]()
+        progress = numpy.zeros(2, numpy.int64)
+        while progress[0] < count and status is Status.FINE:
+            done, taken = map(int, progress)
+            if are_doubles:
+                status = self._follow(ceilings, at, progress, found)
+                if [*map(int, progress)] != [done, taken] or status is not Status.FINE:
+                    continue
             covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
             if covered <= done:
                 status = self._advance(ceilings[done], _STEPS_AT_ONCE)
                 continue
-            at[words * done : words * covered] = inside(done, covered)
+            at[words * done : words * covered] = self._inside([Fraction(time) for time in times[done:covered]])
             self._samples(pointers, done, covered)
-            if not table[done:covered, -8:].max() <= limit:
-                for row in range(done, covered):
-                    if not table[row, -8:].max() <= limit:
-                        others[row] = self.exact_state(table[row], Fraction(times[row]))
-            done = covered
-        return status, self._components(table[:done]), others
+            for row in range(done, covered):
+                if not table[row, -8:].max() <= limit:
+                    others[row] = self.exact_state(table[row], Fraction(times[row]))
+            progress[0] = covered
+        return status, self._components(table[: progress[0]]), others
+
+    def _follow(self, times: Doubles, at: Doubles, progress: Any, found: Doubles) -> Status:
+        """Some steps and their samples, as far as doubles tell."""
+        before, arrays = int(progress[1]), [pointer(array) for array in (times, at, progress)]
+        follow = self.machine.functions["follow"]
+        follow(*self.arrays, *arrays, len(times), before + _STEPS_AT_ONCE, pointer(found))
+        self.steps += int(progress[1]) - before
+        return Status(int(self.counts[steps.STATUS]))
 
     def _samples(self, pointers: tuple[Any, Any, Any], first: int, last: int) -> None:
         """Those of the last step from one to before another; pointers: to its rows, their words of x, the result."""
         order, (rows, at, found) = int(self.counts[steps.ORDERS]), pointers
         self.machine.functions["samples"](rows, order, at, first, last, found)
 
-    def _inside(self, times: Sequence[Fraction]) -> Callable[[int, int], Any]:
-        """The words of (time − began)/h in the last step, from one of the times to before another."""
+    def _inside(self, times: Sequence[Fraction]) -> list[float]:
+        """The words of (time − began)/h for times in the last step."""
         bits = max(_FINEST_TIME, *(time.denominator.bit_length() for time in times))
-        wholes = [time.numerator << bits - time.denominator.bit_length() + 1 for time in times]
-
-        def words(first: int, last: int) -> list[float]:
-            began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
-            shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
-            away = [whole - began for whole in wholes[first:last]]
-            x = [value << shift if shift >= 0 else _nearest(value, -shift) for value in away]
-            return [word for value in x for word in words_of(value, self.grid)]
-
-        return words
-
-    def _doubles_inside(self, times: Doubles) -> Callable[[int, int], Any]:
-        """The same of doubles.  time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz)."""
-
-        def words(first: int, last: int) -> Any:
-            part, began = times[first:last], self.clock[steps.BEGAN]
-            x = (part - began) / (self.clock[steps.TIME] - began)
-            found = _split(x, self.grid) if began == 0 or part[-1] <= 2 * began else None
-            return self._inside([*map(Fraction, part.tolist())])(0, last - first) if found is None else found.ravel()
-
-        return words
+        began, step = (int(value * 2**bits) for value in (self._began, self.time - self._began))
+        shift = self.grid.total - step.bit_length() + 1  # a step is a power of two
+        away = [(time.numerator << bits - time.denominator.bit_length() + 1) - began for time in times]
+        x = [value << shift if shift >= 0 else _nearest(value, -shift) for value in away]
+        return [word for value in x for word in words_of(value, self.grid)]
 
     def _components(self, rows: Doubles) -> Doubles:
         """The words of (Ω, γ, ξ) out of rows of samples; the last is what the one before it had to round."""
         count = self.grid.words
-        left = rows[:, :-8].reshape(len(rows), self.vectors, count, 8).astype(float)
-        lanes = [[left[:, v, :, lane] for lane in range(6)] for v in range(self.vectors)]
+        table = rows.reshape(len(rows), -1, 8)
+        left = [table[:, count * v : count * (v + 1)] for v in range(self.vectors)]
+        lanes = [[words[:, :, lane] for lane in range(6)] for words in left]
         found = numpy.zeros((len(rows), count + 1, len(self.problem.state)))
         for place, value in enumerate(state_of_left(lanes)):
             found[:, :count, place] = value
-        for v in range(self.vectors):
-            whole, half = left[:, v, -1, 4:2:-1], left[:, v, -1, 5:6] / 2
+        for v, words in enumerate(left):
+            whole, half = words[:, -1, 4:2:-1], words[:, -1, 5:6] / 2
             total = whole - half
             part = total - whole
             found[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (whole - (total - part)) - (half + part)
@@ -298,23 +294,6 @@ def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
         middle = left[5] / 2
         found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
     return tuple(found)
-
-
-def _split(x: Doubles, grid: Grid) -> Doubles | None:
-    """The words of :func:`heavytop.multiword.fixed_point.arithmetic.words_of`, a row each; None where they do not hold
-    all of x.
-    """
-    found, rest = numpy.zeros((len(x), grid.words)), x
-    for k in range(grid.words):
-        size = 2.0 ** (grid.bits * (k + 1))
-        digits = rest * size
-        low = numpy.floor(digits)
-        word = (low + (digits - low >= 0.5)) / size
-        found[:, k] = word
-        rest = rest - word
-        if not rest.any():
-            return found
-    return None
 
 
 def _nearest(value: int, shift: int) -> int:

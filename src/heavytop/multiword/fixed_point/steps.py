@@ -9,7 +9,7 @@ coefficients and sum their products. The series ends where two coefficients in a
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +25,7 @@ from heavytop.multiword.codegen.machine_code import (
     POINTER,
     VECTOR,
     Code,
+    Index,
     Machine,
     Processor,
     Stepping,
@@ -284,6 +285,7 @@ class SeriesCode:
 
 
 _SUM_BITS = 50
+_WORDS_AT_ONCE = 12
 
 
 def most_of(grid: Grid) -> float:
@@ -296,7 +298,12 @@ def sample_row(grid: Grid, vectors: int) -> int:
     return 8 * (grid.words * vectors + 1)
 
 
-def write_samples(module: ir.Module, grid: Grid, vectors: int) -> None:
+def samples_at_once(grid: Grid) -> int:
+    """Samples that are taken side by side: of few words the operations of one wait for each other."""
+    return max(1, _WORDS_AT_ONCE // grid.words)
+
+
+def write_samples(module: ir.Module, grid: Grid, vectors: int) -> Value:
     """Write ``samples(rows, order, at, first, last, result)``: from the first sample to before the last.
 
     rows: those of ``series``, and order what it gave.  at: K words of x for each sample, |x| at most 1, word 1 and on
@@ -304,30 +311,39 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> None:
     """
     made, code = function(module, "samples", ir.VoidType(), [POINTER, INT, POINTER, INT, INT, POINTER])
     coefficients, order, at, first, last, result = made.args
-    b, words = code.builder, grid.words
+    b, words, count = code.builder, grid.words, samples_at_once(grid)
     kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, None, None, None, [])
+    width = words * vectors + 1
 
-    def one(place: Value, _: list[Value]) -> None:
-        start = b.mul(place, code.integer(words))
-        x = [code.spread(b.load(code.address(at, b.add(start, code.integer(k))))) for k in range(words)]
+    def several(block: Value, _: list[Value]) -> None:
+        begin = b.add(first, b.mul(block, code.integer(count)))
+        places = [code.least(b.add(begin, code.integer(i)), b.sub(last, code.integer(1))) for i in range(count)]
+        starts = [code.address(at, b.mul(place, code.integer(words))) for place in places]
+        x = [[code.spread(b.load(code.address(start, k))) for k in range(words)] for start in starts]
 
         def term(k: Value, values: list[Value]) -> list[Value]:
-            found, largest = [], values[-1]
-            for v in range(vectors):
-                product = bounded_product(code, grid, x, values[words * v : words * (v + 1)])
-                row = kept.stored(b.sub(order, k), v)
-                total = carried(code, grid, [code.add(one, other) for one, other in zip(product, row, strict=True)])
-                largest = code.larger(code.absolute(total[0]), largest)
-                found += total
-            return [*found, largest]
+            rows, found = [kept.stored(b.sub(order, k), v) for v in range(vectors)], []
+            for i in range(count):
+                sums, largest = [], values[width * (i + 1) - 1]
+                for v, row in enumerate(rows):
+                    place = width * i + words * v
+                    product = bounded_product(code, grid, x[i], values[place : place + words])
+                    total = carried(code, grid, [code.add(one, other) for one, other in zip(product, row, strict=True)])
+                    largest = code.larger(code.absolute(total[0]), largest)
+                    sums += total
+                found += [*sums, largest]
+            return found
 
-        values = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * (words * vectors + 1))
-        begin = b.mul(place, code.integer(sample_row(grid, vectors)))
-        for index, value in enumerate(values):
-            code.store(value, result, b.add(begin, code.integer(8 * index)))
+        values = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * (width * count))
+        for i, place in enumerate(places):
+            row = code.address(result, b.mul(place, code.integer(8 * width)))
+            for index, value in enumerate(values[width * i : width * (i + 1)]):
+                code.store(value, row, 8 * index)
 
-    code.loop(first, last, one, [])
+    blocks = b.sdiv(b.add(b.sub(last, first), code.integer(count - 1)), code.integer(count))
+    code.loop(0, blocks, several, [])
     b.ret_void()
+    return made
 
 
 # Steps on a grid of K words: h = ± a power of two, halved and doubled by the number of orders that a step takes.
@@ -347,10 +363,13 @@ _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
 def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
-    """``series`` for this system and, unless the grid is relative, ``advance`` and ``samples``.
+    """``series`` for this system and, unless the grid is relative, ``advance``, ``follow`` and ``samples``.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
+    follow(those of advance but steps, times, at, progress, count, steps, samples): steps, and ``samples`` of the times
+    that they cover, doubles > 0, until all are or so many steps are taken.  at: room for the K words of each.
+    progress: times and steps done; it ends, too, at a time that takes exact numbers, or whose sum leaves its range.
     """
     module = ir.Module("grid")
     series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
@@ -360,10 +379,14 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
         "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
     }
     if not grid.relative:
-        _Advance(module, grid, series.vectors, made).write()
-        write_samples(module, grid, series.vectors)
+        advance = _Advance(module, grid, series.vectors, made)
+        advance.write()
+        samples = write_samples(module, grid, series.vectors)
+        _Follow(module, grid, series.vectors, advance.made, samples).write()
         signatures["advance"] = (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer])
         signatures["samples"] = (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES])
+        follow = [*pointers, *[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 2, INTEGERS, integer, integer, DOUBLES]
+        signatures["follow"] = (None, follow)
     return compiled(module, signatures, processor)
 
 
@@ -372,9 +395,9 @@ class _Advance(Stepping):
 
     def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Value) -> None:
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, POINTER, POINTER, INT_POINTER, INT]
-        made, code = function(module, "advance", INT, arguments)
-        self.scratch, self.result = made.args[:7], made.args[7]
-        clock, counts, most = made.args[8:]
+        self.made, code = function(module, "advance", INT, arguments)
+        self.scratch, self.result = self.made.args[:7], self.made.args[7]
+        clock, counts, most = self.made.args[8:]
         super().__init__(code, clock, counts, most, STATUS)
         self.grid, self.size, self.series = grid, grid.words * vectors, series
 
@@ -424,6 +447,96 @@ class _Advance(Stepping):
         shorter = b.or_(b.not_(good), b.icmp_signed(">", orders, many))
         following = b.select(shorter, b.add(halvings, one), halvings)
         self.set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
+
+
+class _Follow:
+    """Writes ``follow``."""
+
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, advance: Value, samples: Value) -> None:
+        arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
+        kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
+        made, self.code = function(module, "follow", ir.VoidType(), kinds)
+        self.grid, self.row, self.functions = grid, sample_row(grid, vectors), (advance, samples)
+        self.arrays, (self.times, self.at, self.progress, *rest) = made.args[:10], made.args[10:]
+        self.count, self.most, self.result = rest
+
+    def write(self) -> None:
+        """The loop over times and steps."""
+        code, b = self.code, self.code.builder
+        head, inside, step, sample, out = map(b.append_basic_block, ("head", "in", "step", "at", "out"))
+        b.branch(head)
+        b.position_at_end(head)
+        done, taken = (self._word(self.progress, place) for place in range(2))
+        running = b.icmp_signed("==", self._word(self.arrays[9], STATUS), code.integer(FINE))
+        left = b.and_(b.icmp_signed("<", done, self.count), b.icmp_signed("<", taken, self.most))
+        b.cbranch(b.and_(running, left), inside, out)
+        b.position_at_end(inside)
+        target = self._word(self.times, done)
+        b.cbranch(b.fcmp_ordered("<=", target, self._clock(TIME)), sample, step)
+        b.position_at_end(step)
+        b.store(target, code.address(self.arrays[8], TARGET))
+        more = b.call(self.functions[0], [*self.arrays, b.sub(self.most, taken)])
+        b.store(b.add(taken, more), code.address(self.progress, 1))
+        b.branch(head)
+        b.position_at_end(sample)
+        known = self._while(done, self.count, self._is_known)
+        order = self._word(self.arrays[9], ORDERS)
+        b.call(self.functions[1], [self.arrays[3], order, self.at, done, known, self.result])
+        good = self._while(done, known, self._is_in_range)
+        b.store(good, code.address(self.progress, 0))
+        b.cbranch(b.icmp_signed(">", good, done), head, out)
+        b.position_at_end(out)
+        b.ret_void()
+
+    def _while(self, start: Value, stop: Value, holds: Callable[[Value], Value]) -> Value:
+        """The first place from ``start`` on that ``holds`` does not, ``stop`` at the latest."""
+        b = self.code.builder
+        entry, head, body, out = b.block, *map(b.append_basic_block, ("while", "holds", "so_far"))
+        b.branch(head)
+        b.position_at_end(head)
+        place = b.phi(INT)
+        place.add_incoming(start, entry)
+        b.cbranch(b.icmp_signed("<", place, stop), body, out)
+        b.position_at_end(body)
+        found, after = holds(place), b.add(place, self.code.integer(1))
+        place.add_incoming(after, b.block)
+        b.cbranch(found, head, out)
+        b.position_at_end(out)
+        return place
+
+    def _is_known(self, place: Value) -> Value:
+        """Whether a time is in the last step and its words are exact, a bit; puts them.
+
+        time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
+        """
+        code, b, grid = self.code, self.code.builder, self.grid
+        time, began, end = self._word(self.times, place), self._clock(BEGAN), self._clock(TIME)
+        rest = b.fdiv(b.fsub(time, began), b.fsub(end, began))
+        zero, one = (ir.Constant(DOUBLE, value) for value in (0.0, 1.0))
+        near = b.fcmp_ordered("<=", time, b.fadd(began, began))
+        known = b.and_(b.fcmp_ordered("<=", time, end), b.or_(near, b.fcmp_ordered("==", began, zero)))
+        for k in range(grid.words):
+            digits = b.fmul(rest, ir.Constant(DOUBLE, 1 / grid.unit(k)))
+            low = code.floor(digits)
+            above = b.fcmp_ordered(">=", b.fsub(digits, low), ir.Constant(DOUBLE, 0.5))
+            word = b.fmul(b.fadd(low, b.select(above, one, zero)), ir.Constant(DOUBLE, grid.unit(k)))
+            at = b.add(b.mul(place, code.integer(grid.words)), code.integer(k))
+            b.store(word, code.address(self.at, at))
+            rest = b.fsub(rest, word)
+        return b.and_(known, b.fcmp_ordered("==", rest, zero))
+
+    def _is_in_range(self, place: Value) -> Value:
+        """Whether the partial sums of a sample were in their range, a bit."""
+        row = self.code.address(self.result, self.code.builder.mul(place, self.code.integer(self.row)))
+        largest = self.code.load(row, self.row - 8)
+        limit = self.code.constant(most_of(self.grid))
+        return self.code.all_of(self.code.builder.fcmp_ordered("<=", largest, limit))
+
+    def _clock(self, place: int) -> Value:
+        return self._word(self.arrays[8], place)
+
+    def _word(self, array: Value, place: Index) -> Value:
+        return self.code.builder.load(self.code.address(array, place))
 
 
 def raises_of(exponent: int) -> tuple[float, int]:
