@@ -144,7 +144,7 @@ def exact(value: Any) -> Fraction:
     if type(value) is Fraction and type(value.numerator) is int is type(value.denominator):
         return value
     if isinstance(value, str):
-        return _from_text(value)
+        return _from_short_text(value) if len(value) <= _SHORT else _from_text(value)
     if isinstance(value, float) and math.isfinite(value):
         return Fraction(float(value))
     kind = type(value).__name__
@@ -251,6 +251,11 @@ def _from_text(text: str) -> Fraction:
     if bottom == 0:
         raise InputError(f"{quoted(text)} divides by zero.", _REMEDY)
     return top / bottom
+
+
+_SHORT = 64
+_from_short_text = lru_cache(maxsize=4096)(_from_text)
+"""Scripts call with the same text again and again, as times or as data."""
 
 
 def _from_decimal(text: str, given: str) -> Fraction:
