@@ -258,8 +258,11 @@ def propagate(
         compact_mode=compact_mode,
         constants=constants,
     )
-    with tool.borrowed() as engine:
+    engine = tool.take()
+    try:
         return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
+    finally:
+        tool.spare.append(engine)
 
 
 def follow(
