@@ -23,7 +23,7 @@ from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
-from heavytop.precision import DOUBLE, LARGEST, OrderedRing, Precision, exact, number, numbers, ordered, whole
+from heavytop.precision import DOUBLE, LARGEST, Array, OrderedRing, Precision, exact, number, numbers, ordered, whole
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
@@ -542,7 +542,7 @@ class Integrator:
         return numpy.array([*states, *([nothing] * missing)])
 
 
-def _array(values: list[Any]) -> Any:
+def _array(values: list[Any]) -> Array:
     """Doubles where all are; else numbers of any kind."""
     return numpy.array(values, dtype=float if all(isinstance(value, float) for value in values) else object)
 

@@ -16,6 +16,7 @@ from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
 from heavytop.precision import (
     DOUBLE,
+    Array,
     Precision,
     Vector,
     cross,
@@ -123,7 +124,7 @@ def _centre(run: Trajectory, output: Output) -> Vector:
     return run.problem.top.centre
 
 
-def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float64]:
+def _columns(run: Trajectory, attitude: Array, output: Output) -> NDArray[np.float64]:
     """The output of doubles, all samples at once, shape (n, 4, 9 or 3); quaternions of either sign."""
     import numpy
 
@@ -145,7 +146,7 @@ def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float
     return found
 
 
-def _exactly(run: Trajectory, place: int, attitude: Any, output: Output) -> Sequence[Any]:
+def _exactly(run: Trajectory, place: int, attitude: Array, output: Output) -> Sequence[Any]:
     """The output at one sample from the exact native numbers: exact, or of more bits than the format has."""
     numbers = [*run.states[place][:6], *attitude[place]]
     try:
@@ -626,7 +627,7 @@ def framed(run: Trajectory, frame: Frame) -> Trajectory:
     return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
 
 
-def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
+def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Array:
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
     import numpy
 
@@ -653,7 +654,7 @@ def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> An
     return in_frame(numpy.array([state]), frame, precision)[0]
 
 
-def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
+def _permuted(part: NDArray[np.float64], frame: Frame) -> Array:
     """Each component of the axes given is one of the others, or its negative."""
     import numpy
 

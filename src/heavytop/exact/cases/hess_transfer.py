@@ -34,7 +34,14 @@ from typing import Any
 from flint import acb, arb, arb_mat, arb_poly, arb_series
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.flint.balls import Undecided, current_length, current_precision, series_length, working_precision
+from heavytop.exact.flint.balls import (
+    Balls,
+    Undecided,
+    current_length,
+    current_precision,
+    series_length,
+    working_precision,
+)
 
 _RATIO_BITS = 2
 RATIO = 2**_RATIO_BITS
@@ -241,7 +248,7 @@ def _short(series: arb_series) -> arb_series:
     return arb_series(_trimmed(series.coeffs()), prec=current_length())
 
 
-def _same(number: Any) -> Any:
+def _same(number: Balls) -> Balls:
     return number
 
 
