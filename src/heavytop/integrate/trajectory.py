@@ -16,7 +16,6 @@ from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
 from heavytop.precision import (
     DOUBLE,
-    Array,
     Precision,
     Vector,
     cross,
@@ -124,7 +123,7 @@ def _centre(run: Trajectory, output: Output) -> Vector:
     return run.problem.top.centre
 
 
-def _columns(run: Trajectory, attitude: Array, output: Output) -> NDArray[np.float64]:
+def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float64]:
     """The output of doubles, all samples at once, shape (n, 4, 9 or 3); quaternions of either sign."""
     import numpy
 
@@ -146,7 +145,7 @@ def _columns(run: Trajectory, attitude: Array, output: Output) -> NDArray[np.flo
     return found
 
 
-def _exactly(run: Trajectory, place: int, attitude: Array, output: Output) -> Sequence[Any]:
+def _exactly(run: Trajectory, place: int, attitude: Any, output: Output) -> Sequence[Any]:
     """The output at one sample from the exact native numbers: exact, or of more bits than the format has."""
     numbers = [*run.states[place][:6], *attitude[place]]
     try:
