@@ -626,7 +626,7 @@ def framed(run: Trajectory, frame: Frame) -> Trajectory:
     return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
 
 
-def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Array:
+def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
     import numpy
 
@@ -653,7 +653,7 @@ def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> An
     return in_frame(numpy.array([state]), frame, precision)[0]
 
 
-def _permuted(part: NDArray[np.float64], frame: Frame) -> Array:
+def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
     """Each component of the axes given is one of the others, or its negative."""
     import numpy
 
