@@ -26,6 +26,7 @@ from heavytop.measure.reference import reference as proven
 from heavytop.precision import (
     DOUBLE,
     LARGEST,
+    Array,
     OrderedRing,
     Precision,
     exact,
@@ -595,7 +596,7 @@ class Integrator:
         return numpy.array([*states, *([nothing] * missing)])
 
 
-def _array(values: list[Any]) -> Any:
+def _array(values: list[Any]) -> Array:
     """Doubles where all are; else numbers of any kind."""
     return numpy.array(values, dtype=float if all(isinstance(value, float) for value in values) else object)
 
