@@ -606,13 +606,11 @@ def _in_memory(
     form: Precision,
     times: list[Fraction],
     states: list[tuple[Fraction, ...] | None],
-    observed: Observed | None = None,
+    found: Observed | None = None,
 ) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    return GivenTrajectory(
-        name, integrator, top, start, which, form, times, states, outcome, 0, {}, "", observed=observed
-    )
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, "", observed=found)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
