@@ -6,11 +6,13 @@ from heavytop.integrate.peers.double import Solved, double_peer
 def _solve(given):
     """From what is given (start and times as arrays, the field, the step) to what was solved."""
 
-    def field(y):
-        return [float(value) for value in given.system.field(given.parameters, y)]
+    parameters = given.parameters
 
-    y, time, steps, states = [float(value) for value in given.start], 0.0, 0, []
-    for end in given.times:
+    def field(y):
+        return given.system.field(parameters, y)
+
+    y, time, steps, states = given.start.tolist(), 0.0, 0, []
+    for end in given.times.tolist():
         count = max(1, round(abs(end - time) / given.setting))
         h = (end - time) / count
         for _ in range(count):

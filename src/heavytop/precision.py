@@ -18,9 +18,12 @@ from itertools import islice
 from math import isqrt
 from numbers import Rational
 from operator import index, is_
-from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
 from heavytop.errors import HeavyTopError, InputError, quoted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
@@ -34,6 +37,8 @@ _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such 
 
 Given: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
 """A number as users give it: an integer, a float of any format (the exact binary number it is), or exact text."""
+Array: TypeAlias = "NDArray[Any]"
+"""An array of the numbers of a format, whatever their dtype."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,7 +354,7 @@ def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
     return [number(value, precision) for value in values]
 
 
-def _widened(doubles: Any, precision: Precision) -> Any:
+def _widened(doubles: Array, precision: Precision) -> Any:
     """An array of doubles as numbers of a format with as many bits or more."""
     if precision.family == "extended":
         return doubles.astype("longdouble")
@@ -358,7 +363,7 @@ def _widened(doubles: Any, precision: Precision) -> Any:
     return doubles.astype(heyoka.real128) if precision.family == "quad" else heyoka.real(0, precision.bits) + doubles
 
 
-def _long_doubles(values: Sequence[Fraction], doubles: Any) -> Any:
+def _long_doubles(values: Sequence[Fraction], doubles: Array) -> Any:
     """The nearest to each of ``values`` in extended, out of the nearest double and the nearest to what that lacks."""
     import numpy
 
@@ -496,8 +501,11 @@ class Ring(Protocol):
 class OrderedRing(Ring, Protocol):
     """Real numbers: those that are near some float."""
 
+    def __sub__(self, other: Self | int, /) -> Self: ...
+    def __truediv__(self, other: Self | int, /) -> Self: ...
     def __radd__(self, other: int, /) -> Self: ...
     def __rsub__(self, other: int, /) -> Self: ...
+    def __rtruediv__(self, other: int, /) -> Self: ...
     def __neg__(self) -> Self: ...
     def __float__(self) -> float: ...
 

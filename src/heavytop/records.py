@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
 
+from heavytop.errors import quoted
 from heavytop.precision import log10 as log10_of
 
 SCHEMA = "heavytop-report/2"
@@ -358,12 +359,16 @@ class Explained(msgspec.Struct, frozen=True, gc=False):
     text: str
 
 
-class Row(msgspec.Struct, frozen=True, gc=False):
+_DERIVED = "system", "precision", "horizon", "measure", "against"
+
+
+class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """One measurement, of one motion compared with one reference.
 
-    key: what is measured, of what, how, over which time; case, system, integrator, precision, horizon and measure are
-    what other programs read of it.  reference: what it was compared with; measured and against say both in words, which
-    nothing reads.
+    key: what is measured, of what, how, over which time; case and integrator are what it is called for other programs.
+    reference: what it was compared with; measured says in words what was.
+    system, precision, horizon, measure and against are what other programs read of the key and the reference.  They
+    follow from these, and stand in a row where none gives them; ValueError where one is given and is another.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, compared where they have a band.
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
@@ -377,12 +382,12 @@ class Row(msgspec.Struct, frozen=True, gc=False):
     """
 
     case: str
-    system: str
+    system: str = ""
     integrator: str
-    precision: str
+    precision: str = ""
     bits: Bits
     outcome: str
-    horizon: str
+    horizon: str = ""
     time_reached: str
     steps: Count
     finite: bool
@@ -407,6 +412,17 @@ class Row(msgspec.Struct, frozen=True, gc=False):
     spread: Spread | msgspec.UnsetType = msgspec.UNSET
     chunk: bytes | msgspec.UnsetType = msgspec.UNSET
     explained: Explained | msgspec.UnsetType = msgspec.UNSET
+
+    def __post_init__(self) -> None:
+        key, reference = self.key, self.reference
+        against = f"nothing: {reference.reason}" if self.outcome in UNMEASURED else reference.text
+        given = self.system, self.precision, self.horizon, self.measure, self.against
+        derived = key.system, key.precision, key.horizon, key.kind, against
+        if given != derived:
+            for name, old, new in zip(_DERIVED, given, derived, strict=True):
+                if old not in ("", new):
+                    raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
+                msgspec.structs.force_setattr(self, name, new)
 
     @property
     def identity(self) -> Identity:

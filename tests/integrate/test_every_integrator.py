@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 from importlib.metadata import EntryPoint
 from typing import Any
 
@@ -73,6 +74,7 @@ def test_an_integrator_added_as_the_manual_says_is_listed(monkeypatch: pytest.Mo
     """An entry point, and a line of the table."""
     entry = EntryPoint("mine:own", "heavytop.integrate.peers.splitting:order2", "heavytop.peers")
     monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
+    monkeypatch.setattr(registry, "_of_packages", lru_cache(registry._of_packages.__wrapped__))
     monkeypatch.setitem(INTEGRATORS, "new", replace(INTEGRATORS["splitting:2"], name="new"))
     shown = heavytop("list", "--json")
     assert shown.returncode == 0

@@ -39,8 +39,8 @@ def sums_code(wide: bool) -> Machine:
     """sums(left, right, where, orders, levels, sums), callable from here."""
     module = ir.Module("sums")
     (written,) = DigitRows.write_kernels(module, grid_of(8), 0, wide)
-    made, code = function(module, "sums", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER])
-    code.builder.call(written, made.args)
+    _, code = function(module, "sums", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER])
+    code.call(written, code.arguments)
     code.builder.ret_void()
     integer = ctypes.c_int64
     return compiled(module, {"sums": (None, [DOUBLES, DOUBLES, INTEGERS, integer, integer, DOUBLES])})
@@ -121,9 +121,9 @@ def conversion(grid: Grid) -> Machine:
     module = ir.Module("conversion")
     count = digits_of(grid)
     for name, length in (("digits", grid.words), ("words", count + 1)):
-        made, code = function(module, name, ir.VoidType(), [POINTER, POINTER])
-        given, to = made.args
-        rows = DigitRows(code, grid, 1, 0, None, None, None, None, [])
+        _, code = function(module, name, ir.VoidType(), [POINTER, POINTER])
+        given, to = code.arguments
+        rows = DigitRows(code, grid, 1, 0, *[code.null] * 4, [])
         values = [code.load(given, LANES * k) for k in range(length)]
         for k, value in enumerate(rows._digits(values) if name == "digits" else rows._words(values)):
             code.store(value, to, LANES * k)

@@ -86,8 +86,8 @@ def test_simple_fractions_round_without_a_bias() -> None:
 def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
     """Not the nearest to the product with the constant's first word: its remainders are not symmetric about 0."""
     module = ir.Module("products")
-    made, code = function(module, "product", ir.VoidType(), [POINTER, POINTER, POINTER])
-    given, factor, result = made.args
+    _, code = function(module, "product", ir.VoidType(), [POINTER, POINTER, POINTER])
+    given, factor, result = code.arguments
     constant, number = ([code.load(base, 8 * k) for k in range(3)] for base in (given, factor))
     words = by_constant(code, (constant[0], constant[1], constant[2]), (number[0], number[1]))
     for k, word in enumerate(words):
@@ -171,8 +171,9 @@ def test_a_state_that_is_not_finite_stops_the_run() -> None:
 def elementary(name: str):
     """log2 or power_of_two as a function of Python."""
     module = ir.Module(name)
-    made, code = function(module, "f", DOUBLE, [DOUBLE])
-    code.builder.ret(log2(code, made.args[0]) if name == "log2" else power_of_two(code, made.args[0], 6, 10))
+    _, code = function(module, "f", DOUBLE, [DOUBLE])
+    (given,) = code.arguments
+    code.builder.ret(log2(given) if name == "log2" else power_of_two(code, given, 6, 10))
     machine = compiled(module, {"f": (ctypes.c_double, [ctypes.c_double])})
     return machine, machine.functions["f"]
 

@@ -76,8 +76,8 @@ def product_code(grid: Grid) -> Machine:
     """products(left, right, count, sums, seen) in all K levels, callable from here."""
     module = ir.Module("products")
     written = arithmetic.write_kernels(module, grid, 8 * grid.words)[-1]
-    made, code = function(module, "products", ir.VoidType(), [POINTER, POINTER, INT, POINTER, POINTER])
-    code.builder.call(written, made.args)
+    _, code = function(module, "products", ir.VoidType(), [POINTER, POINTER, INT, POINTER, POINTER])
+    code.call(written, code.arguments)
     code.builder.ret_void()
     return compiled(module, {"products": (None, [DOUBLES, DOUBLES, ctypes.c_int64, DOUBLES, DOUBLES])})
 

@@ -34,7 +34,8 @@ def report() -> Report:
     first = next(row for row in rows if row.key.kind == "drift")
     for outcome in ("failed", "out_of_time", "unsupported", "out_of_reach"):
         key = msgspec.structs.replace(first.key, case=f"{outcome}-case")
-        rows.append(msgspec.structs.replace(first, key=key, case=f"{outcome}-case", outcome=outcome, metrics={}))
+        ended = {"key": key, "case": key.case, "outcome": outcome, "metrics": {}, "against": ""}
+        rows.append(msgspec.structs.replace(first, **ended))
     return Report(found.schema, found.plan, found.environment, rows)
 
 

@@ -54,9 +54,7 @@ def candidate() -> Report:
     rows[1].metrics["solution_error_across_max"] = error("1e-14")
     rows[2] = replace(rows[2], outcome="step_limit", time_reached="7.5")
     made = report(*rows, row(case="added"))
-    made.environment = {"packages": {"heyoka": "8"}, "llvm": "23.0"}
-    made.plan = {"name": "test", "seed": "1"}
-    return made
+    return replace(made, environment={"packages": {"heyoka": "8"}, "llvm": "23.0"}, plan={"name": "test", "seed": "1"})
 
 
 def compared() -> Differences:
@@ -79,13 +77,15 @@ def shown() -> Report:
         "local_error_ulp_rms": error("0.28"),
         "observed_order": of_fraction(exact("19"), "value"),
     }
-    made.rows += [
-        row(measure="local_error", metrics=steps, order=20),
-        row(measure="local_error", metrics={}, outcome="step_limit", time_reached="7.5"),
-        row(measure="score", integrator="rk4.f90"),
-        row(measure="growth", laws={"drift_area": Law("t", 64, 1.0), "drift_energy": Law("t", 64, 1.0, 0.9, 1.1)}),
-        row(measure="of a later version"),
-    ]
+    made.rows.extend(
+        [
+            row(measure="local_error", metrics=steps, order=20),
+            row(measure="local_error", metrics={}, outcome="step_limit", time_reached="7.5"),
+            row(measure="score", integrator="rk4.f90"),
+            row(measure="growth", laws={"drift_area": Law("t", 64, 1.0), "drift_energy": Law("t", 64, 1.0, 0.9, 1.1)}),
+            row(measure="of a later version"),
+        ]
+    )
     return made
 
 
@@ -189,7 +189,7 @@ def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
     ]
     rows.append(row(case=CONTROL, outcome="step_limit", time_reached="1", system=CONTROL, seconds={"least": 1.0}))
     old, new = report(*rows), report(*(replace(each, metrics={CONTROL: error("1")}) for each in rows))
-    old.environment[CONTROL], old.plan = CONTROL, {"name": CONTROL}
+    old = replace(old, environment=old.environment | {CONTROL: CONTROL}, plan={"name": CONTROL})
     found, tracks = compare(old, new, Policy()), history([old, new], Policy())
     texts = [
         on_paper(summary(old)),

@@ -124,8 +124,8 @@ def test_timings_compare_by_their_own_rule(tmp_path: Path, when: str, machine: s
     given = policy(tmp_path, f"[timings]\ncompare = '{when}'\nratio = 2")
     old, new = (report(drift("1e-12", seconds={"run": seconds, "compile": 0.01})) for seconds in (1.0, 2.5))
     names = ("system", "machine", "processor", "simd_width_double", "cpu_features")
-    old.environment |= dict.fromkeys(names, "A")
-    new.environment |= dict.fromkeys(names, machine)
+    old.environment.update(dict.fromkeys(names, "A"))
+    new.environment.update(dict.fromkeys(names, machine))
     found = {f.metric: f.verdict for f in compare(old, new, given).findings}
     assert found.get("seconds run") is verdict
     assert found.get("seconds compile") in (None, Verdict.SAME)

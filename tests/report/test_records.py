@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.records import Law, Metric, Quantity, Series, by_name
+from heavytop.records import Law, Metric, Quantity, Row, Series, by_name
 from support.small_reports import row
 
 METRICS = [
@@ -77,6 +77,25 @@ def test_a_report_is_a_value_too(tmp_path: Path) -> None:
     assert msgspec.json.encode(report) == before
     with pytest.raises(AttributeError):
         report.rows = []  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", ["system", "precision", "horizon", "measure", "against"])
+def test_what_follows_from_the_key_of_a_row_is_never_another(name: str) -> None:
+    known = row()
+    with pytest.raises(ValueError, match=f"{name} = 'another' is not what follows"):
+        msgspec.structs.replace(known, **{name: "another"})
+    assert msgspec.structs.replace(known, **{name: ""}) == known
+    document = msgspec.to_builtins(known)
+    assert msgspec.convert(document, Row) == known
+    with pytest.raises(msgspec.ValidationError, match=name):
+        msgspec.convert(document | {name: "another"}, Row)
+
+
+def test_a_stored_row_is_written_as_it_was_read() -> None:
+    lines = (Path(__file__).parents[2] / "results/default/report.json").read_bytes().split(b"\n")
+    rows = [line.rstrip(b",") for line in lines if line.startswith(b'{"case"')]
+    assert len(rows) > 10
+    assert [msgspec.json.encode(msgspec.json.decode(each, type=Row)) for each in rows] == rows
 
 
 def test_errors_smaller_than_any_float_have_an_order() -> None:

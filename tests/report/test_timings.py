@@ -29,9 +29,9 @@ SECONDS = {"compile": 0.1, "run": 1.1e-4, "least": 1e-4, "repeats": 11.0, "band"
 
 
 def judged(new: dict, old: dict = SECONDS, environment: dict = ENVIRONMENT, **policy) -> tuple[str, str]:
-    two = [replace(report(row(seconds=each)), environment=ENVIRONMENT) for each in (old, new)]
-    two[1].environment = environment
-    result = compare(*two, Policy(**policy))
+    before = replace(report(row(seconds=old)), environment=ENVIRONMENT)
+    after = replace(report(row(seconds=new)), environment=environment)
+    result = compare(before, after, Policy(**policy))
     return result.verdict, "; ".join(f"{finding.metric}: {finding.reason}" for finding in result.changed)
 
 

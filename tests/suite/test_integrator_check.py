@@ -20,9 +20,10 @@ from heavytop.integrate.peers.double import Solved
 def solve(given):
     """Runge-Kutta of order 4."""
     FAULT
+    parameters = given.parameters
     def field(y):
-        return [float(value) for value in given.system.field(given.parameters, y)]
-    y, t, count = [float(value) for value in given.start], 0.0, 0
+        return given.system.field(parameters, y)
+    y, t, count = given.start.tolist(), 0.0, 0
     states = []
     for end in given.times:
         n = max(1, ceil(abs(end - t) * 50))

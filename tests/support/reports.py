@@ -134,7 +134,7 @@ def Row(**given: Any) -> records.Row:  # noqa: N802 - in the place of the record
         direction,
         given["horizon"],
     )
-    text = given.setdefault("against", "")
+    text = given.pop("against", "")
     given["reference"] = given.get("reference") or Against("proven", text)
     for name, metric in given["metrics"].items():
         if metric.quantity is None or metric.quantity.text != name:

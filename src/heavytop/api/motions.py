@@ -23,7 +23,19 @@ from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
-from heavytop.precision import DOUBLE, LARGEST, OrderedRing, Precision, exact, number, numbers, ordered, whole
+from heavytop.precision import (
+    DOUBLE,
+    LARGEST,
+    Array,
+    OrderedRing,
+    Precision,
+    exact,
+    last_call,
+    number,
+    numbers,
+    ordered,
+    whole,
+)
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
@@ -113,6 +125,41 @@ def propagate(
             attitude=whole_states[:, 6:],
             angle_texts=shown.angles,
         )
+    # what of the arguments can change between two calls is looked at in each
+    lasting = isinstance(integrator, str) and tolerance is None and xi is None and observer is None
+    prepare = _kept if lasting and described(cast(str, integrator)).streams else _prepared
+    run = prepare(
+        top,
+        start,
+        precision,
+        integrator,
+        system,
+        xi,
+        attitude,
+        tolerance,
+        high_accuracy,
+        compact_mode,
+        step_limit,
+        observer,
+    )
+    return run(times)
+
+
+def _prepared(
+    top: HeavyTop | Body,
+    start: State,
+    precision: Precision | str,
+    integrator: str | Callable[..., Any],
+    system: System | str | None,
+    xi: Numbers | None,
+    attitude: bool | None,
+    tolerance: Number | None,
+    high_accuracy: bool | None,
+    compact_mode: bool | None,
+    step_limit: int | None,
+    observer: Observer | None,
+) -> Callable[[Numbers], Trajectory]:
+    """:func:`propagate` of times, everything else checked."""
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     setup = Setup.of(body, state, form, arguments.system(system, body))
@@ -127,10 +174,17 @@ def propagate(
     elif beside:
         options["xi"] = setup.xi
     run = registry.propagator(which, options)
-    found = cast(Trajectory, run(setup.top, setup.start, check_times(times), form, system=setup.system))
-    if beside:
-        found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
-    return setup.given(found)
+
+    def call(times: Numbers) -> Trajectory:
+        found: Trajectory = run(setup.top, setup.start, check_times(times), form, system=setup.system)
+        if beside:
+            found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
+        return setup.given(found)
+
+    return call
+
+
+_kept = last_call(_prepared)
 
 
 def motion(
@@ -542,7 +596,7 @@ class Integrator:
         return numpy.array([*states, *([nothing] * missing)])
 
 
-def _array(values: list[Any]) -> Any:
+def _array(values: list[Any]) -> Array:
     """Doubles where all are; else numbers of any kind."""
     return numpy.array(values, dtype=float if all(isinstance(value, float) for value in values) else object)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,11 @@ from heavytop.top.equations import NAMES
 from heavytop.top.heavy_top import HeavyTop
 
 if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter, Animation, FuncAnimation
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d import Axes3D
 
 __all__ = ["animate", "digits", "drift", "error", "herpolhode", "phase", "poincare", "polhode", "sphere"]
 
@@ -58,13 +62,13 @@ _DASHES = ("-", "--", "-.", ":", (0, (6, 2)), (0, (1, 2)))
 
 def sphere(
     run: Motion,
-    axes: Any = None,
+    axes: Axes3D | None = None,
     *,
     of: str | None = None,
     top: HeavyTop | None = None,
     colour: str = COLOURS[0],
     label: str | None = None,
-) -> Any:
+) -> Axes3D:
     """The path of an axis of the body on the unit sphere in space: loops, cusps and waves.
 
     Arguments:
@@ -93,8 +97,13 @@ def sphere(
 
 
 def polhode(
-    run: Motion, axes: Any = None, *, top: HeavyTop | None = None, colour: str = COLOURS[0], label: str | None = None
-) -> Any:
+    run: Motion,
+    axes: Axes3D | None = None,
+    *,
+    top: HeavyTop | None = None,
+    colour: str = COLOURS[0],
+    label: str | None = None,
+) -> Axes3D:
     """The polhode, the path of Ω in the principal axes; on the energy ellipsoid Ω·IΩ = 2T of a free body, P r = 0.
 
     Arguments:
@@ -136,8 +145,13 @@ def _omega_labels() -> dict[str, str]:
 
 
 def herpolhode(
-    run: Motion, axes: Any = None, *, top: HeavyTop | None = None, colour: str = COLOURS[0], label: str | None = None
-) -> Any:
+    run: Motion,
+    axes: Axes3D | None = None,
+    *,
+    top: HeavyTop | None = None,
+    colour: str = COLOURS[0],
+    label: str | None = None,
+) -> Axes3D:
     """The path of Ω in space, the herpolhode, seen along the angular momentum of a free body, else from above.
 
     Arguments:
@@ -178,11 +192,11 @@ def phase(
     run: Motion,
     x: str = "gamma3",
     y: str = "omega3",
-    axes: Any = None,
+    axes: Axes | None = None,
     *,
     colour: str = COLOURS[0],
     label: str | None = None,
-) -> Any:
+) -> Axes:
     """One component of the motion over another, or over time.
 
     Arguments:
@@ -207,11 +221,11 @@ def poincare(
     section: Section | Events | ReferenceEvents | Iterable[Events | ReferenceEvents],
     x: str = "gamma3",
     y: str = "omega3",
-    axes: Any = None,
+    axes: Axes | None = None,
     *,
     colours: Sequence[str] = COLOURS,
     size: float | None = None,
-) -> Any:
+) -> Axes:
     """A Poincaré section: the states at the events of several motions, a colour each.
 
     Arguments:
@@ -248,7 +262,7 @@ def poincare(
     return drawn
 
 
-def drift(run: Trajectory, axes: Any = None) -> Any:
+def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
     """How far the first integrals of a computed motion are from their value at t = 0, over time.
 
     Arguments:
@@ -274,8 +288,8 @@ def drift(run: Trajectory, axes: Any = None) -> Any:
 
 
 def digits(
-    run: Trajectory, known: Motion, axes: Any = None, *, colour: str = COLOURS[0], label: str | None = None
-) -> Any:
+    run: Trajectory, known: Motion, axes: Axes | None = None, *, colour: str = COLOURS[0], label: str | None = None
+) -> Axes:
     """The digits right of a computed motion over time, −log10 of the largest error of a component.
 
     Arguments:
@@ -300,7 +314,7 @@ def digits(
     return drawn
 
 
-def error(run: Trajectory, known: Motion, axes: Any = None) -> Any:
+def error(run: Trajectory, known: Motion, axes: Axes | None = None) -> Axes:
     """The error of a computed motion along the flow (its phase) and across it, over time.
 
     Arguments:
@@ -330,7 +344,7 @@ def animate(
     frames: int = 120,
     fps: int = 24,
     colour: str = COLOURS[0],
-) -> Any:
+) -> FuncAnimation:
     """The motion as a film: the principal axes of the body, and the path of one of them on the unit sphere.
 
     Arguments:
@@ -361,7 +375,7 @@ def animate(
     drawn.legend(loc="upper left", fontsize="small", frameon=False)
     places = every(len(line), count or 1)
 
-    def show(frame: int) -> Any:
+    def show(frame: int) -> list[Artist]:
         place = places[frame]
         for axis, arm in enumerate(arms):
             arm.set_data_3d(*np.stack([np.zeros(3), rows[place][:, axis]]).T)
@@ -378,7 +392,7 @@ def animate(
     return film
 
 
-def _save(film: Any, file: Path, writer: Any) -> None:
+def _save(film: Animation, file: Path, writer: AbstractMovieWriter | None) -> None:
     try:
         film.save(file, writer=writer)
     except OSError as problem:
@@ -387,7 +401,7 @@ def _save(film: Any, file: Path, writer: Any) -> None:
         ) from None
 
 
-def _writer(suffix: str, fps: int) -> Any:
+def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     if suffix == ".gif":
@@ -401,7 +415,7 @@ def _writer(suffix: str, fps: int) -> Any:
     return FFMpegWriter(fps=fps)
 
 
-def _figure(width: float, height: float) -> Any:
+def _figure(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -410,7 +424,7 @@ def _figure(width: float, height: float) -> Any:
     return figure
 
 
-def _flat(axes: Any) -> Any:
+def _flat(axes: Axes | None) -> Axes:
     """Plane axes: those given, or new ones."""
     if axes is None:
         axes = _figure(6.4, 4.0).add_subplot()
@@ -423,7 +437,7 @@ def _flat(axes: Any) -> Any:
     return axes
 
 
-def _solid(axes: Any) -> Any:
+def _solid(axes: Axes3D | None) -> Axes3D:
     """Three-dimensional axes: those given, or new ones."""
     if axes is None:
         axes = _figure(5.2, 5.0).add_subplot(projection="3d")
@@ -434,13 +448,13 @@ def _solid(axes: Any) -> Any:
     return axes
 
 
-def _sight(axes: Any) -> NDArray[np.float64]:
+def _sight(axes: Axes3D) -> NDArray[np.float64]:
     """The unit vector from the middle of the axes to the eye."""
     elevation, azimuth = np.radians(axes.elev), np.radians(axes.azim)
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
-def _globe(axes: Any) -> None:
+def _globe(axes: Axes3D) -> None:
     """The unit sphere, and a line upwards."""
     _ellipsoid(axes, np.ones(3))
     axes.plot([0, 0], [0, 0], [-1, 1.25], color=_GREY, lw=0.8)
@@ -450,7 +464,7 @@ def _globe(axes: Any) -> None:
     axes.zaxis.labelpad = -1
 
 
-def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
+def _ellipsoid(axes: Axes3D, radii: NDArray[np.float64]) -> None:
     """A translucent ellipsoid with circles of latitude and longitude."""
     turn, height = np.linspace(0, 2 * np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37)
     across, up = np.cos(height)[:, None], np.sin(height)[:, None]
@@ -459,7 +473,7 @@ def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
     axes.plot_wireframe(x, y, z * radii[2], rstride=6, cstride=9, color=_GREY, alpha=0.18, lw=0.5)
 
 
-def _equal(axes: Any, extent: float, middle: Any = (0.0, 0.0, 0.0)) -> None:
+def _equal(axes: Axes3D, extent: float, middle: Sequence[float] | NDArray[np.float64] = (0.0, 0.0, 0.0)) -> None:
     """One scale on all three axes, ``extent`` to both sides of the middle."""
     low, high = np.asarray(middle) - extent, np.asarray(middle) + extent
     for name, ends in zip("xyz", zip(low, high, strict=True), strict=True):
@@ -468,7 +482,11 @@ def _equal(axes: Any, extent: float, middle: Any = (0.0, 0.0, 0.0)) -> None:
 
 
 def _visible_path(
-    axes: Axes, path: NDArray[np.float64], colour: str, label: str | None, weights: Any = (1.0, 1.0, 1.0)
+    axes: Axes3D,
+    path: NDArray[np.float64],
+    colour: str,
+    label: str | None,
+    weights: Sequence[float] | NDArray[np.float64] = (1.0, 1.0, 1.0),
 ) -> None:
     """A path on an ellipsoid Σ weight x² = 1: the part that faces the eye as a line, the rest thin."""
     front = (path * np.asarray(weights)) @ _sight(axes) >= 0
@@ -511,16 +529,15 @@ def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
     axes.set_xlabel(_TIME if (times >= 0).all() else "|t| (time units)")
 
 
-def _logarithmic(axes: Any, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
+def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
     """Curves over time by their decimal logarithms, which may be those of numbers that no double is."""
     backwards = bool((times < 0).any())
     for place, (name, logs) in enumerate(curves.items()):
         values = np.array([np.nan if log is None else log for log in logs])
         exact_zero = bool(np.isnan(values).all())
         colour, dash = COLOURS[place % len(COLOURS)], _DASHES[place % len(_DASHES)]
-        line = {"color": colour, "lw": _WIDTH, "ls": dash, "label": f"{name}: exactly 0" if exact_zero else name}
-        marker = "." if np.isnan(values).any() else ""
-        axes.plot(abs(times), values, marker=marker, ms=3, **line)
+        label, marker = f"{name}: exactly 0" if exact_zero else name, "." if np.isnan(values).any() else ""
+        axes.plot(abs(times), values, marker=marker, ms=3, color=colour, lw=_WIDTH, ls=dash, label=label)
     _time_axis(axes, abs(times))
     if backwards:
         axes.set_xlabel("|t| (time units)")

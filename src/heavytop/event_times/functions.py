@@ -22,7 +22,7 @@ from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import radius_text
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
-from heavytop.precision import decimal_text, exact, native_text
+from heavytop.precision import Array, decimal_text, exact, native_text
 from heavytop.top.equations import NAMES, VARIABLES, Parameters, System
 
 if TYPE_CHECKING:
@@ -422,9 +422,9 @@ class Events(Tabular):
     function: str
     direction: int
     guarantee: str
-    times: Any
-    states: Any
-    directions: Any
+    times: Array
+    states: Array
+    directions: Array
     until: Fraction
     outcome: Outcome
     time_reached: Fraction
@@ -598,7 +598,7 @@ def _arrow(direction: Any) -> str:
     return "rises" if direction > 0 else "falls"
 
 
-def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Any, Any, Any]:
+def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Array, Array, Array]:
     """Times (n,), states (n, 6) and directions (n,) as arrays, also where there are none."""
     import numpy
 

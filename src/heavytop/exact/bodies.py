@@ -30,6 +30,7 @@ from heavytop.exact.closed_form import state_and_attitude
 from heavytop.exact.enclosure.run import Uncertainty, Validated
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
+    BallLike,
     ball,
     midpoint,
     radius,
@@ -77,7 +78,7 @@ class Resolved:
         """Whether the axes given are not these."""
         return self.axes != IDENTITY
 
-    def given(self, state: Any) -> list[Any]:
+    def given(self, state: Any) -> list[BallLike]:
         """A state, (Ω, γ) or (Ω, γ, ξ), in the axes given, over any ring that rationals act on."""
         return [value for place in range(0, len(state), 3) for value in rotated(self.axes, state[place : place + 3])]
 

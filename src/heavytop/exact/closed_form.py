@@ -23,6 +23,8 @@ from heavytop.exact.elliptic.weierstrass import Winding
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
+    BallLike,
+    Balls,
     ball,
     coefficient,
     current_length,
@@ -112,7 +114,7 @@ def initial_xi(gamma: Vector) -> list[arb]:
     root = rational_root(square)
     if root is not None:
         return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
-    size: Any = ball(square).sqrt()
+    size: BallLike = ball(square).sqrt()
     return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]
 
 
@@ -125,7 +127,7 @@ def instant(time: Fraction) -> Any:
     return ball(time) if current_length() == 1 else arb_series([ball(time), 1], prec=current_length())
 
 
-def unit(angle: Any) -> Any:
+def unit(angle: Any) -> BallLike:
     """e^(i angle) of a number or series."""
     sine, cosine = angle.sin_cos()
     if isinstance(angle, arb):
@@ -149,7 +151,7 @@ def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
     return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
 
 
-def rotate(vector: Sequence[Any], omega: Sequence[Fraction], time: Any) -> list[Any]:
+def rotate(vector: Sequence[Balls], omega: Sequence[Fraction], time: Balls) -> list[Balls]:
     """The solution of v' = v × Ω for a constant Ω at ``time``, a number or series."""
     if not any(omega):
         return list(vector)
@@ -158,16 +160,16 @@ def rotate(vector: Sequence[Any], omega: Sequence[Fraction], time: Any) -> list[
     return about([component / rate for component in balls(omega)], cosine, sine, vector)
 
 
-def about(axis: Sequence[Any], cosine: Any, sine: Any, vector: Sequence[Any]) -> list[Any]:
+def about(axis: Sequence[BallLike], cosine: BallLike, sine: BallLike, vector: Sequence[BallLike]) -> list[Any]:
     """The vector turned about a unit vector, axis 2 towards axis 1 about axis 3, by the angle given."""
     along, across = dot(axis, vector), cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
 
 
-def between(before: Sequence[Sequence[Any]], now: Sequence[Sequence[Any]]) -> Carry:
+def between(before: Sequence[Sequence[BallLike]], now: Sequence[Sequence[BallLike]]) -> Carry:
     """What carries vectors with a frame of three unit vectors, from where it was to where it is."""
 
-    def carry(vector: Sequence[Any]) -> list[Any]:
+    def carry(vector: Sequence[BallLike]) -> list[Any]:
         parts = [dot(vector, direction) for direction in before]
         return [sum(part * e[k] for part, e in zip(parts, now, strict=True)) for k in range(3)]
 
@@ -192,7 +194,7 @@ def carried_xi(gamma: Vector, carried: Callable[[Vector], tuple[Sequence[Any], S
     return [cosine * a + sine * b for a, b in zip(*carried(basis), strict=True)]
 
 
-def tanh_sech(argument: Any) -> tuple[Any, Any]:
+def tanh_sech(argument: Balls) -> tuple[Balls, Balls]:
     """(tanh, sech) of a number or series; nothing grows, whatever its sign and size."""
     side = -1 if constant(argument) < 0 else 1
     decay = (-side * argument).exp()
@@ -266,10 +268,10 @@ class WithAttitude(ClosedForm):
     __slots__ = ()
 
     @abstractmethod
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
         """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`ClosedForm`."""
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
@@ -466,8 +468,8 @@ class Renamed:
         """That of the solution."""
         return self.solution.system
 
-    def _renamed(self, values: Sequence[Any]) -> list[Any]:
-        omega: tuple[Any, ...] = permuted(values[:3], self.axes)
+    def _renamed(self, values: Sequence[Balls]) -> list[Balls]:
+        omega: tuple[BallLike, ...] = permuted(values[:3], self.axes)
         if orientation(self.axes) < 0:
             # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
             omega = tuple(w.neg(exact=True) if isinstance(w, arb) else -w for w in omega)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 import math
 import re
+import sys
 import tomllib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -304,11 +305,14 @@ def seconds_of(value: Any, what: str) -> float:
 
 def known() -> dict[str, Integrator]:
     """Every integrator by name, not yet imported: its own, then those of other packages, which replace none."""
-    found = dict(INTEGRATORS)
-    for entry in entry_points(group=GROUP):
-        if entry.name not in FORMER:
-            found.setdefault(entry.name, foreign(entry.name, entry.value))
-    return found
+    return INTEGRATORS | _of_packages(tuple(sys.path)) | INTEGRATORS
+
+
+@lru_cache(maxsize=4)
+def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
+    """Those of the packages on ``sys.path``, looked through once."""
+    entries = entry_points(group=GROUP)
+    return {each.name: foreign(each.name, each.value) for each in entries if each.name not in FORMER}
 
 
 def is_third_party(name: str) -> bool:
@@ -321,6 +325,8 @@ def peer(which: str | IntegratorSource) -> Peer:
     if not isinstance(which, str):
         return which.load()
     name = which
+    if name not in known():
+        _of_packages.cache_clear()  # it may have been installed since
     entry = known().get(name)
     if entry is None:
         raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")

@@ -85,21 +85,16 @@ def _law_row(members: Sequence[Row], slope: Fraction, expected: Fraction, noise:
     }
     return Row(
         case=first.case,
-        system=first.system,
         integrator=first.integrator,
-        precision=formats,
         bits=max(row.bits for row in members),
         outcome=Outcome.SUCCESS.value,
-        horizon=horizon,
         time_reached=max((row.time_reached for row in members), key=lambda t: abs(Fraction(t))),
         steps=sum(row.steps for row in members),
         finite=True,
         metrics=by_name(metrics),
         key=RowKey(NAME, first.key.case, first.system, first.key.subject, formats, first.key.direction, horizon),
         reference=_AGAINST,
-        measure=NAME,
         measured="time units of escape gained per bit, least squares over the formats",
-        against=_AGAINST.text,
     )
 
 

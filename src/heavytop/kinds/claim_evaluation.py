@@ -99,9 +99,8 @@ class ClaimEvaluation(Kind):
         measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
         against = Against("proven", "the same form exactly evaluated from the same rounded data")
         row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
-        end = task.key.horizon
         whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
-        return replace(row, horizon=end, time_reached=end, finite=whole)
+        return replace(row, finite=whole)
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""

@@ -22,7 +22,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.scalar import largest, to_ball
-from heavytop.precision import Precision, decimal_text, exact, number, shown
+from heavytop.precision import Array, Precision, Real, decimal_text, exact, number, shown
 from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
 from heavytop.top.equations import GYROSTAT, gyrostat_energy
 
@@ -52,7 +52,7 @@ class ModelError:
     attitude: arb
 
 
-def exact_claim(case: PartialCase, time: Fraction, branch: Branch, bits: int = MODEL_BITS) -> Values:
+def exact_claim(case: PartialCase, time: Fraction, branch: Branch, bits: int = MODEL_BITS) -> Values[arb]:
     """The printed formulas (4.2)-(4.6) at ``time`` as balls of ``bits`` bits; angles are NaN at t = 0, where φ divides
     by 0.  Raises OutOfReach where even a high working precision leaves less.
     """
@@ -66,7 +66,7 @@ def exact_claim(case: PartialCase, time: Fraction, branch: Branch, bits: int = M
     return Values((o1, o2, o3), (g1, g2, g3), phi, theta, psi)
 
 
-def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values:
+def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values[arb]:
     if time == 0:
         # (4.2) is exactly 0, and the roots of (4.3), (4.5) must not see a ball that reaches below it
         return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), arb(0), FUNCTIONS, "smooth")
@@ -74,7 +74,7 @@ def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values:
 
 
 @whole_evaluation
-def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> tuple[Any, Any, Any]:
+def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> Sequence[arb]:
     """The claimed attitude vector ξ at ``time``: on the smooth branch (4.5) continued through the pole at t = 0."""
     if branch == "smooth":
         angles = case.solves.angles(time, MODEL_BITS)
@@ -91,7 +91,7 @@ def model_error(case: PartialCase, time: Fraction, truth: Truth, branch: Branch 
 
 
 @whole_evaluation
-def _difference(claim: Values, claimed_xi: tuple[Any, Any, Any], state: Sequence[arb], xi: Sequence[arb]) -> ModelError:
+def _difference(claim: Values[arb], claimed_xi: Sequence[arb], state: Sequence[arb], xi: Sequence[arb]) -> ModelError:
     with working_precision(MODEL_BITS + 32):
         gamma = tuple(state[3:6])
         claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
@@ -156,7 +156,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
         )
 
 
-def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Library) -> Values:
+def stable_case(alpha: Real, i1: Real, i3: Real, t: Real, lib: Library) -> Values[Real]:
     """The same motion in the forms that lose no digits, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
     omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
@@ -352,7 +352,7 @@ PAPER_FIGURES = (
 class Curves:
     """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
 
-    times: Any
+    times: Array
     states: NDArray[np.float64]
     angles: NDArray[np.float64]
 
@@ -362,7 +362,7 @@ class PaperCurve:
     """A figure of the paper over time, shapes (n,)."""
 
     figure: PaperFigure
-    times: Any
+    times: Array
     values: NDArray[np.float64]
 
 
@@ -385,9 +385,9 @@ class Portrait:
     levels: level lines of the gyrostat's energy on the sphere |M| = ``length``, each a triple of arrays.
     """
 
-    gyrostat: Any
-    heavy_top: Any
-    levels: list[Any]
+    gyrostat: Array
+    heavy_top: Array
+    levels: list[tuple[Array, Array, Array]]
     length: float
 
 
@@ -435,7 +435,7 @@ def _portrait() -> Portrait:
     return Portrait(orbits[0], orbits[1], _levels(case), float(case.alpha * case.i1))
 
 
-def _levels(case: PartialCase) -> list[Any]:
+def _levels(case: PartialCase) -> list[tuple[Array, Array, Array]]:
     """Level lines of the gyrostat's energy on the sphere |M| = C0."""
     from contourpy import contour_generator
 
@@ -459,7 +459,7 @@ def _levels(case: PartialCase) -> list[Any]:
 
 def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
     """The claim as printed: u = √Ω2, positive roots and arctan."""
-    t = numpy.array([float(time) for time in times])
+    t: Any = numpy.array([float(time) for time in times])
     i1, i3, c1 = float(case.i1), float(case.i3), float(case.c1)
     with numpy.errstate(divide="ignore"):
         v = ershkov.partial_case(i1, i3, c1, t, numpy, "printed")

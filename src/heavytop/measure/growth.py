@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_args
+from typing import get_args
 
 import numpy
-from numpy.typing import NDArray
 
+from heavytop.precision import Array
 from heavytop.records import Growth, Law
-
-Array = NDArray[Any]
 
 Interval = tuple[float, float]
 CLASSES: dict[Growth, float] = dict(zip(get_args(Growth)[:5], (0.0, 0.5, 1.0, 1.5, 2.0), strict=True))
@@ -187,7 +185,7 @@ def _usable(ensemble: Ensemble, errors: Array) -> Array:
     return numpy.flatnonzero(known[:end])
 
 
-def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
+def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Array, Array]:
     """Slopes and sums of squared residuals of least-squares lines through (x, y), y of shape (..., samples)."""
     w = numpy.ones_like(x) if weights is None else weights
     centred = x - numpy.average(x, weights=w)

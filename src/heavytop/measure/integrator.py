@@ -25,11 +25,11 @@ from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.registry import Integrator, IntegratorSource, described, load
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
-from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
+from heavytop.measure.growth import Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
-from heavytop.precision import OrderedRing, Precision, decimal_text, exact
+from heavytop.precision import Array, OrderedRing, Precision, decimal_text, exact
 from heavytop.records import Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State

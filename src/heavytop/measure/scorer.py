@@ -9,7 +9,16 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.flint.balls import ball, ball_from, ball_text, rational, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import (
+    at_precision,
+    ball,
+    ball_from,
+    ball_text,
+    current_length,
+    rational,
+    whole_evaluation,
+    working_precision,
+)
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_ball
 from heavytop.measure.truth import Truth
@@ -164,8 +173,7 @@ class Drift(Statistics):
     @whole_evaluation
     def following(self, state: Sequence[Any]) -> list[Sums]:
         """What the drifts add up to with this native state; nothing is taken in."""
-        with working_precision(self.bits):
-            return self.sums([to_ball(value) for value in state])
+        return at_precision(self.bits, current_length(), lambda _: self.sums([to_ball(value) for value in state]))
 
     def sums(self, y: Sequence[arb]) -> list[Sums]:
         """The same with a state of balls, at a working precision of ``bits``."""

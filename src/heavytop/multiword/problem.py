@@ -15,7 +15,6 @@ import numpy
 from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
     DOUBLES,
     INT,
     LANES,
@@ -23,7 +22,7 @@ from heavytop.multiword.codegen.machine_code import (
     Code,
     Doubles,
     Machine,
-    Value,
+    Operand,
     compiled,
     doubles,
     function,
@@ -244,37 +243,37 @@ def _width(size: int) -> int:
 def _machine(size: int) -> Machine:
     """variation(slopes, powers, orders) for matrices of ``size`` rows."""
     module = ir.Module("variation")
-    made, code = function(module, "variation", ir.VoidType(), [POINTER, POINTER, INT])
-    slopes, powers, orders = made.args
-    b, width = code.builder, _width(size)
+    _, code = function(module, "variation", ir.VoidType(), [POINTER, POINTER, INT])
+    slopes, powers, orders = code.arguments
+    width = _width(size)
 
-    def order(n: Value, _: list[Value]) -> None:
-        after = b.add(n, code.integer(1))
+    def order(n: Operand, _: list[Operand]) -> None:
+        after = n + 1
         zeros = [code.zero] * (size * width // LANES)
         sums = code.loop(0, after, lambda m, values: _product(code, size, (slopes, powers), (m, n), values), zeros)
-        divisor = code.spread(b.sitofp(after, DOUBLE))
-        place = code.address(powers, b.mul(after, code.integer(size * width)))
+        divisor = code.spread(after.to_double())
+        place = code.address(powers, after * (size * width))
         for k, total in enumerate(sums):
-            code.store(b.fdiv(total, divisor), place, LANES * k)
+            code.store(total / divisor, place, LANES * k)
 
     code.loop(0, orders, order, [])
-    b.ret_void()
+    code.builder.ret_void()
     return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
 
 
 def _product(
-    code: Code, size: int, tables: tuple[Value, Value], at: tuple[Value, Value], sums: list[Value]
-) -> list[Value]:
+    code: Code, size: int, tables: tuple[Operand, Operand], at: tuple[Operand, Operand], sums: list[Operand]
+) -> list[Operand]:
     """``sums`` + J_m V_(n−m)."""
-    b, width, (m, n) = code.builder, _width(size), at
-    slope = code.address(tables[0], b.mul(m, code.integer(size * size)))
-    power = code.address(tables[1], b.mul(b.sub(n, m), code.integer(size * width)))
+    width, (m, n) = _width(size), at
+    slope = code.address(tables[0], m * (size * size))
+    power = code.address(tables[1], (n - m) * (size * width))
     parts = width // LANES
     rows = [code.load(power, LANES * k) for k in range(size * parts)]
     found = list(sums)
     for i in range(size):
         for j in range(size):
-            factor = code.spread(b.load(code.address(slope, size * i + j)))
+            factor = code.spread(code.load_one(slope, size * i + j))
             for part in range(parts):
                 found[parts * i + part] = code.fma(factor, rows[parts * j + part], found[parts * i + part])
     return found

@@ -166,24 +166,18 @@ def exact_row(
     series: dict[str, Series] | None = None,
 ) -> Row:
     """The row of what is evaluated, not integrated.  Its samples are the times of the task."""
-    horizon = time_text(task.times[-1]) if task.times else "0"
     return Row(
         case=task.title,
-        system=task.key.system,
         integrator=task.subject,
-        precision=task.key.precision,
         bits=bits,
         outcome=Outcome.SUCCESS.value,
-        horizon=horizon,
-        time_reached=horizon,
+        time_reached=task.key.horizon,
         steps=0,
         finite=all(metric.value != "nan" for metric in metrics.values()),
         metrics=metrics,
         key=task.key,
         reference=reference,
-        measure=task.key.kind,
         measured=measured,
-        against=reference.text,
         series=series or {},
         samples=len(task.times),
     )
@@ -205,21 +199,16 @@ def computed_row(
     horizon = task.times[-1] if task.times else run.time_reached
     return Row(
         case=task.title,
-        system=run.problem.system.name,
         integrator=run.integrator,
-        precision=precision.name,
         bits=precision.bits,
         outcome=outcome.value,
-        horizon=time_text(horizon),
         time_reached=time_text(horizon if done else run.time_reached),
         steps=run.steps,
         finite=done and not any(m.value in ("nan", "missing") for m in metrics.values()),
         metrics=metrics,
         key=task.key,
         reference=reference,
-        measure=task.key.kind,
         measured=f"computed: {run.integrator} in {precision.name}",
-        against=reference.text,
         order=run.order,
         flags=run.flags,
         input_rounding=decimal_text(input_rounding(case.top, case.start, run.problem), 3),
@@ -261,21 +250,16 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
     """The row of a task that was aborted: an outcome of its own, no metric, and why in the place of a reference."""
     return Row(
         case=task.title,
-        system=task.key.system,
         integrator=task.subject,
-        precision=task.key.precision,
         bits=task.precision.bits if task.has_precision else 0,
         outcome=_OUTCOMES.get(type(reason), OUT_OF_REACH),
-        horizon=task.key.horizon,
         time_reached="0",
         steps=0,
         finite=False,
         metrics={},
         key=task.key,
         reference=Against("none", reason=reason.cause),
-        measure=task.key.kind,
         measured="nothing",
-        against=f"nothing: {reason.cause}",
     )
 
 

@@ -370,7 +370,7 @@ def _as_doubles(times: Any) -> Any:
         return None
     sizes = found if found[-1] > 0 else -found
     far = (sizes[0] > _SMALL or sizes[0] == 0) and sizes[-1] < _LARGE
-    return found if far and bool((sizes[1:] > sizes[:-1]).all()) else None
+    return found if far and (len(found) == 1 or bool((sizes[1:] > sizes[:-1]).all())) else None
 
 
 def _in_order(values: list[Fraction]) -> list[float]:

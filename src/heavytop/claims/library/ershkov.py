@@ -15,9 +15,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, NamedTuple
+from typing import Any, Generic, Literal, NamedTuple
 
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.precision import Real
 from heavytop.top.attitude import Library
 
 Branch = Literal["smooth", "printed"]
@@ -42,76 +43,76 @@ class PartialCase:
         return self.alpha**2 * self.i1**2 / (2 * self.i3)
 
 
-class Constants(NamedTuple):
+class Constants(NamedTuple, Generic[Real]):
     """The constants of (4.1), in any ring."""
 
-    i1: Any
-    i3: Any
-    c1: Any
-    alpha: Any
-    a: Any
-    c0: Any
+    i1: Real
+    i3: Real
+    c1: Real
+    alpha: Real
+    a: Real
+    c0: Real
 
 
-class Values(NamedTuple):
+class Values(NamedTuple, Generic[Real]):
     """What the partial case claims at one time."""
 
-    omega: tuple[Any, Any, Any]
-    gamma: tuple[Any, Any, Any]
-    phi: Any
-    theta: Any
-    psi: Any
+    omega: tuple[Real, Real, Real]
+    gamma: tuple[Real, Real, Real]
+    phi: Real
+    theta: Real
+    psi: Real
 
 
-def constants(i1: Any, i3: Any, c1: Any, lib: Library) -> Constants:
+def constants(i1: Real, i3: Real, c1: Real, lib: Library) -> Constants[Real]:
     """(4.1): α = √(2 C1 (I3/I1²)), A = √(√(2 C1/I3) (I1 − I3)²/(I1 I3)), C0 = √(2 I3 C1)."""
     alpha = lib.sqrt(2 * c1 * (i3 / (i1 * i1)))
     a = lib.sqrt(lib.sqrt(2 * c1 / i3) * ((i1 - i3) * (i1 - i3) / (i1 * i3)))
     return Constants(i1, i3, c1, alpha, a, lib.sqrt(2 * i3 * c1))
 
 
-def a_of_6_2(i1: Any, i3: Any, alpha: Any, lib: Library) -> Any:
+def a_of_6_2(i1: Real, i3: Real, alpha: Real, lib: Library) -> Any:
     """A = √(α (I1 − I3)²/I3²) of (6.2); equal to that of (4.1)."""
     return lib.sqrt(alpha * ((i1 - i3) * (i1 - i3) / (i3 * i3)))
 
 
-def u(a: Any, alpha: Any, t: Any, lib: Library) -> Any:
+def u(a: Real, alpha: Real, t: Real, lib: Library) -> Any:
     """(4.2): u = (exp(−A√α t) − 1)/(exp(−A√α t) + 1) √α, and Ω2 = u²."""
     growth = lib.exp(-(a * lib.sqrt(alpha)) * t)
     return (growth - 1) / (growth + 1) * lib.sqrt(alpha)
 
 
-def omega1(c: Constants, omega2: Any, lib: Library) -> Any:
+def omega1(c: Constants[Real], omega2: Real, lib: Library) -> Any:
     """(4.3): Ω1 = √((√(2 I3 C1)/I1) Ω2 − Ω2²), the positive root."""
     return lib.sqrt(c.c0 / c.i1 * omega2 - omega2 * omega2)
 
 
-def omega1_smooth(c: Constants, u: Any, lib: Library) -> Any:
+def omega1_smooth(c: Constants[Real], u: Real, lib: Library) -> Any:
     """The root of (4.3) that follows the flow for all t: u √(α − u²)."""
     return u * lib.sqrt(c.alpha - u * u)
 
 
-def omega3(c: Constants, omega2: Any, lib: Library) -> Any:
+def omega3(c: Constants[Real], omega2: Real, lib: Library) -> Any:
     """(4.4): Ω3 = √((2 C1/I3) (1 − I1/√(2 I3 C1) Ω2))."""
     return lib.sqrt(2 * c.c1 / c.i3 * (1 - c.i1 / c.c0 * omega2))
 
 
-def gamma(c: Constants, omega: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+def gamma(c: Constants[Real], omega: tuple[Real, Real, Real]) -> tuple[Real, Real, Real]:
     """(2.1) with I1 = I2: γ = I Ω/C0."""
     return c.i1 * omega[0] / c.c0, c.i1 * omega[1] / c.c0, c.i3 * omega[2] / c.c0
 
 
-def phi(c: Constants, u: Any, lib: Library) -> Any:
+def phi(c: Constants[Real], u: Real, lib: Library) -> Any:
     """(4.5): φ = arctan √((√(2 I3 C1)/I1)(1/u²) − 1).  Divides by 0 at t = 0."""
     return lib.arctan(lib.sqrt(c.c0 / c.i1 * (1 / (u * u)) - 1))
 
 
-def theta(c: Constants, u: Any, lib: Library) -> Any:
+def theta(c: Constants[Real], u: Real, lib: Library) -> Any:
     """(4.5): θ = arccos √(1 − I1/√(2 I3 C1) u²)."""
     return lib.arccos(lib.sqrt(1 - c.i1 / c.c0 * (u * u)))
 
 
-def angles_smooth(c: Constants, u: Any, lib: Library) -> tuple[Any, Any]:
+def angles_smooth(c: Constants[Real], u: Real, lib: Library) -> tuple[Any, Any]:
     """(φ, θ) with φ = arccos(u/√α), θ = arctan(u/√(α − u²)): (4.5) for t <= 0, and its continuation for t > 0.
 
     θ takes the sign of −t and φ passes π/2 at t = 0, so γ of (3.2) is that of the smooth branch for all t.
@@ -119,23 +120,23 @@ def angles_smooth(c: Constants, u: Any, lib: Library) -> tuple[Any, Any]:
     return lib.arccos(u / lib.sqrt(c.alpha)), lib.arctan(u / lib.sqrt(c.alpha - u * u))
 
 
-def phi_of_6_1(alpha: Any, u: Any, lib: Library) -> Any:
+def phi_of_6_1(alpha: Real, u: Real, lib: Library) -> Any:
     """(6.1): φ = arctan √(α/u² − 1).  Divides by 0 at t = 0."""
     return lib.arctan(lib.sqrt(alpha / (u * u) - 1))
 
 
-def theta_of_6_1(alpha: Any, u: Any, lib: Library) -> Any:
+def theta_of_6_1(alpha: Real, u: Real, lib: Library) -> Any:
     """(6.1): θ = arccos √(1 − u²/α)."""
     return lib.arccos(lib.sqrt(1 - u * u / alpha))
 
 
-def psi(i1: Any, i3: Any, alpha: Any, u: Any, t: Any, lib: Library) -> Any:
+def psi(i1: Real, i3: Real, alpha: Real, u: Real, t: Real, lib: Library) -> Any:
     """(4.6) and (6.2): ψ = (I1/I3) α t + ½ ln((√α + u)/(√α − u))."""
     root = lib.sqrt(alpha)
     return i1 / i3 * alpha * t + lib.log((root + u) / (root - u)) / 2
 
 
-def partial_case(i1: Any, i3: Any, c1: Any, t: Any, lib: Library, branch: Branch = "smooth") -> Values:
+def partial_case(i1: Real, i3: Real, c1: Real, t: Real, lib: Library, branch: Branch = "smooth") -> Values[Real]:
     """(4.1)-(4.6) at time t, all in the arithmetic of the numbers given."""
     c = constants(i1, i3, c1, lib)
     u_of_t = u(c.a, c.alpha, t, lib)

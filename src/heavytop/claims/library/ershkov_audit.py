@@ -362,7 +362,7 @@ def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ..
     return Formulas(gamma, frozenset(), (), conditions_of(angles), _POLE)
 
 
-def _partial_constants() -> ershkov.Constants:
+def _partial_constants() -> ershkov.Constants[Any]:
     return ershkov.constants(_I1, _I3, _ALPHA**2 * _I1**2 / (2 * _I3), SYMBOLIC)
 
 

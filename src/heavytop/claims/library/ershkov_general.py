@@ -8,28 +8,29 @@ equation of (1.1).
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple
 
+from heavytop.precision import Real
 from heavytop.top.attitude import Library
 
 
-class GeneralConstants(NamedTuple):
+class GeneralConstants(NamedTuple, Generic[Real]):
     """Data of the general case in any ring: I1 != I3, C0 != 0."""
 
-    inertia: tuple[Any, Any, Any]
-    weight: Any
-    b: Any
-    c0: Any
-    c1: Any
+    inertia: tuple[Real, Real, Real]
+    weight: Real
+    b: Real
+    c0: Real
+    c1: Real
 
 
-def gamma(c: GeneralConstants, omega: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+def gamma(c: GeneralConstants[Real], omega: tuple[Real, Real, Real]) -> tuple[Real, Real, Real]:
     """(2.1): γ = (I1 Ω1, I2 Ω2, I3 Ω3)/C0."""
     i1, i2, i3 = c.inertia
     return i1 * omega[0] / c.c0, i2 * omega[1] / c.c0, i3 * omega[2] / c.c0
 
 
-def omega3_squared(c: GeneralConstants, omega2: Any) -> Any:
+def omega3_squared(c: GeneralConstants[Real], omega2: Real) -> Real:
     """(2.2): Ω3² = (C2 C3 + (I2 − I1) I2 Ω2² − b I2 C3 Ω2)/((I1 − I3) I3)."""
     i1, i2, i3 = c.inertia
     c2 = c.c0 * (c.c1 / c.weight - c.c0 * c.c0 / (2 * c.weight * i1))
@@ -37,7 +38,7 @@ def omega3_squared(c: GeneralConstants, omega2: Any) -> Any:
     return (c2 * c3 + (i2 - i1) * i2 * (omega2 * omega2) - c.b * i2 * c3 * omega2) / ((i1 - i3) * i3)
 
 
-def f1(c: GeneralConstants, omega2: Any) -> Any:
+def f1(c: GeneralConstants[Real], omega2: Real) -> Real:
     """f1 of (2.3)."""
     i1, i2, i3 = c.inertia
     return (
@@ -47,7 +48,7 @@ def f1(c: GeneralConstants, omega2: Any) -> Any:
     )
 
 
-def f2(c: GeneralConstants, omega2: Any) -> Any:
+def f2(c: GeneralConstants[Real], omega2: Real) -> Real:
     """f2 of (2.3)."""
     i1, i2, i3 = c.inertia
     return (
@@ -57,7 +58,7 @@ def f2(c: GeneralConstants, omega2: Any) -> Any:
     )
 
 
-def omega1_squared(c: GeneralConstants, omega2: Any) -> Any:
+def omega1_squared(c: GeneralConstants[Real], omega2: Real) -> Real:
     """(2.4): Ω1² as a polynomial in Ω2."""
     i1, i2, i3 = c.inertia
     return (
@@ -67,16 +68,16 @@ def omega1_squared(c: GeneralConstants, omega2: Any) -> Any:
     )
 
 
-def phi(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Library) -> Any:
+def phi(c: GeneralConstants[Real], omega: tuple[Real, Real, Real], lib: Library) -> Any:
     """(3.3): φ = arctan(I1 Ω1/(I2 Ω2))."""
     return lib.arctan(c.inertia[0] * omega[0] / (c.inertia[1] * omega[1]))
 
 
-def theta(c: GeneralConstants, omega: tuple[Any, Any, Any], lib: Library) -> Any:
+def theta(c: GeneralConstants[Real], omega: tuple[Real, Real, Real], lib: Library) -> Any:
     """(3.3): θ = arccos(I3 Ω3/C0)."""
     return lib.arccos(c.inertia[2] * omega[2] / c.c0)
 
 
-def psi_rate(c: GeneralConstants, omega3: Any, phi_rate: Any) -> Any:
+def psi_rate(c: GeneralConstants[Real], omega3: Real, phi_rate: Real) -> Real:
     """(3.4): ψ' = (C0/I3)(1 − φ'/Ω3)."""
     return c.c0 / c.inertia[2] * (1 - phi_rate / omega3)

@@ -23,7 +23,7 @@ from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import IntervalCurve, OneGapMotion, gaps, value
 from heavytop.exact.closed_form import kept
 from heavytop.exact.enclosure.run import Validated
-from heavytop.exact.flint.balls import ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, WithBearing
 from heavytop.precision import decimal_text, round_to, shown
 from heavytop.top.heavy_top import HeavyTop, State
@@ -80,7 +80,7 @@ class AlgebraicMotion(WithBearing):
 
         return to_bits(evaluate, bits)
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.Evaluated`."""
         motion, size = _motion(self).at(ball(time)), ball(self.curve.gamma_square()).sqrt()
         return [*motion[:3], *(component / size for component in motion[3:])]

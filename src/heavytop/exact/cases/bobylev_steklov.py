@@ -40,7 +40,7 @@ from heavytop.exact.closed_form import (
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding
-from heavytop.exact.flint.balls import ball, coefficient, series_length, to_bits
+from heavytop.exact.flint.balls import Balls, ball, coefficient, series_length, to_bits
 from heavytop.exact.solution import ON_AXIS_1, ExactRelation
 from heavytop.precision import Vector, cross, dot, shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
@@ -183,7 +183,7 @@ class _Lattice:
     crossing: bool
     shares: tuple[arb, arb, arb, arb, arb]
 
-    def motion(self, time: Any) -> tuple[Any, Any]:
+    def motion(self, time: Balls) -> tuple[Balls, Balls]:
         """(x, x')."""
         sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
         if self.crossing:

@@ -41,7 +41,7 @@ from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, level_vecto
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, WorkingStart, start_of
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, initial_xi, instant, kept, tanh_sech
 from heavytop.exact.elliptic.quartic import PreparedMotion, QuarticMotion
-from heavytop.exact.flint.balls import Undecided, ball, coefficient, current_length, series_length, to_bits
+from heavytop.exact.flint.balls import BallLike, Undecided, ball, coefficient, current_length, series_length, to_bits
 from heavytop.exact.separable.abel import phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import SPIN_UPWARDS, XI, ExactRelation, apart, plane_top
@@ -281,7 +281,7 @@ class DeloneHomoclinic(WithAngles):
         # 1 - sinθ = 2 S²/d, so the root is exact and odd in t
         return -arb(8).sqrt() * (tanh * sech) / d, 2 * sin_theta - 1, sin_theta, cos_theta
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         alpha = ball(self.alpha)
         sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)

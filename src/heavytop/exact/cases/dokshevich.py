@@ -28,7 +28,17 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import ClosedForm, kept, sign
-from heavytop.exact.flint.balls import Undecided, ball, current_length, exponent, midpoint, to_bits, whole_evaluation
+from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
+    Undecided,
+    ball,
+    current_length,
+    exponent,
+    midpoint,
+    to_bits,
+    whole_evaluation,
+)
 from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import (
@@ -115,7 +125,7 @@ class _Swing:
         """θ and whole turns at a time in own units; raises Undecided where the working precision does not prove it."""
         return phase_at(self.gap, self.origin + time)
 
-    def state(self, phase: Any) -> tuple[list[Any], list[Any]]:
+    def state(self, phase: Balls) -> tuple[list[Balls], list[Balls]]:
         """M and −Γ along e1, e2, e3."""
         c = self.constants
         v = self.gap.position(phase)
@@ -157,7 +167,7 @@ class _Frame:
     momentum: arb
     gamma: arb
 
-    def body(self, along: Sequence[Any]) -> list[Any]:
+    def body(self, along: Sequence[BallLike]) -> list[Any]:
         """Components along e1, e2, e3 in body axes."""
         return [sum((a * e[i] for a, e in zip(along, self.axes, strict=True)), arb(0)) for i in range(3)]
 
@@ -167,10 +177,10 @@ class _Moving(WithBearing):
 
     __slots__ = ()
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.Evaluated`."""
         swing, frame = _swing(self), _frame(self)
-        phase: Any = swing.phase(frame.rate * ball(time))[0]
+        phase: BallLike = swing.phase(frame.rate * ball(time))[0]
         for _ in range(current_length() - 1):
             moving: Any = arb_series([phase], prec=current_length()) if isinstance(phase, arb) else phase
             density = swing.gap.density(swing.gap.position(moving))

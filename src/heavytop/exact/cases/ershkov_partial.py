@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from flint import arb, arb_series
 
@@ -21,19 +20,21 @@ from heavytop.errors import NotInClass
 from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
 from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.solution import SPIN_UPWARDS, ExactRelation, apart, positive
-from heavytop.precision import shown
+from heavytop.precision import Real, shown
 from heavytop.top.attitude import Library
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
 
-def hyperbolic(alpha: Any, ratio: Any, tanh: Any, sech: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any]]:
+def hyperbolic(
+    alpha: Real, ratio: Real, tanh: Real, sech: Real
+) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
     """(Ω, γ) from tanh s and sech s, s = k t/2, over any ring."""
     gamma = (-tanh * sech, tanh * tanh, sech)
     return (alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2]), gamma
 
 
-def hyperbolic_angles(s: Any, lib: Library) -> tuple[Any, Any]:
+def hyperbolic_angles(s: Real, lib: Library) -> tuple[Real, Real]:
     """(φ, θ) at s = k t/2: φ = π/2 + gd(s) = 2 arctan e^s, θ = −gd(s); no digits are lost at either end."""
     return 2 * lib.arctan(lib.exp(s)), -2 * lib.arctan(lib.tanh(s / 2))
 

@@ -33,7 +33,7 @@ from flint import acb, arb
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, kept, rotate, sign, unit
 from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.elliptic.weierstrass import imag, real
-from heavytop.exact.flint.balls import ball
+from heavytop.exact.flint.balls import BallLike, Balls, ball
 from heavytop.exact.solution import NO_TORQUE
 from heavytop.precision import cross, dot
 
@@ -53,7 +53,7 @@ class Euler(WithAttitude):
         omega = self.start.omega
         return not any(cross(omega, self.top.angular_momentum(omega)))
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: BallLike) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         if lattice is not None:
@@ -78,10 +78,10 @@ class _Lattice:
     origin: arb
     wave: Wave
     drift: arb
-    frame: tuple[Sequence[Any], ...]
+    frame: tuple[Sequence[BallLike], ...]
     turn: acb
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
         """Ω, and what carries vectors fixed in space."""
         a, b, c = self.axes
         u = self.rate * time + self.origin
@@ -94,7 +94,7 @@ class _Lattice:
         along = [share * w for share, w in zip(self.shares, omega, strict=True)]
         square = along[i] * along[i] + along[j] * along[j]
 
-        def carry(vector: Sequence[Any]) -> list[Any]:
+        def carry(vector: Sequence[Any]) -> list[BallLike]:
             # what stays: the part along M, and the one across as a factor of the wave
             part, projection, across = (dot(vector, axis) for axis in self.frame)
             turned = acb(projection, -across) * self.turn * turning
@@ -154,7 +154,7 @@ def _rotate(values: Sequence[Fraction], axis: int) -> tuple[Fraction, Fraction, 
     return values[axis], values[(axis + 1) % 3], values[(axis + 2) % 3]
 
 
-def _frame(momentum: Sequence[Any], length: arb, axis: int) -> tuple[Sequence[Any], ...]:
+def _frame(momentum: Sequence[Balls], length: arb, axis: int) -> tuple[Sequence[Balls], ...]:
     """M/L, the unit vector along the projection of the axis across M, and their cross product."""
     along = [component / length for component in momentum]
     first, second = along[(axis + 1) % 3], along[(axis + 2) % 3]

@@ -28,6 +28,8 @@ from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.cases.lagrange import Reduced, polynomial
 from heavytop.exact.closed_form import ClosedForm, constant, kept
 from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
     Undecided,
     ball,
     current_length,
@@ -261,7 +263,7 @@ class GoryachevMotion:
             raise Undecided
         return possible[0]
 
-    def at(self, time: Fraction, length: int) -> list[Any]:
+    def at(self, time: Fraction, length: int) -> list[BallLike]:
         """The six components at ``time``, numbers, or series in t of that length.
 
         Raises Undecided where the working precision does not prove the phases.
@@ -275,14 +277,14 @@ class GoryachevMotion:
         """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""
         return self.line.phases(ball(time * self.level.rate))
 
-    def _rates(self, u1: Any, u2: Any) -> list[Any]:
+    def _rates(self, u1: Balls, u2: Balls) -> list[Balls]:
         """θ1' and θ2'."""
         return [
             u * 0 if isinstance(gap, Rest) else -1 / ((u1 - u2) * gap.density(u))
             for gap, u in zip(self.line.variables, (u1, u2), strict=True)
         ]
 
-    def turned(self, phases: Sequence[Any], turns: Sequence[int]) -> list[Any]:
+    def turned(self, phases: Sequence[Balls], turns: Sequence[int]) -> list[Balls]:
         """The six components in the turned frame."""
         (u1, a1, b1), (u2, a2, b2) = (self.halves(k, phases[k], turns[k]) for k in (0, 1))
         h, rotor, apart = ball(self.level.energy), ball(self.level.rotor), 1 / (self.moment * (u1 - u2))
@@ -298,7 +300,7 @@ class GoryachevMotion:
             -self.sign * (a1 * b2 - a2 * b1) * apart,
         ]
 
-    def halves(self, variable: int, phase: Any, turns: int) -> tuple[Any, Any, Any]:
+    def halves(self, variable: int, phase: Balls, turns: int) -> tuple[Balls, Balls, Balls]:
         """(u, α, β), at a phase of the first turn or a series there."""
         gap, (low, high) = self.line.variables[variable], self.ends[variable]
         u, side = gap.position(phase), -1 if turns % 2 else 1
@@ -317,7 +319,7 @@ class GoryachevMotion:
         return u, -found[0] if constant(gap.bend(phase)) < 0 else found[0], found[1]
 
 
-def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
+def _distance(u: BallLike, root: acb, many: int, middle: arb) -> Any:
     """|u − root|^many for a real root, its square for a pair once; 1 for the other of the pair."""
     if root.imag.is_zero():
         return (u - root.real if root.real < middle else root.real - u) ** many
@@ -586,7 +588,7 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
         ClosedForm.__post_init__(self)
         _require_done(GoryachevLevel.of(self.top, self.start))
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         return _motion(self).at(time, current_length())
 

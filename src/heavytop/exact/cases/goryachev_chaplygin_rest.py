@@ -57,7 +57,7 @@ from heavytop.exact.cases.goryachev_chaplygin import GoryachevLevel, separated_s
 from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.closed_form import ClosedForm, constant, instant, kept
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
-from heavytop.exact.flint.balls import Undecided, ball, series_length
+from heavytop.exact.flint.balls import BallLike, Balls, Undecided, ball, series_length
 from heavytop.exact.separable.oscillation import Bearing, WithBearing
 from heavytop.exact.solution import GAMMA, LEVEL_MOMENTUM, ExactRelation, plane_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -101,7 +101,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         """In the level's unit."""
         return GoryachevLevel.of(self.top, self.start).rate * time
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         motion = _motion(self)
         level = motion.level
@@ -213,11 +213,11 @@ class RestMotion:
             origin += legendre_f(less / (1 + delta), both / (1 + delta), both / more)
         return tangents, origin
 
-    def state(self, time: Any) -> list[Any]:
+    def state(self, time: Balls) -> list[Balls]:
         """The six components in the turned frame at a number or series."""
         return self.at(time).state()
 
-    def at(self, time: Any) -> PathPoint:
+    def at(self, time: BallLike) -> PathPoint:
         """The place at a number or series."""
         root = self.size.sqrt()
         s, k, delta = self.functions.functions(time * (root / 2) + self.origin)
@@ -266,13 +266,13 @@ class PathPoint:
     side: int
     root: arb
 
-    def _tangents(self) -> tuple[list[Any], list[Any], list[arb]]:
+    def _tangents(self) -> tuple[list[BallLike], list[BallLike], list[arb]]:
         """p_k, w_k and e ∓ γ2."""
         shares = list(self.motion.shares[:: self.side])
         tangents = [share * self.lift for share in shares]
         return tangents, [self._width(p * p) for p in tangents], shares
 
-    def _width(self, square: Any) -> Any:
+    def _width(self, square: Balls) -> Balls:
         off, sine = square - self.motion.energy / self.motion.size, self.motion.speed / self.motion.size
         return (off * off + sine * sine).sqrt()
 
@@ -293,7 +293,7 @@ class PathPoint:
         ]
         return [*(self.lift * m / i for m, i in zip(self.momentum(), (4, 4, 1), strict=True)), *gamma]
 
-    def momentum(self) -> list[Any]:
+    def momentum(self) -> list[BallLike]:
         """M/x, not 0, in the turned frame."""
         motion = self.motion
         (p1, p2), (w1, w2), shares = self._tangents()
@@ -335,7 +335,7 @@ class UprightMotion:
         c, total = ball(level.moment_square).sqrt(), one.asinh() + two.asinh()
         return _the_one(level, [cls(level, size_of(level), c, total, one - two, sign) for sign in (1, -1)])
 
-    def state(self, time: Any) -> list[Any]:
+    def state(self, time: Balls) -> list[Balls]:
         """The six components in the turned frame at a number or series."""
         a, root = self.size, self.size.sqrt()
         half = (time * root + self.sum) / 2

@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, between, half_angle
-from heavytop.exact.flint.balls import ball
+from heavytop.exact.flint.balls import Balls, ball
 from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
@@ -57,7 +56,7 @@ class Grioli(WithAttitude):
         ExactRelation("gamma as it follows from Omega", "the difference", _gamma_off),
     )
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         n = self.top.moment
         length = ball(dot(n, n)).sqrt()

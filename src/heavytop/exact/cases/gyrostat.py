@@ -30,7 +30,7 @@ from flint import arb
 from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, kept, rotate, taylor, turned
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
-from heavytop.exact.flint.balls import ball, current_length, to_bits
+from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, to_bits
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import GYROSTAT, Parameters, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State
@@ -73,7 +73,7 @@ class Gyrostat(ClosedForm):
         """Whether M is at rest in the body: ω ∥ M, or nothing moves."""
         return not any(cross(self.momentum, self.angular_velocity))
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         prepared = _prepared(self)
         momentum, point, inverse = self._momentum(time)
@@ -150,7 +150,7 @@ class _Fixed:
     turn: arb
     square: arb
 
-    def at(self, momentum: list[Any], point: Point, inverse: Any) -> list[Any]:
+    def at(self, momentum: list[Balls], point: Point, inverse: Balls) -> list[Balls]:
         """In body components at the point."""
         along = [m * self.share for m in momentum]
         if self.waves is None:

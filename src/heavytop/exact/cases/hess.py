@@ -37,6 +37,8 @@ from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.cases.pendulum import Swing, swing
 from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, between, constant, kept, sign, tanh_sech
 from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
     Undecided,
     ball,
     current_length,
@@ -257,11 +259,11 @@ class HessMotion:
         phase, turns = self._phase(time)
         return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
 
-    def _moving(self, phase: arb, u: arb, v: arb) -> tuple[Any, Any, Any]:
+    def _moving(self, phase: arb, u: arb, v: arb) -> tuple[BallLike, BallLike, BallLike]:
         """(θ, u, v) as power series in t, from their differential equations."""
         if current_length() == 1:
             return phase, u, v
-        now: tuple[Any, ...] = tuple(arb_series([x], prec=current_length()) for x in (phase, u, v))
+        now: tuple[BallLike, ...] = tuple(arb_series([x], prec=current_length()) for x in (phase, u, v))
         for _ in range(current_length() - 1):
             rate = 1 / self.gap.density(self.gap.position(now[0]))
             b, c = self.linear.entries(now[0])
@@ -270,7 +272,7 @@ class HessMotion:
         moving, first, second = now
         return moving, first, second
 
-    def _state(self, phase: Any, u: Any, v: Any) -> list[Any]:
+    def _state(self, phase: Balls, u: Balls, v: Balls) -> list[Balls]:
         s = self.gap.position(phase)
         square = 2 * (self.energy - s)
         share = square.sqrt() / (u * u + v * v)
@@ -339,7 +341,7 @@ class HessPendulum(WithAttitude):
         ExactRelation("M, or the torque, off axis 2", "its part in the plane of axes 1 and 3", _in_plane, any),
     )
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         path, began = _path(self)
         frame, speed = path.at(time)
@@ -388,10 +390,10 @@ class _Path:
         inertia = [ball(i) for i in (i1, i2, i3)]
         return cls(inertia, axis, level, turning, skew, sign(cosine), begin)
 
-    def at(self, time: Any) -> tuple[list[list[Any]], Any]:
+    def at(self, time: Balls) -> tuple[list[list[Balls]], Balls]:
         """(e, γ/|γ| and e × γ/|γ| in body components; x') at a number or series."""
         sine, cosine, speed = self.swing.at(time)
-        half: Any = self.swing.half(constant(time))
+        half: BallLike = self.swing.half(constant(time))
         if isinstance(time, arb_series):
             half = half + (speed / 2).integral()
         tangent, secant = tanh_sech(self.begin - self.skew * half)

@@ -46,6 +46,8 @@ from heavytop.exact.cases.kovalevskaya_theta import (
 )
 from heavytop.exact.closed_form import ClosedForm, kept
 from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
     Undecided,
     ball,
     coefficient,
@@ -211,7 +213,7 @@ class AbelMotion:
         plain = cls(level, start, mu, branch, ends, line, cubic, ((), ()))
         return plain._with_factors(curve, mu, phases)
 
-    def at(self, time: Fraction, length: int) -> list[Any]:
+    def at(self, time: Fraction, length: int) -> list[BallLike]:
         """The six components at ``time``, numbers, or series in t of that length.
 
         Raises Undecided where the working precision does not prove the phases.
@@ -254,7 +256,7 @@ class AbelMotion:
                 return arb((coefficient(value, 1) / coefficient(value, 0)).real)
         return None
 
-    def _speeds(self, v1: Any, v2: Any) -> tuple[Any, Any]:
+    def _speeds(self, v1: Balls, v2: Balls) -> tuple[Balls, Balls]:
         """θ1'/v2 and −θ2'/v1."""
         first, second = (
             v * 0 if isinstance(g, Rest) else 1 / ((v1 - v2) * g.density(v))
@@ -262,12 +264,12 @@ class AbelMotion:
         )
         return first, second
 
-    def _rates(self, v1: Any, v2: Any) -> tuple[Any, Any]:
+    def _rates(self, v1: Balls, v2: Balls) -> tuple[Balls, Balls]:
         """θ1' and θ2'."""
         first, second = self._speeds(v1, v2)
         return v2 * first, -v1 * second
 
-    def moving(self, phases: Sequence[arb]) -> list[Any]:
+    def moving(self, phases: Sequence[arb]) -> list[BallLike]:
         """The phases as power series in t."""
         return self.line.series(phases, self._rates)
 
@@ -294,7 +296,7 @@ class AbelMotion:
             return 1
         return -1 if number == high or self.branch[low].real < b.real else 1
 
-    def _velocity(self, phases: Sequence[Any], turns: Sequence[int]) -> tuple[Any, Any, Any]:
+    def _velocity(self, phases: Sequence[Balls], turns: Sequence[int]) -> tuple[Balls, Balls, Balls]:
         """(p, q, r) from series of the phases."""
         first, second = (self.halves(k, phases[k], turns[k]) for k in (0, 1))
         products = [first[i] * second[i] for i in self.cubic]
@@ -303,7 +305,7 @@ class AbelMotion:
         p, q = above * half, first[0] * second[0] * half * acb(0, -1)
         return real_part(p), real_part(q), real_part(self._spin(phases, first, second) * half * acb(0, 4))
 
-    def _spin(self, phases: Sequence[Any], first: Sequence[Any], second: Sequence[Any]) -> Any:
+    def _spin(self, phases: Sequence[Any], first: Sequence[BallLike], second: Sequence[BallLike]) -> BallLike:
         """(N'D − ND')/(h_10 h_20)."""
         v1, v2 = (g.position(x) for g, x in zip(self.variables, phases, strict=True))
         speeds = self._speeds(v1, v2)
@@ -356,7 +358,7 @@ class AbelMotion:
         return replace(self, rows=(first, second))
 
 
-def _fourth_root(left: Any, right: Any) -> acb:
+def _fourth_root(left: BallLike, right: BallLike) -> acb:
     """The one f in {1, i, −1, −i} with left = f right; raises Undecided where more than one can be."""
     sides = [(coefficient(left, n), coefficient(right, n)) for n in range(ORDERS)]
     possible = [f for f in _UNITS if all((one - f * other).contains(0) for one, other in sides)]

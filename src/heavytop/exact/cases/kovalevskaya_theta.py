@@ -31,7 +31,16 @@ from typing import Any
 from flint import acb, acb_mat, acb_series, arb, arb_mat, arb_series, fmpq_poly
 
 from heavytop.exact.cases.lagrange import Reduced, polynomial
-from heavytop.exact.flint.balls import Undecided, ball, coefficient, current_length, midpoint, series_length, whole
+from heavytop.exact.flint.balls import (
+    BallLike,
+    Undecided,
+    ball,
+    coefficient,
+    current_length,
+    midpoint,
+    series_length,
+    whole,
+)
 from heavytop.top.equations import Parameters, heavy_top, kovalevskaya
 
 # Kovalevskaya's separation of variables: the exact level of a start, its curve, and w1, w2 there.
@@ -125,7 +134,7 @@ class WorkingStart:
     upper: Any
     still: bool
 
-    def state(self, velocity: Sequence[Any], length: int) -> tuple[Any, ...]:
+    def state(self, velocity: Sequence[Any], length: int) -> tuple[BallLike, ...]:
         """The six components from series of p, q, r that are one longer than ``length``."""
         p, q, r = velocity
         with series_length(length + 1):
@@ -177,7 +186,7 @@ def start_of(level: KovalevskayaLevel) -> WorkingStart:
     return WorkingStart(c, h, area, g, motion, lower, upper, level.across(level.omega) == 0)
 
 
-def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
+def _flow(c: arb, start: list[arb]) -> tuple[BallLike, ...]:
     """The power series of the motion from the start, by Picard's iteration on the field itself."""
     parameters = Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0))
     motion = [arb_series([value], prec=current_length()) for value in start]
@@ -213,7 +222,7 @@ def square_root(value: acb) -> acb:
     return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
 
 
-def real_part(series: Any) -> Any:
+def real_part(series: BallLike) -> Any:
     """The real part of a complex series."""
     length = current_length()
     return arb_series([coefficient(series, n).real for n in range(length)], prec=length)

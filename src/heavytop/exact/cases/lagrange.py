@@ -50,7 +50,17 @@ from heavytop.exact.closed_form import (
 )
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Winding, imag, real
-from heavytop.exact.flint.balls import ball, coefficient, current_length, exponent, rational, series_length, to_bits
+from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
+    ball,
+    coefficient,
+    current_length,
+    exponent,
+    rational,
+    series_length,
+    to_bits,
+)
 from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
@@ -196,7 +206,7 @@ class _Prepared:
     across: arb
     directions: tuple[list[arb], ...] | None
 
-    def composed(self, first: Any, second: Any, third: Any) -> list[Any]:
+    def composed(self, first: Balls, second: Balls, third: Balls) -> list[Balls]:
         """The vector whose products with u, v/|a| and a are these numbers or series."""
         if self.directions is None:
             return [first, second, third]
@@ -319,7 +329,7 @@ class LagrangeGyrostat(ClosedForm):
         found: Lagrange = self.made["top"]
         return found
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         turned = self._turned(self.lagrange.evaluate(time), instant(time))
         return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
@@ -334,7 +344,7 @@ class LagrangeGyrostat(ClosedForm):
 
         return to_bits(evaluate, bits, time)
 
-    def _turned(self, vectors: Sequence[Any], time: Any) -> list[Any]:
+    def _turned(self, vectors: Sequence[Balls], time: Balls) -> list[Balls]:
         """Rz(k3 t/I3) of each three components."""
         sine, cosine = (time * ball(self._ahead)).sin_cos()
         found: list[Any] = []
@@ -408,14 +418,14 @@ class Reduced:
             found += [ball(self.along(vector)) / c, ball(self.across(vector)) / c, ball(vector[2])]
         return found
 
-    def in_body(self, vector: Sequence[Any]) -> list[Any]:
+    def in_body(self, vector: Sequence[Balls]) -> list[Balls]:
         """A vector of the turned frame in the top's own axes."""
         c = ball(self.moment_square).sqrt()
         cosine, sine = (ball(n) / c for n in self.moment)
         x, y, z = vector
         return [cosine * x - sine * y, sine * x + cosine * y, z]
 
-    def restored(self, motion: Sequence[Any], length: int) -> list[Any]:
+    def restored(self, motion: Sequence[Any], length: int) -> list[BallLike]:
         """Six series in t', in the turned frame, as numbers or series in t of that length, in the top's own units."""
         rate, size = ball(self.rate), ball(self.size)
         omega, gamma = self.in_body(motion[:3]), self.in_body(motion[3:])

@@ -30,6 +30,8 @@ from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.closed_form import ClosedForm, kept
 from heavytop.exact.flint.balls import (
+    BallLike,
+    Balls,
     Undecided,
     ball,
     current_length,
@@ -175,7 +177,7 @@ class OneGapMotion:
             motion = cls(curve, gap, rests, motion.stops, motion.others, motion.origin, (-1, -both))
         return motion
 
-    def at(self, time: arb) -> list[Any]:
+    def at(self, time: arb) -> list[BallLike]:
         """Ω and Nγ at ``time``, numbers or series of the length set by :func:`series_length`.
 
         Raises Undecided where the working precision does not prove the phase.
@@ -206,16 +208,16 @@ class OneGapMotion:
         vector = [a * x ** (self.curve.power - self.curve.power // 2), b * q, c * r]
         return Bearing.of([s, q * t, r * u], vector, azimuth.at(phase, turns))
 
-    def _moving(self, phase: arb) -> Any:
+    def _moving(self, phase: arb) -> BallLike:
         """The phase as a power series in t, from its differential equation."""
         if current_length() == 1:
             return phase
-        moving: Any = arb_series([phase], prec=current_length())
+        moving: BallLike = arb_series([phase], prec=current_length())
         for _ in range(current_length() - 1):
             moving = phase + (1 / self.gap.density(self.gap.position(moving))).integral()
         return moving
 
-    def _square_roots(self, phase: Any, turns: int) -> tuple[Any, Any]:
+    def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
         found = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
@@ -223,7 +225,7 @@ class OneGapMotion:
             found[stop.of] *= -half if turns % 2 else half
         return found[0], found[1]
 
-    def _state(self, phase: Any, turns: int) -> list[Any]:
+    def _state(self, phase: Balls, turns: int) -> list[Balls]:
         x = self.gap.position(phase)
         q, r = self._square_roots(phase, turns)
         s, t, u = (horner(height, x) for height in self.curve.heights)
@@ -231,7 +233,7 @@ class OneGapMotion:
         return [x**self.curve.power, factor * q, factor * r, s, q * t, r * u]
 
 
-def horner(polynomial: fmpq_poly, x: Any) -> Any:
+def horner(polynomial: fmpq_poly, x: Balls) -> Balls:
     """A rational polynomial at a ball or series."""
     found = x * 0
     for coefficient in reversed(polynomial.coeffs()):
@@ -239,7 +241,7 @@ def horner(polynomial: fmpq_poly, x: Any) -> Any:
     return found
 
 
-def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]:
+def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[BallLike]:
     """Ω and γ, series in t' or numbers, as those in t = t'/rate of Ω times ``rate`` and γ times ``size``."""
     units = [ball(rate)] * 3 + [ball(size)] * 3
     if current_length() == 1:
@@ -346,7 +348,7 @@ class Steklov(WithBearing, ClosedForm):
         ClosedForm.__post_init__(self)
         _require_reach(self)
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         rate, torque = _units(self.top, self.start)
         return in_units(_motion(self).at(ball(rate * time)), rate, 1 / torque)

@@ -27,7 +27,7 @@ from flint import arb
 
 from heavytop.exact.closed_form import Carry, WithAttitude, about, kept, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
-from heavytop.exact.flint.balls import ball, whole
+from heavytop.exact.flint.balls import BallLike, Balls, ball, whole
 from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
@@ -79,7 +79,7 @@ class Pendulum(WithAttitude):
         """It stands still: at rest where no torque acts."""
         return not any(self.axis)
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
@@ -99,7 +99,7 @@ class Swing:
     speed: arb
     rotating: bool
 
-    def at(self, time: Any) -> tuple[Any, Any, Any]:
+    def at(self, time: BallLike) -> tuple[Any, Any, Any]:
         """(sin(x/2), cos(x/2), x') at a number or series."""
         sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
         cosine, speed = (cn, dn) if self.rotating else (dn, cn)
@@ -153,7 +153,7 @@ class _Lattice:
     swing: Swing
     half: tuple[arb, arb]
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
         sine, cosine, speed = self.swing.at(time)
         cosine0, sine0 = self.half
         c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0

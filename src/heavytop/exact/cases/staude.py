@@ -22,7 +22,7 @@ from flint import arb, fmpq_mat, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
-from heavytop.exact.flint.balls import ball, rational, to_bits
+from heavytop.exact.flint.balls import BallLike, ball, rational, to_bits
 from heavytop.exact.solution import equilibrium, require
 from heavytop.precision import Vector, cross, dot, rational_root, shown, vector
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
@@ -39,7 +39,7 @@ class Staude(WithAttitude):
     def __post_init__(self) -> None:
         require("A permanent rotation", (equilibrium(self.system),), self.top, self.start)
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+    def motion(self, time: BallLike) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         parameters = self.system.parameters(self.top, self.start)
         omega = self.system.angular_velocity(parameters, self.start.flat)

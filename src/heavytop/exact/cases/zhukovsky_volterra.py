@@ -46,7 +46,7 @@ from heavytop.exact.elliptic.weierstrass import (
     real,
     second_kind,
 )
-from heavytop.exact.flint.balls import ball, current_length, rational, to_bits, unit_of_time
+from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, rational, to_bits, unit_of_time
 from heavytop.exact.solution import NO_TORQUE
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_GYROSTAT
@@ -120,7 +120,7 @@ class ZhukovskyVolterra(ClosedForm):
         slope = (a0 * a0 * a3 - 3 * a0 * a1 * a2 + 2 * a1**3) / a0**2
         return Winding((a1 * a1 - a0 * a2) / a0, slope, a1 / a0, -a0)
 
-    def evaluate(self, time: Fraction) -> list[Any]:
+    def evaluate(self, time: Fraction) -> list[BallLike]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         if self.permanent:
             return [*balls(self.start.omega), *rotate(balls(self.start.gamma), self.start.omega, instant(time))]
@@ -148,7 +148,7 @@ class ZhukovskyVolterra(ClosedForm):
             self.made["unit"] = Fraction(2) ** unit_of_time(parameters, self.start.flat)
         return Fraction(time * self.made["unit"])
 
-    def _momentum(self, time: Fraction) -> tuple[list[Any], Point, Any]:
+    def _momentum(self, time: Fraction) -> tuple[list[BallLike], Point, BallLike]:
         """M, the point of the lattice, and 1/(D T^5)."""
         curve, length = _curve(self), current_length()
         point = _lattice(self).point(time, length if length > 1 else 0)
@@ -169,7 +169,7 @@ def _product(factors: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     return found
 
 
-def _terms(point: Point, order: int) -> list[Any]:
+def _terms(point: Point, order: int) -> list[BallLike]:
     """1, ℘, ℘', ℘² and ℘℘', each times T^order."""
     t, wp, slope = point.scale, point.above(Fraction(0)), point.slope
     powers = [point.square * 0 + 1]
@@ -179,7 +179,7 @@ def _terms(point: Point, order: int) -> list[Any]:
     return [*found, wp * slope] if order == _POLE else found
 
 
-def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[Any]:
+def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[BallLike]:
     """The combinations of the terms with the factors in each row: of numbers, or of real series."""
     if isinstance(terms[0], arb):
         return list((rows * arb_mat(len(terms), 1, list(terms))).entries())
@@ -321,7 +321,7 @@ class _Fixed:
     invariant: arb
     order: int
 
-    def at(self, momentum: list[Any], point: Point, inverse: Any) -> list[Any]:
+    def at(self, momentum: list[Balls], point: Point, inverse: Balls) -> list[Balls]:
         """In body components at the point."""
         along = [m * self.share for m in momentum]
         if self.wave is None or self.factors is None:
@@ -330,7 +330,7 @@ class _Fixed:
         waves = _combined(self.factors, [*map(real, terms), *map(imag, terms)])
         return [a + part * inverse for a, part in zip(along, waves, strict=True)]
 
-    def _terms(self, wave: SecondKind, point: Point) -> list[Any]:
+    def _terms(self, wave: SecondKind, point: Point) -> list[BallLike]:
         """Φ .. Φ'''' times e^(iκt) T^order, by Lamé's equation."""
         phi, slope = map(lift, wave.at(point))
         t, square = lift(point.scale), lift(point.square)

@@ -24,7 +24,7 @@ from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series
 
 from heavytop.exact.closed_form import constant
 from heavytop.exact.elliptic.weierstrass import Theta, real
-from heavytop.exact.flint.balls import coefficient, current_length, series_length, whole
+from heavytop.exact.flint.balls import BallLike, coefficient, current_length, series_length, whole
 
 _I = acb(0, 1)
 _REACH = arb(1.25)  # quarter periods: the largest reduced argument
@@ -55,7 +55,7 @@ class Jacobi:
     theta: Theta
     parts: tuple[arb_poly, arb_poly, arb_poly, arb_poly]
 
-    def reduced(self, u: Any) -> tuple[Any, int]:
+    def reduced(self, u: BallLike) -> tuple[Any, int]:
         """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no series needs it."""
         if self.period is None:
             return u, 0
@@ -109,7 +109,7 @@ class Wave:
     imaginary: arb_poly
     period: arb
 
-    def at(self, u: Any) -> tuple[Any, arb]:
+    def at(self, u: BallLike) -> tuple[Any, arb]:
         """The value at u reduced by n periods, a number or a series, and the angle n · period it is to be turned by."""
         rest, turns = self.functions.reduced(u)
         return self._number(rest) if isinstance(rest, arb) else self._series(rest), turns * self.period

@@ -44,7 +44,7 @@ from heavytop.exact.elliptic.weierstrass import (
     from_invariants,
     second_kind,
 )
-from heavytop.exact.flint.balls import ball
+from heavytop.exact.flint.balls import BallLike, Balls, ball
 
 Pair = tuple[Fraction, Fraction]
 
@@ -204,7 +204,7 @@ class Companions:
     factors: tuple[Factors, ...]
     still: bool
 
-    def at(self, point: Point, inverse: Any) -> list[Any]:
+    def at(self, point: Point, inverse: Balls) -> list[Balls]:
         """Each F at the point, complex where it is not real; inverse: 1/:meth:`PreparedMotion.denominator`."""
         if self.still:
             return [lift(point.scale * 0)] * len(self.factors)
@@ -226,6 +226,6 @@ class Companions:
         return [a * f + b * g + c * h + d * i + e * j for f, g, h, i, j in self.factors]
 
 
-def lift(value: Any) -> Any:
+def lift(value: BallLike) -> Any:
     """A series as a complex one; a number as it is."""
     return acb_series(value) if isinstance(value, arb_series) else value

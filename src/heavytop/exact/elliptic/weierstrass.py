@@ -24,7 +24,7 @@ from typing import Any
 from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series, fmpz_poly
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.flint.balls import ball, current_precision, midpoint, working_precision
+from heavytop.exact.flint.balls import BallLike, Balls, ball, current_precision, midpoint, working_precision
 
 # Theta functions of one nome at many real or imaginary arguments: polynomials made once, with a proven tail.
 #
@@ -150,11 +150,11 @@ class Point:
     time, z: u and u/(2ω) reduced, or sin, cos and cos 2· of πz where nothing was reduced.
     """
 
-    scale: Any
-    square: Any
-    raised: Any
-    high: Any
-    slope: Any
+    scale: BallLike
+    square: BallLike
+    raised: BallLike
+    high: BallLike
+    slope: BallLike
     root: Scalar
     thetas: tuple[Any, ...]
     time: Any
@@ -236,7 +236,7 @@ class DegenerateLattice:
         square = -3 * as_ball(self.double)
         return arb.pi() / (2 * square.sqrt()) if square > 0 else arb("inf")
 
-    def functions(self, u: Any) -> tuple[Any, Any]:
+    def functions(self, u: Balls) -> tuple[Balls, Balls]:
         """(T, C) = (sinh(κu)/κ, cosh(κu)), or sin and cos, or (u, 1), of a number or a power series."""
         if self.double == 0:
             return u, u * 0 + 1
@@ -251,7 +251,7 @@ class DegenerateLattice:
 
     def point(self, time: Exact, length: int = 0) -> Point:
         """As :meth:`Lattice.point`."""
-        u: Any = arb_series([ball(time), 1], length) if length else ball(time)
+        u: BallLike = arb_series([ball(time), 1], length) if length else ball(time)
         scale, cosine = self.functions(u)
         one = u * 0 + 1
         return Point(scale, scale * scale, one, one, cosine * -2, self.double, (), u, u)
@@ -282,7 +282,7 @@ def real(value: Any) -> Any:
     return value if isinstance(value, arb) else value.real
 
 
-def imag(value: Any) -> Any:
+def imag(value: Any) -> BallLike:
     """The imaginary part of a ball or of a power series in a real variable."""
     if isinstance(value, acb_series):
         return arb_series([value[i].imag for i in range(value.prec)], value.prec)
@@ -439,7 +439,7 @@ class SecondKind:
     index: int | None
     parts: tuple[arb_poly, ...] = ()
 
-    def at(self, point: Point) -> tuple[Any, Any]:
+    def at(self, point: Point) -> tuple[BallLike, BallLike]:
         """(Φ T, Φ' T²) e^(iκt), complex."""
         factor: Any = 1 if self.rate.is_zero() else exponential(point.time, self.rate)
         if not isinstance(self.lattice, Lattice):
@@ -458,7 +458,7 @@ class SecondKind:
         phi = theta * (1 / self.unit) * factor
         return phi, phi * ((point.scale * point.square) * self.slope + point.slope) / above
 
-    def _degenerate(self, point: Point, factor: Any) -> tuple[Any, Any]:
+    def _degenerate(self, point: Point, factor: Balls) -> tuple[Balls, Balls]:
         """Φ = e^(Kt) (κ coth κt − K), or κ/sinh κt where V is at infinity."""
         cosine = point.slope / -2
         if self.index is not None:
@@ -467,7 +467,7 @@ class SecondKind:
         return phi, phi * point.scale * self.shift - factor
 
 
-def exponential(time: Any, rate: acb) -> Any:
+def exponential(time: Any, rate: acb) -> BallLike:
     """e^(rate·time) of a number or a series."""
     return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (rate * time).exp()
 

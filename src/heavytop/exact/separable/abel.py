@@ -22,7 +22,14 @@ from flint import arb, arb_mat, arb_series, fmpq
 from numpy.typing import NDArray
 
 from heavytop.errors import LevelNotDone, OutOfReach
-from heavytop.exact.flint.balls import Undecided, current_length, current_precision, whole, working_precision
+from heavytop.exact.flint.balls import (
+    Balls,
+    Undecided,
+    current_length,
+    current_precision,
+    whole,
+    working_precision,
+)
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
 
 _FLOAT_BITS = 46
@@ -45,19 +52,19 @@ class Variable(Protocol):
     @property
     def column(self) -> list[arb]: ...
 
-    def position(self, phase: Any) -> Any:
+    def position(self, phase: Balls) -> Balls:
         """v at the phase, a number or series."""
         ...
 
-    def density(self, v: Any) -> Any:
+    def density(self, v: Balls) -> Balls:
         """dF_0 by dphase, > 0."""
         ...
 
-    def ends(self, phase: Any) -> tuple[Any, Any]:
+    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
         """√(v − lo) and √(hi − v), each with a sign that makes it analytic."""
         ...
 
-    def bend(self, phase: Any) -> Any:
+    def bend(self, phase: Balls) -> Balls:
         """−dv/dphase over the product of :meth:`ends`."""
         ...
 
@@ -223,19 +230,19 @@ class Rest:
         self.middle = place
         self.column = [arb(0), arb(0)]
 
-    def position(self, phase: Any) -> Any:
+    def position(self, phase: Balls) -> Balls:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         return phase * 0 + self.middle
 
-    def density(self, v: Any) -> Any:
+    def density(self, v: Balls) -> Balls:
         """1: no phase depends on it."""
         return v * 0 + 1
 
-    def ends(self, phase: Any) -> tuple[Any, Any]:
+    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
         """√(v − e), at both ends, which are one."""
         return phase * 0, phase * 0
 
-    def bend(self, phase: Any) -> Any:
+    def bend(self, phase: Balls) -> Balls:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         return phase * 0
 
@@ -261,7 +268,7 @@ class RestingVariable:
         self.position, self.ends = variable.position, variable.ends
         self.bend, self.phase = variable.bend, variable.phase
 
-    def _combined(self, first: Any, second: Any) -> Any:
+    def _combined(self, first: Balls, second: Balls) -> Balls:
         return second - first * self.place
 
     @property
@@ -269,7 +276,7 @@ class RestingVariable:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         return [self._combined(*self.variable.column)]
 
-    def density(self, v: Any) -> Any:
+    def density(self, v: Balls) -> Balls:
         """dH by dphase, of either sign."""
         return (v - self.place) * self.variable.density(v)
 

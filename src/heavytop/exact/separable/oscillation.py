@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.closed_form import Evaluated, constant, kept, tanh_sech
-from heavytop.exact.flint.balls import current_precision, to_bits, working_precision
+from heavytop.exact.flint.balls import Balls, current_precision, to_bits, working_precision
 from heavytop.precision import cross, dot
 
 MOST_TERMS = 1 << 17
@@ -142,17 +142,17 @@ class Gap:
         """The real periods."""
         return [2 * arb.pi() * mean for mean in self.means]
 
-    def position(self, phase: Any) -> Any:
+    def position(self, phase: Balls) -> Balls:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         return self.middle + self.reach * phase.cos()
 
-    def ends(self, phase: Any) -> tuple[Any, Any]:
+    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
         """√(v − lo) and √(hi − v), each with a sign that makes it analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
         sine, cosine = (phase / 2).sin_cos()
         root = (2 * self.reach).sqrt()
         return root * cosine, root * sine
 
-    def bend(self, phase: Any) -> Any:
+    def bend(self, phase: Balls) -> Balls:
         """−dv/dθ over the product of :meth:`ends`."""
         return phase * 0 + 1
 
@@ -362,18 +362,18 @@ class Approach:
 
         return even_rows(lambda cosine: values(self.turning + self.length * (1 - cosine) / 2), self.terms)
 
-    def position(self, phase: Any) -> Any:
+    def position(self, phase: Balls) -> Balls:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         ratio, _ = tanh_sech(phase)
         return self.turning + self.length * (ratio * ratio)
 
-    def ends(self, phase: Any) -> tuple[Any, Any]:
+    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         ratio, rest = tanh_sech(phase)
         turning, limit = self.root * ratio, self.root * rest
         return (turning, limit) if self.length > 0 else (limit, turning)
 
-    def bend(self, phase: Any) -> Any:
+    def bend(self, phase: Balls) -> Balls:
         """See :class:`heavytop.exact.separable.abel.Variable`."""
         _, rest = tanh_sech(phase)
         return rest * (-2 if self.length > 0 else 2)

@@ -258,13 +258,16 @@ def compiled(
 
     Raises Contradiction where its first step, which is known, is wrong.
     """
+    compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
+    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+    found = _compiled.get(key)
+    if found is not None:
+        return found
     require(precision)
     if precision == DOUBLE_DOUBLE:
         raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
-    compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
-    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
     with _compiling.setdefault(key, RLock()):
         if key not in _compiled:
             engine, seconds = _built(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)

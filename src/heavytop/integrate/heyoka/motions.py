@@ -27,6 +27,8 @@ CHUNK_SECONDS = 0.25
 _ON_A_GRID = ("double", "extended", "quad")
 _MANY, _CLOSE = 256, 20
 """States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
+_FORGETS = 0.98
+"""The part of a miss, in steps, that still counts at the next far time."""
 
 
 @dataclass(slots=True)
@@ -47,6 +49,8 @@ class Stepper:
     _largest_step: float = 0.0
     _mean_step: float = 0.0
     _part: float = 0.95
+    _foreseen: float = 0.0
+    _spread: float | None = None
     _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
     rest: Any = None
@@ -64,6 +68,9 @@ class Stepper:
             outcome = self.single() if count < 2 else self._several(count, target)
             if outcome is not Outcome.SUCCESS:
                 return outcome
+        if self._foreseen:
+            self._spread = max(abs(self.steps - self._foreseen), _FORGETS * (self._spread or 0.0))
+            self._foreseen = 0.0
         return Outcome.SUCCESS
 
     def at(self, target: Any, time: Fraction | None = None) -> tuple[Outcome, Any]:
@@ -82,8 +89,14 @@ class Stepper:
             return 1
         distance = abs(float(target - self.engine.time))
         # many steps average out; each of a few may be as long as the longest so far
-        far = distance > 100 * self._largest_step
-        count = self._part * distance / self._mean_step if far else distance / self._largest_step
+        if distance > 100 * self._largest_step:
+            expected = distance / self._mean_step
+            self._foreseen = self._foreseen or self.steps + expected
+            count = self._part * expected
+            if self._spread is not None:
+                count = max(count, expected - self._spread - 2)
+        else:
+            count = distance / self._largest_step
         # a few steps say little of the mean of many
         count = min(count, CHUNK_SECONDS / self._seconds_per_step, 16 * max(self.steps, 1))
         if self.step_limit is not None:
@@ -119,6 +132,7 @@ class Stepper:
         if failed or self._beyond(target):
             # what has been seen of the steps behind the target says how many lie before it
             self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
+            self._spread = None
             self.engine.state[:] = state
             self.engine.dtime = time
             if failed:
@@ -258,8 +272,11 @@ def propagate(
         compact_mode=compact_mode,
         constants=constants,
     )
-    with tool.borrowed() as engine:
+    engine = tool.take()
+    try:
         return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
+    finally:
+        tool.spare.append(engine)
 
 
 def follow(

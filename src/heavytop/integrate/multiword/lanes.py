@@ -285,14 +285,14 @@ class Pairs:
     low: NDArray[np.float64]
 
     @classmethod
-    def of(cls, value: Any) -> Pairs:
+    def of(cls, value: Pairs | Doubles | float) -> Pairs:
         """An array or a number that doubles hold."""
         if isinstance(value, Pairs):
             return value
         high = numpy.asarray(value, float)
         return cls(high, numpy.zeros_like(high))
 
-    def __add__(self, other: Any) -> Pairs:
+    def __add__(self, other: Pairs | Doubles | float) -> Pairs:
         one = Pairs.of(other)
         total, off = _two_sum(self.high, one.high)
         low, rest = _two_sum(self.low, one.low)
@@ -304,21 +304,21 @@ class Pairs:
     def __neg__(self) -> Pairs:
         return type(self)(-self.high, -self.low)
 
-    def __sub__(self, other: Any) -> Pairs:
+    def __sub__(self, other: Pairs | Doubles | float) -> Pairs:
         return self.__add__(-Pairs.of(other))
 
-    def __rsub__(self, other: Any) -> Pairs:
+    def __rsub__(self, other: Pairs | Doubles | float) -> Pairs:
         opposite = -self
         return opposite.__add__(other)
 
-    def __mul__(self, other: Any) -> Pairs:
+    def __mul__(self, other: Pairs | Doubles | float) -> Pairs:
         one = Pairs.of(other)
         product, off = _two_product(self.high, one.high)
         return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Pairs:
+    def __truediv__(self, other: Pairs | Doubles | float) -> Pairs:
         one = Pairs.of(other)
         first = self.high / one.high
         rest = self - one * first
@@ -351,24 +351,24 @@ class Numerators(Pairs):
         return numpy.array(words)
 
 
-def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:
+def _two_sum(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
 
 
-def _quick(a: Any, b: Any) -> tuple[Any, Any]:
+def _quick(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
     total = a + b
     return total, b - (total - a)
 
 
-def _halves(a: Any) -> tuple[Any, Any]:
+def _halves(a: Doubles) -> tuple[Doubles, Doubles]:
     product = _SPLIT * a
     high = product - (product - a)
     return high, a - high
 
 
-def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
+def _two_product(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
     product = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
@@ -478,7 +478,7 @@ class _Grid:
         return Pairs(total, low - (total - high))
 
 
-def _constants(parameters: NDArray[np.float64]) -> Any:
+def _constants(parameters: NDArray[np.float64]) -> Doubles:
     """The coefficients of Ω × Ω and of the linear part, read off the field, three words each: (k, 3, motions)."""
     numbers = [Numerators(column, numpy.zeros(1)) for column in parameters.T]
     given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)

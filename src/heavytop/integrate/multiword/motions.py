@@ -17,7 +17,7 @@ from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Flo
 from heavytop.multiword.fixed_point.arithmetic import Grid
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, number, numbers, require
+from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
@@ -162,7 +162,7 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
     return found
 
 
-def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
     """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
     import numpy
 
@@ -177,7 +177,7 @@ def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: P
     return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd.any(axis=1)
 
 
-def _added(start: Any, arrays: Sequence[Any]) -> Any:
+def _added(start: Array, arrays: Sequence[Array]) -> Array:
     """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
     found = start + arrays[0]
     for each in arrays[1:]:
@@ -185,7 +185,7 @@ def _added(start: Any, arrays: Sequence[Any]) -> Any:
     return found
 
 
-def _reals(words: list[Doubles], grid: Grid, bits: int) -> Any:
+def _reals(words: list[Doubles], grid: Grid, bits: int) -> Array:
     """The sums of words, rounded once.
 
     Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
@@ -205,7 +205,7 @@ def _reals(words: list[Doubles], grid: Grid, bits: int) -> Any:
     return numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
 
 
-def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
     """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows in which
     only exact numbers tell.
     """

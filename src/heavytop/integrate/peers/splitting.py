@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy
 
@@ -26,7 +25,8 @@ from heavytop.integrate.peers.double import (
     reader,
     timed,
 )
-from heavytop.top.equations import HEAVY_GYROSTAT, System
+from heavytop.multiword.codegen.machine_code import Doubles
+from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
 
 _SUZUKI = 1 / (4 - 4 ** (1 / 3))
 _KAHAN_LI = (
@@ -53,12 +53,12 @@ def _stepper(system: System) -> Callable[..., None]:
     field, velocity, read = jit(system.field), jit(system.angular_velocity), jit(reader(system))
     cos, sin = math.cos, math.sin
 
-    def kick(v: Any, p: Any, h: float) -> None:
+    def kick(v: Doubles, p: Parameters, h: float) -> None:
         rates = field(p, (0.0, 0.0, 0.0, v[3], v[4], v[5]))
         for i in range(3):
             v[i] += h * p.inertia[i] * rates[i]
 
-    def turn(v: Any, p: Any, k: Any, axis: int, h: float) -> None:
+    def turn(v: Doubles, p: Parameters, k: Doubles, axis: int, h: float) -> None:
         i1, i2, i3 = p.inertia
         omega = velocity(p, ((v[0] - k[0]) / i1, (v[1] - k[1]) / i2, (v[2] - k[2]) / i3))
         c, s = cos(h * omega[axis]), sin(h * omega[axis])
@@ -68,7 +68,7 @@ def _stepper(system: System) -> Callable[..., None]:
 
     kick, turn = jit(kick), jit(turn)
 
-    def advance(v: Any, n: Any, k: Any, h: float, count: int, stages: Any) -> None:
+    def advance(v: Doubles, n: Doubles, k: Doubles, h: float, count: int, stages: Doubles) -> None:
         p = read(n)
         for _ in range(count):
             for weight in stages:

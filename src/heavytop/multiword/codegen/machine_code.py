@@ -142,165 +142,278 @@ VECTOR = ir.VectorType(DOUBLE, LANES)
 INT_VECTOR = ir.VectorType(INT, LANES)
 POINTER = DOUBLE.as_pointer()
 INT_POINTER = INT.as_pointer()
+_VECTOR_POINTER = VECTOR.as_pointer()
 _INDEX = ir.IntType(32)
+_INDICES = ir.VectorType(_INDEX, LANES)
+_MASK = ir.IntType(LANES)
 _INFINITY = float("inf")
 
-Value: TypeAlias = ir.Value
-"""A value of the machine code: a double, a vector of eight of them, an integer, a flag or an address."""
-Pair: TypeAlias = tuple[Value, Value]
-Index: TypeAlias = int | Value
-"""An int, known when the code is made, or an integer value of the code."""
+
+def _operator(of_doubles: str, of_integers: str, swapped: bool = False) -> Callable[[Operand, Number], Operand]:
+    """Writes one operation, by its name of LLVM's builder."""
+
+    def written(self: Operand, other: Number) -> Operand:
+        write = getattr(self.builder, of_doubles if _is_double(self.type) else of_integers)
+        b = _typed(self.type, other)
+        return Operand(self.builder, write(b, self.raw) if swapped else write(self.raw, b))
+
+    return written
+
+
+def _relation(sign: str) -> Callable[[Operand, Number], Operand]:
+    def written(self: Operand, other: Number) -> Operand:
+        compare = self.builder.fcmp_ordered if _is_double(self.type) else self.builder.icmp_signed
+        return Operand(self.builder, compare(sign, self.raw, _typed(self.type, other)))
+
+    return written
+
+
+def _conversion(operation: str, to: ir.Type) -> Callable[[Operand], Operand]:
+    def written(self: Operand) -> Operand:
+        return Operand(self.builder, getattr(self.builder, operation)(self.raw, _like(self.type, to)))
+
+    return written
+
+
+class Operand:
+    """A double, an integer, a flag, eight of one of these, or an address of the machine code, and its arithmetic.
+
+    An operator writes one operation, of doubles or of integers as the type says; a number beside it is a constant
+    of its type.  LLVM's builder takes it as it is.
+    """
+
+    __slots__ = ("builder", "raw", "type")
+
+    def __init__(self, builder: ir.IRBuilder, raw: ir.Value) -> None:
+        self.builder, self.raw, self.type = builder, raw, raw.type
+
+    __add__, __radd__ = _operator("fadd", "add"), _operator("fadd", "add", swapped=True)
+    __sub__, __rsub__ = _operator("fsub", "sub"), _operator("fsub", "sub", swapped=True)
+    __mul__, __rmul__ = _operator("fmul", "mul"), _operator("fmul", "mul", swapped=True)
+    __truediv__ = _operator("fdiv", "fdiv")
+    __floordiv__ = _operator("sdiv", "sdiv")  # of integers that are not negative
+    __and__, __or__, __xor__ = _operator("and_", "and_"), _operator("or_", "or_"), _operator("xor", "xor")
+    __lshift__, __rshift__ = _operator("shl", "shl"), _operator("ashr", "ashr")
+    unsigned_shift = _operator("lshr", "lshr")  # to the right, zeros come from the left
+    __lt__, __le__, __gt__, __ge__ = _relation("<"), _relation("<="), _relation(">"), _relation(">=")
+    __eq__, __ne__ = _relation("=="), _relation("!=")  # type: ignore[assignment]
+    bits, of_bits = _conversion("bitcast", INT), _conversion("bitcast", DOUBLE)
+    to_integer, to_double = _conversion("fptosi", INT), _conversion("sitofp", DOUBLE)  # towards 0, to nearest
+    extended = _conversion("zext", INT)  # a flag, to 0 or 1
+
+    def __neg__(self) -> Operand:
+        return Operand(self.builder, (self.builder.fneg if _is_double(self.type) else self.builder.neg)(self.raw))
+
+    def __invert__(self) -> Operand:
+        return Operand(self.builder, self.builder.not_(self.raw))
+
+    def get_reference(self) -> str:
+        """As LLVM's builder asks for it."""
+        return str(self.raw.get_reference())
+
+    def __bool__(self) -> bool:
+        raise TypeError("An operand of the machine code is not known when the code is made.")
+
+
+Number: TypeAlias = float | Operand
+"""A number known when the code is made, or an operand."""
+Index: TypeAlias = int | Operand
+Pair: TypeAlias = tuple[Operand, Operand]
+
+
+def _is_double(kind: ir.Type) -> bool:
+    return isinstance(getattr(kind, "element", kind), ir.DoubleType)
+
+
+def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
+    """One, or eight where the shape has eight."""
+    return ir.VectorType(element, LANES) if isinstance(shape, ir.VectorType) else element
+
+
+def _typed(kind: ir.Type, value: Number) -> ir.Value:
+    """What LLVM's builder has of an operand; a number as a constant of that type."""
+    if isinstance(value, Operand):
+        return value.raw
+    return ir.Constant(kind, float(value) if _is_double(kind) else int(value))
 
 
 class Code:
-    """Writes the body of one function; a value is a vector of eight doubles where nothing else is said."""
+    """Writes the body of one function; a value is a vector of eight doubles where nothing else is said.
+
+    true: a flag.  null: an address where nothing is.
+    """
 
     def __init__(self, builder: ir.IRBuilder) -> None:
         self.builder = builder
         self.module = builder.module
-        self.zero = self.constant(0.0)
+        self.arguments = [self.value(argument) for argument in builder.function.args]
+        self.zero, self.true = self.constant(0.0), self.value(ir.Constant(ir.IntType(1), 1))
+        self.null = self.value(ir.Constant(POINTER, None))
 
-    def _call(self, name: str, result: ir.Type, arguments: Sequence[Value]) -> Value:
+    def value(self, raw: ir.Value) -> Operand:
+        """What LLVM's builder made."""
+        return Operand(self.builder, raw)
+
+    def _intrinsic(self, name: str, result: ir.Type, arguments: Sequence[ir.Value]) -> Operand:
         known = self.module.globals.get(name)
         function = known or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
-        return self.builder.call(function, arguments)
+        return self.value(self.builder.call(function, arguments))
 
-    def constant(self, value: float | Sequence[float]) -> Value:
+    def call(self, function: ir.Function, arguments: Sequence[Operand]) -> Operand:
+        """What a function gives."""
+        return self.value(self.builder.call(function, [argument.raw for argument in arguments]))
+
+    def constant(self, value: float | Sequence[float]) -> Operand:
         """The same double in every lane, or eight."""
-        values = [value] * LANES if isinstance(value, (int, float)) else list(value)
-        return ir.Constant(VECTOR, [ir.Constant(DOUBLE, float(v)) for v in values])
+        return self.value(ir.Constant(VECTOR, value if isinstance(value, (int, float)) else list(value)))
 
-    def integer(self, value: Index) -> Value:
+    def integer(self, value: Index) -> Operand:
         """An integer value."""
-        return ir.Constant(INT, value) if isinstance(value, int) else value
+        return self.value(ir.Constant(INT, value)) if isinstance(value, int) else value
 
-    def add(self, a: Value, b: Value) -> Value:
-        """a + b."""
-        return self.builder.fadd(a, b)
+    def select(self, condition: Operand, a: Number, b: Number) -> Operand:
+        """``a`` where a bit is set, else ``b``; both may be numbers, of the type that they have in Python."""
+        kind = INT if isinstance(a, int) else DOUBLE
+        kinds = [value.type for value in (a, b) if isinstance(value, Operand)] or [_like(condition.type, kind)]
+        return self.value(self.builder.select(condition.raw, _typed(kinds[0], a), _typed(kinds[0], b)))
 
-    def subtract(self, a: Value, b: Value) -> Value:
-        """a - b."""
-        return self.builder.fsub(a, b)
+    def unsigned_less(self, a: Operand, b: int) -> Operand:
+        """Whether an integer is less and not negative."""
+        return self.value(self.builder.icmp_unsigned("<", a.raw, _typed(INT, b)))
 
-    def multiply(self, a: Value, b: Value) -> Value:
-        """a b."""
-        return self.builder.fmul(a, b)
-
-    def negative(self, a: Value) -> Value:
-        """-a."""
-        return self.builder.fneg(a)
-
-    def fma(self, a: Value, b: Value, c: Value) -> Value:
+    def fma(self, a: Operand, b: Number, c: Number) -> Operand:
         """a b + c, rounded once."""
         name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
-        return self._call(name, a.type, (a, b, c))
+        return self._intrinsic(name, a.type, (a.raw, _typed(a.type, b), _typed(a.type, c)))
 
-    def multiply_add(self, a: Value, b: Value, c: Value) -> Value:
+    def multiply_add(self, a: Operand, b: Number, c: Operand) -> Operand:
         """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
-        return self._call("llvm.fmuladd.v8f64", VECTOR, (a, b, c))
+        return self._intrinsic("llvm.fmuladd.v8f64", VECTOR, (a.raw, _typed(VECTOR, b), c.raw))
 
-    def floor(self, a: Value) -> Value:
+    def floor(self, a: Operand) -> Operand:
         """The largest integer that is not above a double, a double."""
-        return self._call("llvm.floor.f64", DOUBLE, (a,))
+        return self._intrinsic("llvm.floor.f64", DOUBLE, (a.raw,))
 
-    def absolute(self, a: Value) -> Value:
+    def absolute(self, a: Operand) -> Operand:
         """|a|."""
-        return self._call("llvm.fabs.v8f64", VECTOR, (a,))
+        return self._intrinsic("llvm.fabs.v8f64", VECTOR, (a.raw,))
 
-    def larger(self, a: Value, b: Value) -> Value:
+    def larger(self, a: Operand, b: Number) -> Operand:
         """max(a, b) lane by lane, for numbers that are not NaN."""
-        return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
+        return self.select(a > b, a, b)
 
-    def least(self, a: Value, b: Value) -> Value:
-        """min(a, b) of two integers."""
-        return self.builder.select(self.builder.icmp_signed("<", a, b), a, b)
+    def smaller(self, a: Operand, b: Number) -> Operand:
+        """min(a, b) lane by lane, for numbers that are not NaN."""
+        return self.select(a < b, a, b)
 
-    def largest(self, a: Value) -> Value:
+    def largest(self, a: Operand) -> Operand:
         """The largest |lane|, a double; NaN lanes are passed over."""
-        return self._call("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a),))
+        return self._intrinsic("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a).raw,))
 
-    def finite(self, a: Value) -> Value:
+    def finite(self, a: Operand) -> Operand:
         """Whether every lane is a finite number, a bit."""
-        below = self.builder.fcmp_ordered("<", self.absolute(a), self.constant(_INFINITY))
-        return self.all_of(below)
+        return self.all_of(self.absolute(a) < _INFINITY)
 
-    def all_of(self, bits: Value) -> Value:
+    def all_of(self, bits: Operand) -> Operand:
         """Whether eight bits are set, a bit."""
-        mask = self.builder.bitcast(bits, ir.IntType(LANES))
-        return self.builder.icmp_unsigned("==", mask, ir.Constant(ir.IntType(LANES), (1 << LANES) - 1))
+        return self.value(self.builder.bitcast(bits.raw, _MASK)) == (1 << LANES) - 1
 
-    def any_bit(self, a: Value) -> Value:
+    def any_of(self, bits: Operand) -> Operand:
+        """Whether one of eight bits is set, a bit."""
+        return self.value(self.builder.bitcast(bits.raw, _MASK)) != 0
+
+    def any_bit(self, a: Operand) -> Operand:
         """The bits that are set in any lane of eight integers, an integer."""
-        return self._call("llvm.vector.reduce.or.v8i64", INT, (a,))
+        return self._intrinsic("llvm.vector.reduce.or.v8i64", INT, (a.raw,))
 
-    def shuffle(self, a: Value, b: Value, lanes: Sequence[int]) -> Value:
+    def shuffle(self, a: Operand, b: Operand, lanes: Sequence[int]) -> Operand:
         """Lanes 0 to 7 of ``a`` and 8 to 15 of ``b``, in that order."""
-        return self.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, LANES), list(lanes)))
+        return self.value(self.builder.shuffle_vector(a.raw, b.raw, ir.Constant(_INDICES, list(lanes))))
 
-    def spread(self, scalar: Value) -> Value:
+    def lane(self, a: Operand, lane: int) -> Operand:
+        """One lane, a double."""
+        return self.value(self.builder.extract_element(a.raw, ir.Constant(_INDEX, lane)))
+
+    def spread(self, scalar: Operand) -> Operand:
         """A double in every lane."""
         undefined = ir.Constant(VECTOR, ir.Undefined)
-        first = self.builder.insert_element(undefined, scalar, ir.Constant(_INDEX, 0))
-        return self.builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES))
+        first = self.builder.insert_element(undefined, scalar.raw, ir.Constant(_INDEX, 0))
+        return self.value(self.builder.shuffle_vector(first, undefined, ir.Constant(_INDICES, [0] * LANES)))
 
-    def two_sum(self, a: Value, b: Value) -> Pair:
+    def two_sum(self, a: Operand, b: Operand) -> Pair:
         """(s, e) with s + e = a + b exactly and s rounded (Knuth); vectors or doubles."""
-        total = self.add(a, b)
-        part = self.subtract(total, a)
-        return total, self.add(self.subtract(a, self.subtract(total, part)), self.subtract(b, part))
+        total = a + b
+        part = total - a
+        return total, (a - (total - part)) + (b - part)
 
-    def quick_two_sum(self, a: Value, b: Value) -> Pair:
+    def quick_two_sum(self, a: Operand, b: Operand) -> Pair:
         """The same where |a| >= |b| or a = 0 (Dekker)."""
-        total = self.add(a, b)
-        return total, self.subtract(b, self.subtract(total, a))
+        total = a + b
+        return total, b - (total - a)
 
-    def two_product(self, a: Value, b: Value) -> Pair:
+    def two_product(self, a: Operand, b: Operand) -> Pair:
         """(p, e) with p + e = a b exactly and p rounded."""
-        product = self.multiply(a, b)
-        return product, self.fma(a, b, self.negative(product))
+        product = a * b
+        return product, self.fma(a, b, -product)
 
-    def address(self, base: Value, offset: Index) -> Value:
+    def _place(self, base: Operand, offset: Index) -> ir.Value:
+        return self.builder.gep(base.raw, [_typed(INT, offset)])
+
+    def address(self, base: Operand, offset: Index) -> Operand:
         """Where ``base[offset]`` is."""
-        return self.builder.gep(base, [self.integer(offset)])
+        return self.value(self._place(base, offset))
 
-    def load(self, base: Value, offset: Index) -> Value:
+    def load_one(self, base: Operand, offset: Index) -> Operand:
+        """``base[offset]``, a double or an integer."""
+        return self.value(self.builder.load(self._place(base, offset)))
+
+    def store_one(self, value: Number, base: Operand, offset: Index) -> None:
+        """Put a double or an integer to ``base[offset]``."""
+        self.builder.store(_typed(base.type.pointee, value), self._place(base, offset))
+
+    def load(self, base: Operand, offset: Index) -> Operand:
         """The eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
-        value = self.builder.load(self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer()))
-        value.align = 64
-        return value
+        return self.value(self.builder.load(self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64))
 
-    def store(self, value: Value, base: Value, offset: Index) -> None:
+    def store(self, value: Operand, base: Operand, offset: Index) -> None:
         """Put eight doubles to ``base[offset]`` and on, aligned to 64 bytes."""
-        self.builder.store(value, self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer())).align = 64
+        self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
+
+    def phi(self, kind: ir.Type) -> Operand:
+        """What comes from one block or another."""
+        return self.value(self.builder.phi(kind))
+
+    def arrive(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
+        """What comes from the block ``before``, or from the one that is being written."""
+        for phi, value in zip(phis, values, strict=True):
+            phi.raw.add_incoming(_typed(phi.type, value), before or self.builder.block)
 
     def loop(
         self,
         start: Index,
         stop: Index,
-        body: Callable[[Value, list[Value]], Sequence[Value] | None],
-        values: Sequence[Value],
-    ) -> list[Value]:
+        body: Callable[[Operand, list[Operand]], Sequence[Operand] | None],
+        values: Sequence[Operand],
+    ) -> list[Operand]:
         """``values`` after ``values = body(i, values)`` for i from ``start`` to before ``stop``."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
         b.branch(head)
         b.position_at_end(head)
-        index, carried = b.phi(INT), [b.phi(value.type) for value in values]
-        index.add_incoming(self.integer(start), before)
-        for phi, value in zip(carried, values, strict=True):
-            phi.add_incoming(value, before)
+        index, carried = self.phi(INT), [self.phi(value.type) for value in values]
+        self.arrive([index, *carried], [start, *values], before)
         inside, after = b.append_basic_block("body"), b.append_basic_block("after")
-        b.cbranch(b.icmp_signed("<", index, self.integer(stop)), inside, after)
+        b.cbranch(index < stop, inside, after)
         b.position_at_end(inside)
-        results = body(index, carried) or []
-        for phi, value in zip(carried, results, strict=True):
-            phi.add_incoming(value, b.block)
-        index.add_incoming(b.add(index, self.integer(1)), b.block)
+        self.arrive(carried, body(index, carried) or [])
+        self.arrive([index], [index + 1])
         b.branch(head)
         b.position_at_end(after)
         return carried
 
-    def either(self, condition: Value, one: Callable[[], list[Value]], other: Callable[[], list[Value]]) -> list[Value]:
+    def either(
+        self, condition: Operand, one: Callable[[], list[Operand]], other: Callable[[], list[Operand]]
+    ) -> list[Operand]:
         """The values of ``one`` where a bit is set, else those of ``other``; the other's code does not run."""
         b = self.builder
         with b.if_else(condition) as (then, otherwise):
@@ -308,11 +421,9 @@ class Code:
                 first, after_first = one(), b.block
             with otherwise:
                 second, after_second = other(), b.block
-        chosen = []
-        for values in zip(first, second, strict=True):
-            chosen.append(b.phi(values[0].type))
-            for value, block in zip(values, (after_first, after_second), strict=True):
-                chosen[-1].add_incoming(value, block)
+        chosen = [self.phi(value.type) for value in first]
+        self.arrive(chosen, first, after_first)
+        self.arrive(chosen, second, after_second)
         return chosen
 
 
@@ -335,28 +446,28 @@ class Stepping(ABC):
     status: the place among the counts of how the last step ended; 0 if well.
     """
 
-    def __init__(self, code: Code, clock: Value, counts: Value, most: Value, status: int) -> None:
+    def __init__(self, code: Code, clock: Operand, counts: Operand, most: Operand, status: int) -> None:
         self.code, self.clock, self.counts, self.most, self.status = code, clock, counts, most, status
 
     @abstractmethod
-    def covered(self) -> Value:
+    def covered(self) -> Operand:
         """Whether the time is the target or behind it, a bit."""
 
     @abstractmethod
-    def write_step(self) -> Value:
+    def write_step(self) -> Operand:
         """Write one step; gives the bit that says whether it stands."""
 
-    def time(self, place: int) -> Value:
+    def time(self, place: int) -> Operand:
         """A double of the clock."""
-        return self.code.builder.load(self.code.address(self.clock, place))
+        return self.code.load_one(self.clock, place)
 
-    def count(self, place: int) -> Value:
+    def count(self, place: int) -> Operand:
         """One of the counts."""
-        return self.code.builder.load(self.code.address(self.counts, place))
+        return self.code.load_one(self.counts, place)
 
     def set_count(self, value: Index, place: int) -> None:
         """Put one of the counts."""
-        self.code.builder.store(self.code.integer(value), self.code.address(self.counts, place))
+        self.code.store_one(value, self.counts, place)
 
     def write(self) -> None:
         """The loop; the function gives the number of steps that stand."""
@@ -365,14 +476,14 @@ class Stepping(ABC):
         entry = b.block
         b.branch(head)
         b.position_at_end(head)
-        taken = b.phi(INT)
-        taken.add_incoming(code.integer(0), entry)
-        running = b.icmp_signed("==", self.count(self.status), code.integer(0))
-        wanted = b.and_(b.icmp_signed("<", taken, self.most), b.not_(self.covered()))
-        b.cbranch(b.and_(running, wanted), body, out)
+        taken = code.phi(INT)
+        code.arrive([taken], [0], entry)
+        running = self.count(self.status) == 0
+        wanted = (taken < self.most) & ~self.covered()
+        b.cbranch(running & wanted, body, out)
         b.position_at_end(body)
         good = self.write_step()
-        taken.add_incoming(b.add(taken, b.zext(good, INT)), b.block)
+        code.arrive([taken], [taken + good.extended()])
         b.branch(head)
         b.position_at_end(out)
         b.ret(taken)

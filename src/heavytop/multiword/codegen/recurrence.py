@@ -12,7 +12,7 @@ from typing import Any
 
 from gmpy2 import mpq
 
-from heavytop.multiword.codegen.machine_code import Code, Index, Pair, Value
+from heavytop.multiword.codegen.machine_code import Code, Index, Operand, Pair
 from heavytop.multiword.double_double.arithmetic import Constant, accumulated, add, by_constant, divided
 from heavytop.top.equations import Parameters, System
 
@@ -250,30 +250,29 @@ class Recurrence:
     code: Code
     layout: Layout
     system: System
-    table: Value
-    scratch: Value
+    table: Operand
+    scratch: Operand
 
     @property
     def vectors(self) -> range:
         """The state vectors."""
         return range(self.layout.vectors)
 
-    def row(self, n: Index) -> Value:
+    def row(self, n: Index) -> Operand:
         """Where the row of order n begins."""
-        offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.row))
-        return self.code.address(self.scratch, offset)
+        return self.code.address(self.scratch, self.code.integer(n) * self.layout.row)
 
-    def pair(self, row: Value, place: int) -> Pair:
+    def pair(self, row: Operand, place: int) -> Pair:
         """Both words of what lies there."""
         return self.code.load(row, place), self.code.load(row, place + 8)
 
     def _side_pair(self, y: Pair, which: Sum) -> Pair:
         first = [self.code.shuffle(word, self.code.zero, which.first) for word in y]
         signs = self.code.constant(which.sign)
-        second = [self.code.multiply(self.code.shuffle(word, self.code.zero, which.second), signs) for word in y]
+        second = [self.code.shuffle(word, self.code.zero, which.second) * signs for word in y]
         return add(self.code, (first[0], first[1]), (second[0], second[1]))
 
-    def side(self, y: Value, which: Sum) -> Value:
+    def side(self, y: Operand, which: Sum) -> Operand:
         """L or R of a plain double, or of a part that is exact."""
         first, second = (self.code.shuffle(y, self.code.zero, lanes) for lanes in (which.first, which.second))
         return self.code.fma(second, self.code.constant(which.sign), first)
@@ -288,7 +287,7 @@ class Recurrence:
             for word in range(2):
                 self.code.store(pair[word], row, place + 8 * word)
 
-    def _put_plain(self, n: Index, y: list[Value]) -> list[Value]:
+    def _put_plain(self, n: Index, y: list[Operand]) -> list[Operand]:
         """Store a row; gives R, each L and each y."""
         row = self.row(n)
         right, left = self.side(y[0], RIGHT), [self.side(value, LEFT) for value in y]
@@ -299,7 +298,7 @@ class Recurrence:
             self.code.store(self.code.zero, row, self.layout.value(vector) + 8)
         return [right, *left, *y]
 
-    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Value]) -> list[Value]:
+    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Operand]) -> list[Operand]:
         """Σ L_m R_other in words (s, c), c unordered."""
         code, left, right = self.code, self.row(m), self.row(other)
         found: list[Any] = []
@@ -308,22 +307,22 @@ class Recurrence:
             found += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
         return found
 
-    def _accumulate(self, m: Index, other: Index, sums: list[Value]) -> list[Value]:
+    def _accumulate(self, m: Index, other: Index, sums: list[Operand]) -> list[Operand]:
         left, right = self.row(m), self.row(other)
         high = self.code.load(right, 0)
         return [
             self.code.fma(self.code.load(left, self.layout.left(vector)), high, sums[vector]) for vector in self.vectors
         ]
 
-    def _gather(self, word: Value, part: int) -> Value:
+    def _gather(self, word: Operand, part: int) -> Operand:
         """One of the four summands of the products, without its signs; 0 where there is none."""
         lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
-    def _signed(self, value: Value, part: int) -> Value:
-        return value if min(_signs(part)) >= 0 else self.code.multiply(value, self.code.constant(_signs(part)))
+    def _signed(self, value: Operand, part: int) -> Operand:
+        return value if min(_signs(part)) >= 0 else value * self.code.constant(_signs(part))
 
-    def _anywhere(self, word: Value, part: int) -> Value:
+    def _anywhere(self, word: Operand, part: int) -> Operand:
         """One of the four summands, and any number where there is none."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
@@ -332,9 +331,9 @@ class Recurrence:
         place = 24 * ((1 + self.layout.linear) * vector + row)
         return (*self.pair(self.table, place), self.code.load(self.table, place + 16))
 
-    def gathered(self, total: Value) -> Value:
+    def gathered(self, total: Operand) -> Operand:
         """The sums of products that the field needs, where they are exact."""
-        found = self.code.multiply(self._anywhere(total, 0), self.code.constant(_signs(0)))
+        found = self._anywhere(total, 0) * self.code.constant(_signs(0))
         for k in range(1, len(GATHERED)):
             found = self.code.fma(self._anywhere(total, k), self.code.constant(_signs(k)), found)
         return found
@@ -342,15 +341,14 @@ class Recurrence:
     def divisor(self, n: Index) -> Pair:
         """n + 1 and its inverse, doubles."""
         base = self._table_row(n)
-        found = [self.code.spread(self.code.builder.load(self.code.address(base, k))) for k in range(2)]
+        found = [self.code.spread(self.code.load_one(base, k)) for k in range(2)]
         return found[0], found[1]
 
-    def _table_row(self, n: Index) -> Value:
-        code = self.code
-        offset = code.builder.mul(code.integer(n), code.integer(self.layout.table_row))
-        return code.address(self.table, code.builder.add(offset, code.integer(24 * self.layout.constants)))
+    def _table_row(self, n: Index) -> Operand:
+        offset = self.code.integer(n) * self.layout.table_row
+        return self.code.address(self.table, offset + 24 * self.layout.constants)
 
-    def _over(self, n: Index, vector: int, row: int) -> Value:
+    def _over(self, n: Index, vector: int, row: int) -> Operand:
         """A constant over n + 1, a double."""
         return self.code.load(self._table_row(n), 8 * (1 + (1 + self.layout.linear) * vector + row))
 
@@ -370,10 +368,10 @@ class Recurrence:
             linear = term if linear is None else add(code, linear, term)
         if linear is not None:
             result = add(code, result, linear)
-        after, high, low = (code.spread(code.builder.load(code.address(base, k))) for k in range(3))
+        after, high, low = (code.spread(code.load_one(base, k)) for k in range(3))
         return code.quick_two_sum(*divided(code, result, after, (high, low)))
 
-    def _next(self, n: Index, vector: int, total: Value, y: Value) -> Value:
+    def _next(self, n: Index, vector: int, total: Operand, y: Operand) -> Operand:
         code = self.code
         linear = code.zero
         for k, lanes in enumerate(turned(self.system), 1):
@@ -382,13 +380,13 @@ class Recurrence:
         # two sums side by side, the signs in the factors
         first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
         one = code.fma(*second, code.fma(*first, linear))
-        return code.add(one, code.fma(*fourth, code.multiply(*third)))
+        return one + code.fma(*fourth, third[0] * third[1])
 
-    def orders_in_pairs(self, first: list[Pair], low_order: Value) -> list[Value]:
+    def orders_in_pairs(self, first: list[Pair], low_order: Operand) -> list[Operand]:
         """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
         code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
 
-        def order(n: Value, words: list[Value]) -> list[Value]:
+        def order(n: Operand, words: list[Operand]) -> list[Operand]:
             y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
             sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
             sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
@@ -397,37 +395,35 @@ class Recurrence:
         words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
         return code.loop(1, low_order, order, words)
 
-    def _inner_pairs(self, n: Value, m: Value, sums: list[Value]) -> list[Value]:
-        return self._accumulate_pairs(m, self.code.builder.sub(n, m), sums)
+    def _inner_pairs(self, n: Operand, m: Operand, sums: list[Operand]) -> list[Operand]:
+        return self._accumulate_pairs(m, n - m, sums)
 
-    def _stored_pairs(self, n: Index, sums: list[Value], y: list[Pair]) -> list[Value]:
+    def _stored_pairs(self, n: Index, sums: list[Operand], y: list[Pair]) -> list[Operand]:
         following = [self._next_pair(n, v, (sums[2 * v], sums[2 * v + 1]), y[v]) for v in self.vectors]
-        self.put(self.code.builder.add(self.code.integer(n), self.code.integer(1)), following)
+        self.put(self.code.integer(n) + 1, following)
         return [word for pair in following for word in pair]
 
-    def plain_orders(self, low_order: Value, order: Value, last: list[Value]) -> None:
+    def plain_orders(self, low_order: Operand, order: Operand, last: list[Operand]) -> None:
         """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
-        b, row = self.code.builder, self.row(low_order)
-        sides = [self.code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
+        code, b, row = self.code, self.code.builder, self.row(low_order)
+        sides = [code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
         after = b.append_basic_block("summed")
         switch, before = b.switch(low_order, after), b.block
         entry, incoming = before, None
         blocks = {n: b.append_basic_block(f"order_{n}") for n in range(LEAST_LOW_ORDER, MOST_ORDER)}
         for n, block in blocks.items():
-            switch.add_case(self.code.integer(n), block)
+            switch.add_case(n, block)
             b.position_at_end(block)
-            known = [b.phi(value.type) for value in (*sides, *last)]
-            for phi, value in zip(known, (*sides, *last), strict=True):
-                phi.add_incoming(value, entry)
+            known = [code.phi(value.type) for value in (*sides, *last)]
+            code.arrive(known, [*sides, *last], entry)
             if incoming is not None:
-                for phi, value in zip(known, incoming, strict=True):
-                    phi.add_incoming(value, before)
+                code.arrive(known, incoming, before)
             incoming, before = self._plain_order(n, known), block
             following = blocks.get(n + 1, after)
-            b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
+            b.cbranch(order == n + 1, after, following)
         b.position_at_end(after)
 
-    def _plain_order(self, n: int, known: list[Value]) -> list[Value]:
+    def _plain_order(self, n: int, known: list[Operand]) -> list[Operand]:
         """R, each L and each y of order n + 1 from those of n, with four sums side by side.
 
         The products of y_n come last, and do not wait until it is stored.
@@ -439,10 +435,7 @@ class Recurrence:
             at = width * (m % 4)
             sums[at : at + width] = self._accumulate(m, n - m, sums[at : at + width])
         first = self.row(0)
-        totals = [
-            code.add(code.add(sums[v], sums[width + v]), code.add(sums[2 * width + v], sums[3 * width + v]))
-            for v in self.vectors
-        ]
+        totals = [sums[v] + sums[width + v] + (sums[2 * width + v] + sums[3 * width + v]) for v in self.vectors]
         totals = [code.fma(code.load(first, self.layout.left(v)), right, totals[v]) for v in self.vectors]
         totals = [code.fma(left[v], code.load(first, 0), totals[v]) for v in self.vectors]
         return self._put_plain(n + 1, [self._next(n, v, totals[v], y[v]) for v in self.vectors])

@@ -10,9 +10,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from llvmlite import ir
-
-from heavytop.multiword.codegen.machine_code import DOUBLE, INT, INT_VECTOR, LANES, VECTOR, Code, Pair, Value
+from heavytop.multiword.codegen.machine_code import Code, Number, Operand, Pair
 
 _FRACTION_BITS = 52
 _BIAS = 1023
@@ -22,14 +20,14 @@ _POWER = (-0.30407153, -0.07912522)
 _LEAST_EXPONENT = -900.0
 _STEP_BITS, _LARGEST_STEP = 10, 6
 
-Constant = tuple[Value, Value, Value]
+Constant = tuple[Operand, Operand, Operand]
 """A number in three words: their vectors."""
 
 
 def add(code: Code, a: Pair, b: Pair) -> Pair:
     """a + b."""
     high, error = code.two_sum(a[0], b[0])
-    return high, code.add(code.add(a[1], b[1]), error)
+    return high, a[1] + b[1] + error
 
 
 def multiply(code: Code, a: Pair, b: Pair) -> Pair:
@@ -45,13 +43,13 @@ def by_constant(code: Code, constant: Constant, a: Pair) -> Pair:
     the roundings, if the high word is that of the first word of the constant only: its few remainders then are not as
     often below 0 as above.  So the high word is that of the whole product.
     """
-    rest = code.fma(constant[1], a[0], code.multiply(constant[2], a[0]))
+    rest = code.fma(constant[1], a[0], constant[2] * a[0])
     product = code.fma(constant[0], a[0], rest)
-    error = code.fma(constant[0], a[0], code.negative(product))
-    return product, code.fma(constant[0], a[1], code.add(error, rest))
+    error = code.fma(constant[0], a[0], -product)
+    return product, code.fma(constant[0], a[1], error + rest)
 
 
-def times(code: Code, a: Pair, factor: Value) -> Pair:
+def times(code: Code, a: Pair, factor: Operand) -> Pair:
     """a times a double."""
     product, error = code.two_product(a[0], factor)
     return product, code.fma(a[1], factor, error)
@@ -59,93 +57,90 @@ def times(code: Code, a: Pair, factor: Value) -> Pair:
 
 def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
     """total + a b, its low word unordered: for long sums."""
-    high = code.add(total[0], code.multiply(a[0], b[0]))
-    part = code.subtract(high, total[0])
-    rest = code.subtract(total[0], code.subtract(high, part))
+    high = total[0] + a[0] * b[0]
+    part = high - total[0]
+    rest = total[0] - (high - part)
     # the rounding of the product too
-    low = code.fma(a[0], b[1], code.fma(a[1], b[0], code.fma(a[0], b[0], code.negative(part))))
-    return high, code.add(total[1], code.add(rest, low))
+    low = code.fma(a[0], b[1], code.fma(a[1], b[0], code.fma(a[0], b[0], -part)))
+    return high, total[1] + (rest + low)
 
 
-def divided(code: Code, a: Pair, divisor: Value, inverse: Pair) -> Pair:
+def divided(code: Code, a: Pair, divisor: Operand, inverse: Pair) -> Pair:
     """a over an integer whose inverse is given in two words.
 
     A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
     the quotient of the exact remainder is not.
     """
-    high = code.multiply(a[0], inverse[0])
-    rest = code.add(code.fma(code.negative(high), divisor, a[0]), a[1])
-    return high, code.fma(rest, inverse[0], code.multiply(rest, inverse[1]))
+    high = a[0] * inverse[0]
+    rest = code.fma(-high, divisor, a[0]) + a[1]
+    return high, code.fma(rest, inverse[0], rest * inverse[1])
 
 
-def later(code: Code, time: Pair, length: Value) -> Pair:
+def later(code: Code, time: Pair, length: Operand) -> Pair:
     """time + length, in order."""
     total, error = code.two_sum(time[0], length)
-    return code.quick_two_sum(total, code.add(error, time[1]))
+    return code.quick_two_sum(total, error + time[1])
 
 
-def covered(code: Code, time: Pair, target: Pair) -> Value:
+def covered(time: Pair, target: Pair) -> Operand:
     """Whether time is the target or behind it."""
-    b = code.builder
-    level = b.and_(b.fcmp_ordered("==", time[0], target[0]), b.fcmp_ordered(">=", time[1], target[1]))
-    return b.or_(b.fcmp_ordered(">", time[0], target[0]), level)
+    level = (time[0] == target[0]) & (time[1] >= target[1])
+    return (time[0] > target[0]) | level
 
 
-def behind(code: Code, time: Pair, began: Pair, sign: Value) -> tuple[Pair, Value]:
+def behind(code: Code, time: Pair, began: Pair, sign: Operand) -> tuple[Pair, Operand]:
     """± (time − began), doubles in order, and a bit: whether it surely is what :func:`split` makes of the exact one.
 
     The exact difference is s + l + e, where s is the nearest double to s + l, with more to spare than |e| or e = 0.
     """
-    b = code.builder
-    first, error = code.two_sum(time[0], b.fneg(began[0]))
-    second, rest = code.two_sum(time[1], b.fneg(began[1]))
+    first, error = code.two_sum(time[0], -began[0])
+    second, rest = code.two_sum(time[1], -began[1])
     total, low = code.two_sum(first, second)
     low, one = code.two_sum(low, error)
     low, other = code.two_sum(low, rest)
     high, low = code.two_sum(total, low)
-    one_is, other_is = (b.fcmp_ordered("==", word, ir.Constant(DOUBLE, 0.0)) for word in (one, other))
-    low, _ = code.two_sum(low, code.add(one, other))
-    wider = code.multiply(low, ir.Constant(DOUBLE, 1 + 2.0**-40))
-    nearest = b.fcmp_ordered("==", code.add(high, wider), high)
-    sure = b.or_(b.and_(one_is, other_is), b.and_(b.or_(one_is, other_is), nearest))
-    return (code.multiply(high, sign), code.multiply(low, sign)), sure
+    one_is, other_is = one == 0, other == 0
+    low, _ = code.two_sum(low, one + other)
+    wider = low * (1 + 2.0**-40)
+    nearest = high + wider == high
+    sure = (one_is & other_is) | ((one_is | other_is) & nearest)
+    return (high * sign, low * sign), sure
 
 
 def polynomials(
-    code: Code, orders: Pair, places: Sequence[Pair], count: int, row: Callable[[Value], list[Pair]]
-) -> list[list[Value]]:
+    code: Code, orders: Pair, places: Sequence[Pair], count: int, row: Callable[[Operand], list[Pair]]
+) -> list[list[Operand]]:
     """For each place, the words of Σ row(n) place^n for each of the ``count`` numbers of a row, from the highest order.
 
     orders: the last of those in double-double, and the highest; between them it goes on in plain doubles.
     The sums of one place wait for each other, those of several do not.
     """
-    (low_order, order), b = orders, code.builder
+    low_order, order = orders
 
-    def plain(k: Value, sums: list[Value]) -> list[Value]:
-        highs = [high for high, _ in row(b.sub(order, k))]
+    def plain(k: Operand, sums: list[Operand]) -> list[Operand]:
+        highs = [high for high, _ in row(order - k)]
         both = [(at, high) for at, _ in places for high in highs]
         return [code.fma(total, at, high) for total, (at, high) in zip(sums, both, strict=True)]
 
-    def term(k: Value, words: list[Value]) -> list[Value]:
-        found: list[Value] = []
-        coefficients = row(b.sub(low_order, k))
+    def term(k: Operand, words: list[Operand]) -> list[Operand]:
+        found: list[Operand] = []
+        coefficients = row(low_order - k)
         for at in places:
             for coefficient in coefficients:
                 total = multiply(code, (words[len(found)], words[len(found) + 1]), at)
                 found += code.quick_two_sum(*add(code, total, coefficient))
         return found
 
-    sums = code.loop(0, b.sub(order, low_order), plain, [code.zero] * (count * len(places)))
+    sums = code.loop(0, order - low_order, plain, [code.zero] * (count * len(places)))
     begin = [word for total in sums for word in (total, code.zero)]
-    words, width = code.loop(0, b.add(low_order, code.integer(1)), term, begin), 2 * count
+    words, width = code.loop(0, low_order + 1, term, begin), 2 * count
     return [words[width * i : width * (i + 1)] for i in range(len(places))]
 
 
-def step_length(code: Code, radii: Sequence[Value], reach: Value) -> Value:
+def step_length(code: Code, radii: Sequence[Operand], reach: Operand) -> Operand:
     """h, from log2 of the radius of convergence as the last two coefficients have it; in a few bits."""
-    b = code.builder
-    least = b.select(b.fcmp_ordered("<", radii[0], radii[1]), radii[0], radii[1])
-    return power_of_two(code, b.fadd(least, reach), _LARGEST_STEP, _STEP_BITS)
+    least = code.smaller(radii[0], radii[1])
+    return power_of_two(code, least + reach, _LARGEST_STEP, _STEP_BITS)
 
 
 def split(value: Fraction) -> tuple[float, float]:
@@ -172,53 +167,30 @@ def _split_ratio(top: int, bottom: int) -> tuple[float, float, float]:
     return high, low, float(Fraction(top, bottom) - Fraction(high) - Fraction(low))
 
 
-def log2(code: Code, value: Value) -> Value:
+def log2(value: Operand) -> Operand:
     """log2 of a double that is not negative, to 1e-3, or of each of eight; about -1023 for 0."""
-    b, of = code.builder, _Like(value)
-    bits = b.bitcast(value, of.integers)
-    exponent = b.sub(b.lshr(bits, of.integer(_FRACTION_BITS)), of.integer(_BIAS))
-    one = of.integer(_BIAS << _FRACTION_BITS)
-    significand = b.or_(b.and_(bits, of.integer((1 << _FRACTION_BITS) - 1)), one)
-    fraction = b.fsub(b.bitcast(significand, value.type), of.double(1.0))
-    return b.fadd(b.sitofp(exponent, value.type), _bent(code, fraction, _LOG))
+    bits = value.bits()
+    exponent = bits.unsigned_shift(_FRACTION_BITS) - _BIAS
+    significand = (bits & (1 << _FRACTION_BITS) - 1) | (_BIAS << _FRACTION_BITS)
+    fraction = significand.of_bits() - 1.0
+    return exponent.to_double() + _bent(fraction, _LOG)
 
 
-def power_of_two(code: Code, exponent: Value, most: int, bits: int) -> Value:
+def power_of_two(code: Code, exponent: Operand, most: int, bits: int) -> Operand:
     """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits; of a double, or of each of eight."""
-    b, of = code.builder, _Like(exponent)
-    low, high = of.double(_LEAST_EXPONENT), of.double(float(most))
-    bounded = b.select(b.fcmp_ordered("<", exponent, high), exponent, high)
-    bounded = b.select(b.fcmp_ordered(">", bounded, low), bounded, low)
-    whole = b.fptosi(b.fsub(bounded, low), of.integers)
-    fraction = b.fsub(b.fsub(bounded, low), b.sitofp(whole, exponent.type))
-    significand = b.bitcast(b.fadd(of.double(1.0), _bent(code, fraction, _POWER)), of.integers)
+    bounded = code.larger(code.smaller(exponent, most), _LEAST_EXPONENT)
+    whole = (bounded - _LEAST_EXPONENT).to_integer()
+    fraction = bounded - _LEAST_EXPONENT - whole.to_double()
+    significand = (1.0 + _bent(fraction, _POWER)).bits()
     kept = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
-    biased = b.add(whole, of.integer(_BIAS + int(_LEAST_EXPONENT)))
-    shifted = b.shl(biased, of.integer(_FRACTION_BITS))
-    return b.bitcast(b.add(b.and_(significand, of.integer(kept)), shifted), exponent.type)
+    biased = whole + (_BIAS + int(_LEAST_EXPONENT))
+    shifted = biased << _FRACTION_BITS
+    return ((significand & kept) + shifted).of_bits()
 
 
-def _bent(code: Code, fraction: Value, bend: tuple[float, ...]) -> Value:
+def _bent(fraction: Operand, bend: tuple[float, ...]) -> Operand:
     """f + f (1 - f) times a polynomial in f."""
-    b, of = code.builder, _Like(fraction)
-    total = of.double(bend[-1])
+    total: Number = bend[-1]
     for coefficient in reversed(bend[:-1]):
-        total = b.fadd(b.fmul(total, fraction), of.double(coefficient))
-    return b.fadd(fraction, b.fmul(b.fmul(fraction, b.fsub(of.double(1.0), fraction)), total))
-
-
-class _Like:
-    """Constants of the shape of a value: one, or eight."""
-
-    def __init__(self, value: Value) -> None:
-        self.eight = value.type == VECTOR
-        self.integers = INT_VECTOR if self.eight else INT
-        self.doubles = value.type
-
-    def integer(self, value: int) -> Value:
-        one = ir.Constant(INT, value)
-        return ir.Constant(INT_VECTOR, [one] * LANES) if self.eight else one
-
-    def double(self, value: float) -> Value:
-        one = ir.Constant(DOUBLE, value)
-        return ir.Constant(VECTOR, [one] * LANES) if self.eight else one
+        total = total * fraction + coefficient
+    return fraction + fraction * (1.0 - fraction) * total

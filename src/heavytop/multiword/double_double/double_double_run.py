@@ -7,17 +7,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
     LANES,
     Code,
     Doubles,
+    Index,
+    Operand,
     Pair,
     Processor,
-    Value,
     doubles,
     once,
     pointer,
@@ -299,33 +300,33 @@ class LaneOrders:
     coefficients, of Ω and of γ, and their slope.
     """
 
-    def __init__(self, code: Code, system: System, arrays: tuple[Value, Value, Value], units: Value) -> None:
+    def __init__(self, code: Code, system: System, arrays: tuple[Operand, Operand, Operand], units: Operand) -> None:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
         self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
 
-    def write(self, pair_order: Value, low_order: Value, order: Value) -> tuple[Value, list[Value]]:
+    def write(self, pair_order: Operand, low_order: Operand, order: Operand) -> tuple[Operand, list[Operand]]:
         """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
-        code, b = self.code, self.code.builder
+        code = self.code
         code.loop(0, pair_order, self._pair_order, [])
-        splitting = b.icmp_signed("<", pair_order, low_order)
-        stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
+        splitting = pair_order < low_order
+        stop = code.select(splitting, pair_order + 1, 0)
         peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
         peaks = code.loop(pair_order, low_order, self._split_order, peaks)
         plain = partial(self._plain_orders, low_order, order)
         code.either(self.absent[2], lambda: plain(_OMEGA[:2]), lambda: plain(_OMEGA))
         return splitting, peaks
 
-    def row(self, n: Value) -> Value:
+    def row(self, n: Index) -> Operand:
         """Where the row of order n begins."""
-        return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
+        return self.code.address(self.scratch, self.code.integer(n) * ROW)
 
-    def pair(self, row: Value, i: int) -> Pair:
+    def pair(self, row: Operand, i: int) -> Pair:
         """Both words of a component of a row."""
         return self.code.load(row, LANES * i), self.code.load(row, LOW + LANES * i)
 
-    def _put(self, row: Value, i: int, y: Pair) -> None:
+    def _put(self, row: Operand, i: int, y: Pair) -> None:
         for word, table in zip(y, (0, LOW), strict=True):
             self.code.store(word, row, table + LANES * i)
 
@@ -333,32 +334,32 @@ class LaneOrders:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
         return high, middle, low
 
-    def _is_zero(self, k: int) -> Value:
+    def _is_zero(self, k: int) -> Operand:
         """Whether a coefficient is 0 in every lane, a bit."""
-        return self.code.all_of(self.code.builder.fcmp_ordered("==", self._coefficient(k)[0], self.code.zero))
+        return self.code.all_of(self._coefficient(k)[0] == 0)
 
-    def _sums(self, group: Products, sums: Callable[[Products], list[Value]]) -> list[Value]:
+    def _sums(self, group: Products, sums: Callable[[Products], list[Operand]]) -> list[Operand]:
         """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
         if group is not _OMEGA:
             return sums(group)
 
-        def two() -> list[Value]:
+        def two() -> list[Operand]:
             found = sums(group[:2])
             return [*found, *[self.code.zero] * (len(found) // 2)]
 
         return self.code.either(self.absent[2], two, lambda: sums(group))
 
-    def _quotient(self, n: Value) -> Pair:
+    def _quotient(self, n: Operand) -> Pair:
         """1/(n + 1) in every lane."""
-        place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
-        words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
+        place = self.code.address(self.quotients, n << 1)
+        words = [self.code.load_one(place, i) for i in range(2)]
         return self.code.spread(words[0]), self.code.spread(words[1])
 
-    def _pair_order(self, n: Value, _: list[Value]) -> None:
+    def _pair_order(self, n: Operand, _: list[Operand]) -> None:
         """y_(n+1) in double-double."""
-        code, b = self.code, self.code.builder
-        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
-        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
+        code = self.code
+        y, following, quotient = self.row(n), self.row(n + 1), self._quotient(n)
+        after = code.spread((n + 1).to_double())
         for rows, group in _GROUPS:
             words = self._sums(group, partial(self._pair_sums, n))
             for i in rows:
@@ -372,122 +373,116 @@ class LaneOrders:
                 self._put(following, i, (high, low))
 
     def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
-        def added() -> list[Value]:
+        def added() -> list[Operand]:
             return [*add(self.code, total, by_constant(self.code, self._coefficient(k), y))]
 
         high, low = self.code.either(self.absent[k], lambda: [*total], added)
         return high, low
 
-    def _pair_sums(self, n: Value, group: Products) -> list[Value]:
+    def _pair_sums(self, n: Operand, group: Products) -> list[Operand]:
         products = partial(self._pair_products, n, group)
-        stop = self.code.builder.add(n, self.code.integer(1))
-        return self.code.loop(1, stop, products, products(self.code.integer(0), []))
+        return self.code.loop(1, n + 1, products, products(self.code.integer(0), []))
 
-    def _pair_products(self, n: Value, group: Products, m: Value, words: list[Value]) -> list[Value]:
-        code, b = self.code, self.code.builder
-        left, right = self.row(m), self.row(b.sub(n, m))
-        found = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
+    def _pair_products(self, n: Operand, group: Products, m: Operand, words: list[Operand]) -> list[Operand]:
+        left, right = self.row(m), self.row(n - m)
+        found: list[Any] = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
-                c, c_low = code.negative(c), code.negative(c_low)
+                c, c_low = -c, -c_low
             at = 2 * (component % 3)
             x, y = (a, a_low), (c, c_low)
             total = found[at], found[at + 1]
-            found[at : at + 2] = multiply(code, x, y) if total[0] is None else accumulated(code, total, x, y)
+            found[at : at + 2] = multiply(self.code, x, y) if total[0] is None else accumulated(self.code, total, x, y)
         return found
 
-    def _split_row(self, m: Value, peaks: list[Value]) -> list[Value]:
+    def _split_row(self, m: Operand, peaks: list[Operand]) -> list[Operand]:
         """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
         row = self.row(m)
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
-    def _put_parts(self, m: Value, y: list[Pair], peaks: list[Value]) -> list[Value]:
+    def _put_parts(self, m: Operand, y: list[Pair], peaks: list[Operand]) -> list[Operand]:
         code, row, found = self.code, self.row(m), []
         up, down = rises(code, m, code.load(self.units, 16))
         for k, (rows, _) in enumerate(_GROUPS):
-            big, largest = code.multiply(code.load(self.units, 8 * k), up), code.zero
+            big, largest = code.load(self.units, 8 * k) * up, code.zero
             for i in rows:
-                coarse, fine = parts(code, y[i], big)
+                coarse, fine = parts(y[i], big)
                 largest = code.larger(code.absolute(y[i][0]), largest)
                 code.store(coarse, row, COARSE + LANES * i)
                 code.store(fine, row, FINE + LANES * i)
-            found.append(code.larger(code.multiply(largest, down), peaks[k]))
+            found.append(code.larger(largest * down, peaks[k]))
         return found
 
-    def _split_order(self, n: Value, peaks: list[Value]) -> list[Value]:
+    def _split_order(self, n: Operand, peaks: list[Operand]) -> list[Operand]:
         """y_(n+1) from split coefficients."""
-        code, b = self.code, self.code.builder
-        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
-        divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
+        y, following = self.row(n), self.row(n + 1)
+        divisor = self.code.spread((n + 1).to_double()), self._quotient(n)[0]
         found = []
         for rows, group in _GROUPS:
             words = self._sums(group, partial(self._split_sums, n))
             for i in rows:
                 at = 3 * (i % 3)
-                total = words[at], code.add(words[at + 1], words[at + 2])
+                total = words[at], words[at + 1] + words[at + 2]
                 factors = [(self._coefficient(i), total)] if i < 3 else []
                 for k, component, source in self.terms:
                     if component == i:
                         factors.append((self._coefficient(k), self.pair(y, source)))
-                pair = quotient(code, None if i < 3 else total, factors, divisor)
+                pair = quotient(self.code, None if i < 3 else total, factors, divisor)
                 self._put(following, i, pair)
                 found.append(pair)
-        return self._put_parts(b.add(n, code.integer(1)), found, peaks)
+        return self._put_parts(n + 1, found, peaks)
 
-    def _split_sums(self, n: Value, group: Products) -> list[Value]:
-        code = self.code
-        zeros = [code.zero] * 3 * (1 + group[-1][2] % 3)
-        return code.loop(0, code.builder.add(n, code.integer(1)), partial(self._split_products, n, group), zeros)
+    def _split_sums(self, n: Operand, group: Products) -> list[Operand]:
+        zeros = [self.code.zero] * 3 * (1 + group[-1][2] % 3)
+        return self.code.loop(0, n + 1, partial(self._split_products, n, group), zeros)
 
-    def _split_products(self, n: Value, group: Products, m: Value, sums: list[Value]) -> list[Value]:
-        code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
+    def _split_products(self, n: Operand, group: Products, m: Operand, sums: list[Operand]) -> list[Operand]:
+        code, left, right = self.code, self.row(m), self.row(n - m)
         found = list(sums)
         for first, second, component, sign in group:
             a, rest = (code.load(left, part + LANES * first) for part in (COARSE, FINE))
             coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, FINE))
             if sign < 0:
-                a, rest = code.negative(a), code.negative(rest)
+                a, rest = -a, -rest
             at = 3 * (component % 3)
             whole = code.load(right, LANES * second)
             for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
-    def _plain_orders(self, start: Value, stop: Value, omega: Products) -> list[Value]:
+    def _plain_orders(self, start: Operand, stop: Operand, omega: Products) -> list[Operand]:
         """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
-        code, b, one = self.code, self.code.builder, self.code.integer(1)
-        count = b.sub(stop, start)
-        odd = b.and_(count, one)
+        code, count = self.code, stop - start
+        odd = count & 1
         code.loop(0, odd, lambda _, values: self._plain_order(omega, start), [])
-        begin = b.add(start, odd)
+        begin = start + odd
         two = partial(self._two_plain_orders, omega)
-        return code.loop(0, b.lshr(count, one), lambda k, _: two(b.add(begin, b.shl(k, one))), [])
+        return code.loop(0, count.unsigned_shift(1), lambda k, _: two(begin + (k << 1)), [])
 
-    def _plain_order(self, group: Products, n: Value) -> None:
+    def _plain_order(self, group: Products, n: Operand) -> None:
         """y_(n+1)."""
-        code, b = self.code, self.code.builder
 
-        def products(m: Value, sums: list[Value]) -> list[Value]:
-            return self._both(group, self._highs(m), self._highs(b.sub(n, m)), sums)
+        def products(m: Operand, sums: list[Operand]) -> list[Operand]:
+            return self._both(group, self._highs(m), self._highs(n - m), sums)
 
-        sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
+        sums = self.code.loop(0, n + 1, products, [self.code.zero] * 6)
         self._plain_rates(n, range(6), sums)
 
-    def _two_plain_orders(self, group: Products, n: Value) -> None:
+    def _two_plain_orders(self, group: Products, n: Operand) -> None:
         """y_(n+1) and y_(n+2).
 
         Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
         Ω_(n+1), go beside them.
         """
-        code, b = self.code, self.code.builder
-        after = b.add(n, code.integer(1))
+        code = self.code
+        after = n + 1
 
-        def alone(m: Value, sums: list[Value]) -> list[Value]:
-            return self._plain(group, self._highs(m), self._highs(b.sub(n, m)), sums)
+        def alone(m: Operand, sums: list[Operand]) -> list[Operand]:
+            return self._plain(group, self._highs(m), self._highs(n - m), sums)
 
-        def beside(m: Value, values: list[Value]) -> list[Value]:
-            y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
+        def beside(m: Operand, values: list[Operand]) -> list[Operand]:
+            y, omega, following = self._highs(m), self._highs(n - m)[:3], values[9:]
             gamma = self._plain(_GAMMA, y, omega, values[:3])
             return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
 
@@ -497,29 +492,29 @@ class LaneOrders:
         last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
         self._plain_rates(after, range(6), last)
 
-    def _highs(self, n: Value) -> list[Value]:
+    def _highs(self, n: Operand) -> list[Operand]:
         """The high words of y_n."""
         row = self.row(n)
         return [self.code.load(row, LANES * i) for i in range(6)]
 
-    def _both(self, group: Products, y: list[Value], omega: list[Value], sums: list[Value]) -> list[Value]:
+    def _both(self, group: Products, y: list[Operand], omega: list[Operand], sums: list[Operand]) -> list[Operand]:
         return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
 
-    def _plain(self, group: Products, y: list[Value], omega: list[Value], sums: list[Value]) -> list[Value]:
+    def _plain(self, group: Products, y: list[Operand], omega: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums with the products of Ω and of the same part of y."""
         code, found = self.code, list(sums)
         for first, second, component, sign in group:
-            factor = y[first] if sign > 0 else code.negative(y[first])
+            factor = y[first] if sign > 0 else -y[first]
             found[component % 3] = code.fma(factor, omega[second], found[component % 3])
         return found
 
-    def _plain_rates(self, n: Value, components: Sequence[int], sums: list[Value]) -> None:
+    def _plain_rates(self, n: Operand, components: Sequence[int], sums: list[Operand]) -> None:
         """Components of y_(n+1) from their sums."""
-        code, b = self.code, self.code.builder
-        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)[0]
+        code = self.code
+        y, following, quotient = self.row(n), self.row(n + 1), self._quotient(n)[0]
         for i, products in zip(components, sums, strict=True):
-            total = code.multiply(self._coefficient(i)[0], products) if i < 3 else products
+            total = self._coefficient(i)[0] * products if i < 3 else products
             for k, component, source in self.terms:
                 if component == i:
                     total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
-            code.store(code.multiply(total, quotient), following, LANES * i)
+            code.store(total * quotient, following, LANES * i)

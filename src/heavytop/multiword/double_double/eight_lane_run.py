@@ -6,13 +6,14 @@ import ctypes
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import reduce
+from operator import and_
 from typing import Any
 
 import numpy
 from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
     DOUBLES,
     INT,
     INT_POINTER,
@@ -22,9 +23,9 @@ from heavytop.multiword.codegen.machine_code import (
     POINTER,
     Doubles,
     Machine,
+    Operand,
     Pair,
     Processor,
-    Value,
     compiled,
     doubles,
     function,
@@ -101,12 +102,12 @@ def build(system: System, processor: Processor | None = None) -> Machine:
 
 
 def _write_sample(module: ir.Module) -> None:
-    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, POINTER, POINTER])
-    scratch, order, times_, result = made.args
+    _, code = function(module, "sample", ir.VoidType(), [POINTER, INT, POINTER, POINTER])
+    scratch, order, times_, result = code.arguments
     b = code.builder
 
-    def row(n: Value) -> list[Pair]:
-        at = code.address(scratch, b.mul(n, code.integer(ROW)))
+    def row(n: Operand) -> list[Pair]:
+        at = code.address(scratch, n * ROW)
         return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
     words = polynomials(code, (order, order), [(code.load(times_, 0), code.load(times_, 8))], 6, row)[0]
@@ -120,15 +121,15 @@ class _Round:
 
     def __init__(self, module: ir.Module, system: System) -> None:
         arguments = [POINTER, POINTER, INT_POINTER, INT, INT, INT, POINTER, POINTER, POINTER, INT]
-        made, self.code = function(module, "advance", INT, arguments)
-        self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = made.args[:6]
-        *arrays, self.most = made.args[6:]
+        _, self.code = function(module, "advance", INT, arguments)
+        self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = self.code.arguments[:6]
+        *arrays, self.most = self.code.arguments[6:]
         self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
 
-    def _address(self, place: int) -> Value:
+    def _address(self, place: int) -> Operand:
         return self.code.address(self.clock, 8 * place)
 
-    def _clock(self, place: int) -> Value:
+    def _clock(self, place: int) -> Operand:
         return self.code.load(self.clock, 8 * place)
 
     def write(self) -> None:
@@ -138,9 +139,9 @@ class _Round:
         entry = b.block
         b.branch(head)
         b.position_at_end(head)
-        taken = b.phi(INT)
-        taken.add_incoming(code.integer(0), entry)
-        b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
+        taken = code.phi(INT)
+        code.arrive([taken], [0], entry)
+        b.cbranch(taken < self.most, body, out)
         b.position_at_end(body)
         first = self.series.row(0)
         for place, table in ((0, 0), (ROW, LOW)):
@@ -148,129 +149,118 @@ class _Round:
                 code.store(code.load(self.state, place + at), first, table + at)
         splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
         some = self._finish(peaks, splitting)
-        taken.add_incoming(b.add(taken, code.integer(1)), b.block)
+        code.arrive([taken], [taken + 1])
         b.cbranch(some, head, out)
         b.position_at_end(out)
         b.ret(taken)
 
-    def _norm(self, n: Value) -> Value:
+    def _norm(self, n: Operand) -> Operand:
         row, found = self.series.row(n), self.code.zero
         for i in range(6):
             found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
-        return log2(self.code, found)
+        return log2(found)
 
-    def _length(self, start: Value) -> Value:
+    def _length(self, start: Operand) -> Operand:
         """Each lane's h > 0, as in :mod:`heavytop.multiword.double_double.steps`."""
-        code, b = self.code, self.code.builder
 
-        def radius(n: Value) -> Value:
-            return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
+        def radius(n: Operand) -> Operand:
+            return (start - self._norm(n)) / self.code.spread(n.to_double())
 
-        radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
-        return step_length(code, radii, self._clock(REACH))
+        radii = radius(self.order), radius(self.order - 1)
+        return step_length(self.code, radii, self._clock(REACH))
 
-    def _sums(self, h: Value) -> list[Pair]:
+    def _sums(self, h: Operand) -> list[Pair]:
         """Σ y_n h^n of each component, from the highest order."""
-        code, b = self.code, self.code.builder
+        code = self.code
 
-        def plain(k: Value, totals: list[Value]) -> list[Value]:
-            row = self.series.row(b.sub(self.order, k))
+        def plain(k: Operand, totals: list[Operand]) -> list[Operand]:
+            row = self.series.row(self.order - k)
             return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
-        def pairs(k: Value, words: list[Value]) -> list[Value]:
-            row, found = self.series.row(b.sub(self.low_order, k)), list[Value]()
+        def pairs(k: Operand, words: list[Operand]) -> list[Operand]:
+            row, found = self.series.row(self.low_order - k), list[Operand]()
             for i in range(6):
                 found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
             return found
 
-        totals = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero] * 6)
+        totals = code.loop(0, self.order - self.low_order, plain, [code.zero] * 6)
         begin = [word for total in totals for word in (total, code.zero)]
-        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
+        words = code.loop(0, self.low_order + 1, pairs, begin)
         return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
-    def _finish(self, peaks: list[Value], splitting: Value) -> Value:
+    def _finish(self, peaks: list[Operand], splitting: Operand) -> Operand:
         """Move the lanes that can go; whether any did, or has to try again."""
-        code, b = self.code, self.code.builder
+        code = self.code
         start = self._norm(code.integer(0))
         length = self._length(start)
-        step = b.fmul(length, self._clock(SIGN))
+        step = length * self._clock(SIGN)
         results = self._sums(step)
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
         total, rest = later(code, (time, low), length)
         target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
-        behind = covered(code, (total, rest), (target, target_low))
+        behind = covered((total, rest), (target, target_low))
         fits, tried_out = self._fits(peaks, splitting, start, length)
-        flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time), tried_out)
-        fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
-        left = self._clock(LEFT)
-        alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
-        going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
+        flags = self._judged(start, length, results, total > time, tried_out)
+        fine, left = flags == 0, self._clock(LEFT)
+        alive = fine & (left > 0)
+        going, again = alive & (fits & ~behind), alive & ~fits
         old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
-        old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
+        old += [(self.clock, 8 * LEFT, left - 1)]
         for base, place, value in old:
-            code.store(b.select(going, value, code.load(base, place)), base, place)
+            code.store(code.select(going, value, code.load(base, place)), base, place)
         self._follow(peaks, length, going, again)
-        moved = b.bitcast(b.or_(going, again), ir.IntType(8))
-        return b.icmp_unsigned("!=", moved, ir.Constant(ir.IntType(8), 0))
+        return code.any_of(going | again)
 
-    def _fits(self, peaks: list[Value], splitting: Value, start: Value, length: Value) -> tuple[Value, Value]:
+    def _fits(
+        self, peaks: list[Operand], splitting: Operand, start: Operand, length: Operand
+    ) -> tuple[Operand, Operand]:
         """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
-        code, b = self.code, self.code.builder
+        code = self.code
         units = [self._clock(UNITS + k) for k in range(2)]
         slope = self._clock(SLOPE)
-        fits = b.fcmp_ordered("<", b.fsub(slope, self._slope(length)), code.constant(TOLERATED_SLOPE))
-        fits = b.and_(fits, b.fcmp_ordered("<=", code.absolute(slope), code.constant(STEEPEST)))
+        fits = (slope - self._slope(length) < TOLERATED_SLOPE) & (code.absolute(slope) <= STEEPEST)
         for unit, peak in zip(units, peaks, strict=True):
-            fits = b.and_(fits, b.and_(in_range(code, unit), next_unit(code, unit, peak)[0]))
-        both = b.fadd(log2(code, units[0]), log2(code, code.larger(*units)))
-        above = b.fadd(b.fsub(both, code.constant(2 * LOG2_OF_A_UNIT)), b.fsub(log2(code, length), start))
-        fall = b.fsub(code.constant(-SLACK), self._clock(REACH))
-        most = b.fmul(code.spread(b.sitofp(self.pair_order, DOUBLE)), fall)
-        fits = b.and_(fits, b.fcmp_ordered("<=", b.fsub(above, self._clock(DEPTH)), most))
-        none = ir.Constant(ir.VectorType(ir.IntType(1), 8), [0] * 8)
-        all_of_them = ir.Constant(ir.VectorType(ir.IntType(1), 8), [1] * 8)
-        fits = b.select(splitting, fits, all_of_them)
-        tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(MOST_TRIES))
-        return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
+            fits &= in_range(unit) & next_unit(code, unit, peak)[0]
+        both = log2(units[0]) + log2(code.larger(*units))
+        above = both - 2 * LOG2_OF_A_UNIT + (log2(length) - start)
+        fall = -SLACK - self._clock(REACH)
+        most = code.spread(self.pair_order.to_double()) * fall
+        fits = code.select(splitting, fits & (above - self._clock(DEPTH) <= most), True)
+        tried = self._clock(TRIES) >= MOST_TRIES
+        return fits, code.select(splitting, tried & ~fits, False)
 
-    def _slope(self, length: Value) -> Value:
-        b = self.code.builder
-        return b.fadd(b.fsub(self._clock(REACH), log2(self.code, length)), self.code.constant(SLACK))
+    def _slope(self, length: Operand) -> Operand:
+        return self._clock(REACH) - log2(length) + SLACK
 
-    def _follow(self, peaks: list[Value], length: Value, going: Value, again: Value) -> None:
+    def _follow(self, peaks: list[Operand], length: Operand, going: Operand, again: Operand) -> None:
         """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
-        code, b = self.code, self.code.builder
-        either = b.or_(going, again)
-        tries = b.select(again, b.fadd(self._clock(TRIES), code.constant(1.0)), code.zero)
+        code = self.code
+        either = going | again
+        tries = code.select(again, self._clock(TRIES) + 1, code.zero)
         values = [next_unit(code, self._clock(UNITS + k), peak)[1] for k, peak in enumerate(peaks)]
         for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
-            code.store(b.select(either, value, self._clock(place)), self.clock, 8 * place)
+            code.store(code.select(either, value, self._clock(place)), self.clock, 8 * place)
 
-    def _judged(self, start: Value, length: Value, results: list[Pair], moves: Value, tried: Value) -> Value:
+    def _judged(self, start: Operand, length: Operand, results: list[Pair], moves: Operand, tried: Operand) -> Operand:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
         code, b = self.code, self.code.builder
-        above = b.add(self.low_order, code.integer(1))
-        power = b.fmul(code.spread(b.sitofp(above, DOUBLE)), log2(code, length))
-        rounding = b.fsub(b.fadd(self._norm(above), power), start)
-        limit = b.fadd(self._clock(ROOM), code.constant(_TOLERATED))
-        infinity, finite = code.constant(math.inf), None
-        for word in (word for pair in results for word in pair):
-            one = b.fcmp_ordered("<", code.absolute(word), infinity)
-            finite = one if finite is None else b.and_(finite, one)
+        above = self.low_order + 1
+        power = code.spread(above.to_double()) * log2(length)
+        rounding = self._norm(above) + power - start
+        limit = self._clock(ROOM) + _TOLERATED
+        finite = reduce(and_, (code.absolute(word) < math.inf for pair in results for word in pair))
 
-        def flag(condition: Value, value: int) -> Value:
-            chosen = ir.Constant(INT_VECTOR, [value] * 8)
-            return b.select(condition, chosen, ir.Constant(INT_VECTOR, [0] * 8))
+        def flag(condition: Operand, value: int) -> Operand:
+            return code.select(condition, value, 0)
 
         place = b.bitcast(self.flags, INT_VECTOR.as_pointer())
-        known = b.load(place)
-        known.align = 8
-        found = b.or_(flag(b.not_(finite), NON_FINITE), flag(b.not_(moves), TOO_SMALL))
-        found = b.or_(found, flag(b.or_(b.fcmp_ordered(">", rounding, limit), tried), LARGER_N0))
-        alive = b.fcmp_ordered(">", self._clock(LEFT), code.zero)
-        found = b.or_(known, b.select(alive, found, ir.Constant(INT_VECTOR, [0] * 8)))
-        b.store(found, place).align = 8
+        known = code.value(b.load(place, align=8))
+        found = flag(~finite, NON_FINITE) | flag(~moves, TOO_SMALL)
+        found |= flag((rounding > limit) | tried, LARGER_N0)
+        alive = self._clock(LEFT) > 0
+        found = known | code.select(alive, found, 0)
+        b.store(found, place, align=8)
         return found
 
 

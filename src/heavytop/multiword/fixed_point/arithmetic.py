@@ -29,14 +29,12 @@ from llvmlite import ir
 from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
-    INT_VECTOR,
     LANES,
     POINTER,
-    VECTOR,
     Code,
     Doubles,
     Machine,
-    Value,
+    Operand,
     compiled,
     function,
     once,
@@ -122,10 +120,10 @@ class Accumulator:
     code: Code
     grid: Grid
     base: int
-    sums: list[Value]
-    seen: Value
+    sums: list[Operand]
+    seen: Operand
 
-    def add_product(self, a: list[Value], b: list[Value], each: bool = False, below: bool = False) -> None:
+    def add_product(self, a: list[Operand], b: list[Operand], each: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
         What goes to the last level is added up before it gets there: its sum is what the next product waits for.
@@ -141,31 +139,28 @@ class Accumulator:
             lows = []
             for i in range(k + 1):
                 total = code.fma(a[i], b[k - i], self.sums[k])
-                part = code.subtract(total, self.sums[k])
-                lows.append(code.fma(a[i], b[k - i], code.negative(part)))
+                part = total - self.sums[k]
+                lows.append(code.fma(a[i], b[k - i], -part))
                 self.sums[k] = total
                 if k == 0 or each:
                     self.look(k)
-            low = in_pairs(code, lows)
+            low = in_pairs(lows)
             if k + 1 < last:
                 self.look(k + 1)
                 self.sums[k + 1] = passed_on(code, self.grid, low, self.sums[k + 1])
                 self.look(k + 1)
         if self.grid.relative:
-            low = code.multiply(low, code.constant(self.grid.apart))
+            low *= self.grid.apart
         pairs = [(i, last - i) for i in range(last + 1)] + [(i, last + 1 - i) for i in range(1, last + 1) if below]
         for i, j in pairs:
             low = code.fma(a[i], b[j], low)
-        self.sums[last] = code.add(self.sums[last], low)
+        self.sums[last] += low
 
     def look(self, k: int) -> None:
         """Gather the bits of a sum; those of the last level are of no account."""
         level = self.base + k
         if level < self.grid.words - 1:
-            b = self.code.builder
-            centre = int(numpy.float64(self.grid.coarse(level)).view(numpy.int64))
-            centres = ir.Constant(INT_VECTOR, [ir.Constant(INT, centre)] * 8)
-            self.seen = b.or_(self.seen, b.xor(b.bitcast(self.sums[k], INT_VECTOR), centres))
+            self.seen |= self.sums[k].bits() ^ _bits(self.grid.coarse(level))
 
     def look_at_all(self) -> None:
         """Gather the bits of every sum."""
@@ -173,15 +168,19 @@ class Accumulator:
             self.look(k)
 
 
-def in_pairs(code: Code, values: list[Value]) -> Value:
+def _bits(value: float) -> int:
+    return int(numpy.float64(value).view(numpy.int64))
+
+
+def in_pairs(values: list[Operand]) -> Operand:
     """Their sum, exact for multiples of one unit; in pairs."""
     while len(values) > 1:
         pairs = zip(values[::2], values[1::2], strict=False)
-        values = [code.add(a, b) for a, b in pairs] + values[len(values) - len(values) % 2 :]
+        values = [a + b for a, b in pairs] + values[len(values) - len(values) % 2 :]
     return values[0]
 
 
-def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Value]:
+def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[ir.Function]:
     """Functions (left, right, count, sums, seen): S += Σ_m left[m] right[-m] in the levels from the q-th last on.
 
     left goes up by a row for each product and right goes down; both point to their first word that is not zero.
@@ -190,29 +189,29 @@ def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Value]:
     return [_write_kernel(module, grid, count, row) for count in range(1, grid.words + 1)]
 
 
-def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Value:
+def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> ir.Function:
     arguments = [POINTER, POINTER, INT, POINTER, POINTER]
     made, code = function(module, f"products_{count}", ir.VoidType(), arguments)
     made.linkage = "internal"
     made.attributes.add("noinline")
-    left, right, terms, sums, seen = made.args
-    base, b = grid.words - count, code.builder
+    left, right, terms, sums, seen = code.arguments
+    base = grid.words - count
 
-    def term(m: Value, values: list[Value]) -> list[Value]:
+    def term(m: Operand, values: list[Operand]) -> list[Operand]:
         total = Accumulator(code, grid, base, list(values[:-1]), values[-1])
-        at = code.address(left, b.mul(m, code.integer(row)))
-        against = code.address(right, b.mul(m, code.integer(-row)))
+        at = code.address(left, m * row)
+        against = code.address(right, m * -row)
         a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
         # where a leading word is small in some lane, these would be left out alike at every step
         total.add_product(a, c, below=count == 2 and not grid.whole)
         return [*total.sums, total.seen]
 
-    begin = [code.load(sums, 8 * k) for k in range(count)] + [b.bitcast(code.load(seen, 0), INT_VECTOR)]
+    begin = [code.load(sums, 8 * k) for k in range(count)] + [code.load(seen, 0).bits()]
     values = code.loop(0, terms, term, begin)
     for k in range(count):
         code.store(values[k], sums, 8 * k)
-    code.store(b.bitcast(values[-1], VECTOR), seen, 0)
-    b.ret_void()
+    code.store(values[-1].of_bits(), seen, 0)
+    code.builder.ret_void()
     return made
 
 
@@ -220,7 +219,7 @@ _UNROLLED = 4
 """Products of a level that are written out one after another."""
 
 
-def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> Value:
+def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
     """The functions of :func:`write_kernels` as one, (left, right, count, sums, seen, levels), of a relative grid.
 
     It is a loop over the products of a level: written out, its code would not stay in the processor's cache.  Levels do
@@ -230,63 +229,60 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> Value:
     made, code = function(module, "long_products", ir.VoidType(), arguments)
     made.linkage = "internal"
     made.attributes.add("noinline")
-    left, right, terms, sums, seen, levels = made.args
-    b, one, lanes = code.builder, code.integer(1), code.integer(LANES)
-    last, apart = b.sub(levels, one), code.constant(grid.apart)
-    bits = ir.Constant(INT, int(numpy.float64(grid.coarse(0)).view(numpy.int64)))
-    centre = ir.Constant(INT_VECTOR, [bits] * LANES)
+    left, right, terms, sums, seen, levels = code.arguments
+    last, centre = levels - 1, _bits(grid.coarse(0))
 
-    def look(found: Value, total: Value) -> Value:
-        return b.or_(found, b.xor(b.bitcast(total, INT_VECTOR), centre))
+    def look(found: Operand, total: Operand) -> Operand:
+        return found | (total.bits() ^ centre)
 
-    def exact_product(a: Value, c: Value, values: list[Value]) -> list[Value]:
+    def exact_product(a: Operand, c: Operand, values: list[Operand]) -> list[Operand]:
         total = code.fma(a, c, values[0])
-        low = code.fma(a, c, code.negative(code.subtract(total, values[0])))
-        return [total, code.add(values[1], low)]
+        low = code.fma(a, c, -(total - values[0]))
+        return [total, values[1] + low]
 
-    def rounded_product(a: Value, c: Value, values: list[Value]) -> list[Value]:
+    def rounded_product(a: Operand, c: Operand, values: list[Operand]) -> list[Operand]:
         return [code.fma(a, c, values[0])]
 
-    def term(m: Value, values: list[Value]) -> list[Value]:
-        ahead = code.address(left, b.mul(m, code.integer(row)))
-        behind = code.address(right, b.mul(m, code.integer(-row)))
+    def term(m: Operand, values: list[Operand]) -> list[Operand]:
+        ahead = code.address(left, m * row)
+        behind = code.address(right, m * -row)
 
-        def level(k: Value, product: Callable[..., list[Value]], found: list[Value]) -> list[Value]:
-            end, count = b.mul(k, lanes), b.add(k, one)
+        def level(k: Operand, product: Callable[..., list[Operand]], found: list[Operand]) -> list[Operand]:
+            end, count = k * LANES, k + 1
 
-            def some(start: Value, width: int, found: list[Value]) -> list[Value]:
+            def some(start: Operand, width: int, found: list[Operand]) -> list[Operand]:
                 for j in range(width):
-                    place = b.mul(b.add(start, code.integer(j)), lanes)
-                    pair = code.load(ahead, place), code.load(behind, b.sub(end, place))
+                    place = (start + j) * LANES
+                    pair = code.load(ahead, place), code.load(behind, end - place)
                     found = product(*pair, found)
                 return found
 
-            groups = b.sdiv(count, code.integer(_UNROLLED))
-            whole = b.mul(groups, code.integer(_UNROLLED))
-            found = code.loop(0, groups, lambda g, v: some(b.mul(g, code.integer(_UNROLLED)), _UNROLLED, v), found)
+            groups = count // _UNROLLED
+            whole = groups * _UNROLLED
+            found = code.loop(0, groups, lambda g, v: some(g * _UNROLLED, _UNROLLED, v), found)
             return code.loop(whole, count, lambda i, v: some(i, 1, v), found)
 
-        def exact_level(k: Value, values: list[Value]) -> list[Value]:
-            place = b.mul(k, lanes)
+        def exact_level(k: Operand, values: list[Operand]) -> list[Operand]:
+            place = k * LANES
             total, lows = level(k, exact_product, [code.load(sums, place), code.zero])
             found = look(values[1], total)
-            total = code.fma(values[0], apart, total)
+            total = code.fma(values[0], grid.apart, total)
             code.store(total, sums, place)
             return [lows, look(found, total)]
 
         lows, found = code.loop(0, last, exact_level, [code.zero, values[0]])
-        low = level(last, rounded_product, [code.multiply(lows, apart)])[0]
-        place = b.mul(last, lanes)
-        code.store(code.add(code.load(sums, place), low), sums, place)
+        low = level(last, rounded_product, [lows * grid.apart])[0]
+        place = last * LANES
+        code.store(code.load(sums, place) + low, sums, place)
         return [found]
 
-    found = code.loop(0, terms, term, [b.bitcast(code.load(seen, 0), INT_VECTOR)])[0]
-    code.store(b.bitcast(found, VECTOR), seen, 0)
-    b.ret_void()
+    found = code.loop(0, terms, term, [code.load(seen, 0).bits()])[0]
+    code.store(found.of_bits(), seen, 0)
+    code.builder.ret_void()
     return made
 
 
-def bounded_product(code: Code, grid: Grid, a: list[Value], b: list[Value]) -> list[Value]:
+def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand]) -> list[Operand]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
 
     a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
@@ -294,53 +290,53 @@ def bounded_product(code: Code, grid: Grid, a: list[Value], b: list[Value]) -> l
     2^3 + 2^2 + 2 (k − 1): less than 2^51 units for 24 words of 45 bits.
     """
     last = grid.words - 1
-    found, lows = [], [list[Value]() for _ in range(grid.words)]
+    found, lows = [], [list[Operand]() for _ in range(grid.words)]
     for k in range(last):
         centre = total = code.constant(grid.centre(k))
         for i in range(k + 1):
             after = code.fma(a[i], b[k - i], total)
-            lows[k + 1].append(code.fma(a[i], b[k - i], code.negative(code.subtract(after, total))))
+            lows[k + 1].append(code.fma(a[i], b[k - i], -(after - total)))
             total = after
-        found.append(code.subtract(total, centre))
+        found.append(total - centre)
     total = code.zero
     # those of the level below the last first: where a leading word is 0 they are what is left
     for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
         total = code.fma(a[i], b[j], total)
     found.append(total)
-    return [found[0], *(code.add(found[k], in_pairs(code, lows[k])) for k in range(1, last + 1))]
+    return [found[0], *(found[k] + in_pairs(lows[k]) for k in range(1, last + 1))]
 
 
-def passed_on(code: Code, grid: Grid, left: Value, word: Value) -> Value:
+def passed_on(code: Code, grid: Grid, left: Operand, word: Operand) -> Operand:
     """``word`` and what is ``left`` of the word before it."""
-    return code.fma(left, code.constant(grid.apart), word) if grid.relative else code.add(word, left)
+    return code.fma(left, grid.apart, word) if grid.relative else word + left
 
 
-def carried_over(code: Code, grid: Grid, carry: Value, word: Value) -> Value:
+def carried_over(code: Code, grid: Grid, carry: Operand, word: Operand) -> Operand:
     """``word`` and the ``carry`` of the word behind it."""
-    return code.fma(carry, code.constant(1 / grid.apart), word) if grid.relative else code.add(word, carry)
+    return code.fma(carry, 1 / grid.apart, word) if grid.relative else word + carry
 
 
-def centred(code: Code, grid: Grid, count: int) -> list[Value]:
+def centred(code: Code, grid: Grid, count: int) -> list[Operand]:
     """The beginning of all sums."""
     return [code.constant(grid.coarse(k)) for k in range(count)]
 
 
-def summed(code: Code, grid: Grid, sums: list[Value]) -> list[Value]:
+def summed(code: Code, grid: Grid, sums: list[Operand]) -> list[Operand]:
     """Sums that began there, as words."""
-    words = [code.subtract(s, c) for s, c in zip(sums, centred(code, grid, len(sums)), strict=True)]
-    return [code.multiply(word, code.constant(1 / grid.apart)) for word in words] if grid.relative else words
+    words = [s - c for s, c in zip(sums, centred(code, grid, len(sums)), strict=True)]
+    return [word * (1 / grid.apart) for word in words] if grid.relative else words
 
 
-def carried(code: Code, grid: Grid, words: list[Value]) -> list[Value]:
+def carried(code: Code, grid: Grid, words: list[Operand]) -> list[Operand]:
     """The same number with each word but the first near b bits wide again."""
-    carries = [None]
+    carries = []
     for k in range(1, grid.words):
         big = code.constant(grid.coarse(k - 1))
-        carries.append(code.subtract(code.add(words[k], big), big))
+        carries.append(words[k] + big - big)
     found = []
     for k, word in enumerate(words):
-        value = word if k == 0 else code.subtract(word, carries[k])
-        found.append(carried_over(code, grid, carries[k + 1], value) if k + 1 < grid.words else value)
+        value = word if k == 0 else word - carries[k - 1]
+        found.append(carried_over(code, grid, carries[k], value) if k + 1 < grid.words else value)
     return found
 
 
@@ -418,16 +414,16 @@ def machine(grid: Grid, vectors: int) -> Machine:
     """
     words, coarser = grid.words, 1 / grid.apart
     module = ir.Module("extents")
-    made, code = function(module, "extents", ir.VoidType(), [POINTER, INT, *[POINTER] * 5])
-    rows, orders, values, sizes, behind, widest, added = made.args
-    b, row = code.builder, words * (1 + vectors)
+    _, code = function(module, "extents", ir.VoidType(), [POINTER, INT, *[POINTER] * 5])
+    rows, orders, values, sizes, behind, widest, added = code.arguments
+    row = words * (1 + vectors)
     for k in range(row):
         code.store(code.zero, widest, 8 * k)
     for k in range(words * vectors):
         code.store(code.zero, added, 8 * k)
 
-    def order(n: Value, _: list[Value]) -> None:
-        at = code.address(rows, b.mul(n, code.integer(8 * row)))
+    def order(n: Operand, _: list[Operand]) -> None:
+        at = code.address(rows, n * (8 * row))
         side = [code.load(at, 8 * k) for k in range(row)]
         for k, word in enumerate(side):
             code.store(code.larger(code.absolute(word), code.load(widest, 8 * k)), widest, 8 * k)
@@ -436,21 +432,21 @@ def machine(grid: Grid, vectors: int) -> Machine:
             for k in reversed(range(words)):
                 y = component(code, side[words * (1 + v) + k])
                 magnitude, place = code.absolute(y), 8 * (words * v + k)
-                code.store(code.add(code.load(added, place), magnitude), added, place)
+                code.store(code.load(added, place) + magnitude, added, place)
                 value, size = (carried_over(code, grid, *pair) for pair in ((value, y), (size, magnitude)))
                 far = size if k == FIRST_BEHIND else far
-            place = b.mul(b.add(b.mul(n, code.integer(vectors)), code.integer(v)), code.integer(8))
-            code.store(code.multiply(value, code.constant(coarser)), code.address(values, place), 0)
-            code.store(code.multiply(size, code.constant(coarser)), code.address(sizes, place), 0)
+            here = (n * vectors + v) * 8
+            code.store(value * coarser, code.address(values, here), 0)
+            code.store(size * coarser, code.address(sizes, here), 0)
             if grid.relative:
-                code.store(far, code.address(behind, place), 0)
+                code.store(far, code.address(behind, here), 0)
 
-    code.loop(0, b.add(orders, code.integer(1)), order, [])
-    b.ret_void()
+    code.loop(0, orders + 1, order, [])
+    code.builder.ret_void()
     return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 5])})
 
 
-def component(code: Code, left: Value) -> Value:
+def component(code: Code, left: Operand) -> Operand:
     """A word of y out of one of L, exactly."""
     half = code.shuffle(left, code.zero, _SECOND)
-    return code.fma(half, code.constant(-0.5), code.shuffle(left, code.zero, _FIRST))
+    return code.fma(half, -0.5, code.shuffle(left, code.zero, _FIRST))

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ldexp
 from threading import local
@@ -39,13 +39,12 @@ from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
     INT_POINTER,
-    INT_VECTOR,
     INTEGERS,
     POINTER,
     Doubles,
     Integers,
     Machine,
-    Value,
+    Operand,
     compiled,
     doubles,
     function,
@@ -70,25 +69,23 @@ _UP = 1 + 2.0**-40
 class _ColumnRows(WordRows):
     """Those of a column.  places: behind those of a motion, for how many orders the first u + 1 words were 0."""
 
-    def begin(self, y: list[Value], wide: Value) -> Value:
+    def begin(self, y: list[Operand], wide: Operand) -> Operand:
         for k in range(self.grid.words):
-            self.code.builder.store(self.code.integer(0), self._quiet(k))
+            self.code.store_one(0, self.places, self._quiet(k))
         return WordRows.begin(self, y, wide)
 
-    def _quiet(self, k: int) -> Value:
-        return self.code.address(self.places, self.grid.words + 2 + k)
+    def _quiet(self, k: int) -> int:
+        return self.grid.words + 2 + k
 
-    def _leading_zeros(self, y: list[Value], before: Value) -> Value:
-        code, b = self.code, self.code.builder
-        count, only = code.integer(0), ir.Constant(ir.IntType(1), 1)
+    def _leading_zeros(self, y: list[Operand], before: Operand) -> Operand:
+        code = self.code
+        count, only = code.integer(0), code.true
         for k in range(self.grid.words - 1):
-            nothing = b.fcmp_ordered("==", code.largest(code.absolute(y[k])), ir.Constant(DOUBLE, 0.0))
-            only = b.and_(only, nothing)
-            longer = b.add(b.load(self._quiet(k)), code.integer(1))
-            quiet = b.select(only, longer, code.integer(0))
-            b.store(quiet, self._quiet(k))
-            count = b.select(b.icmp_signed(">=", quiet, code.integer(_QUIET)), code.integer(k + 1), count)
-        return b.select(b.icmp_signed(">", count, before), count, before)
+            only &= code.largest(code.absolute(y[k])) == 0
+            quiet = code.select(only, code.load_one(self.places, self._quiet(k)) + 1, 0)
+            code.store_one(quiet, self.places, self._quiet(k))
+            count = code.select(quiet >= _QUIET, k + 1, count)
+        return code.larger(count, before)
 
 
 @dataclass(slots=True)
@@ -101,17 +98,17 @@ class _ColumnCode(SeriesCode):
     """
 
     of_data: bool = False
-    kernels: Sequence[Value] = ()
-    n: Value = None
+    kernels: Sequence[ir.Function] = ()
+    n: Operand = field(init=False)
 
-    def write(self) -> Value:
+    def write(self) -> ir.Function:
         """The function; gives the order, or FIRED."""
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER, POINTER, INT_POINTER, INT]
         if self.of_data:
             arguments += [POINTER, POINTER]
         name = "column_of_data" if self.of_data else "column"
-        self.made, self.code = function(self.module, name, INT, arguments)
-        state, _, _, rows, sums, places, seen, _, _, result, motion, known, order = self.made.args[:13]
+        made, self.code = function(self.module, name, INT, arguments)
+        state, _, _, rows, sums, places, seen, _, _, result, motion, known, order = self.code.arguments[:13]
         code, b, grid = self.code, self.code.builder, self.grid
         words, room = grid.words, most_orders(grid) + 2
         self.rows = _ColumnRows(code, grid, 1, room, rows, sums, places, seen, list(self.kernels))
@@ -120,16 +117,16 @@ class _ColumnCode(SeriesCode):
         code.store(code.zero, seen, 0)
         wide = self.rows.begin(first, code.zero)
         values = code.loop(0, order, lambda n, v: self._next(n, v, along), [code.integer(0), wide, *first, *first])
-        bits = b.and_(code.any_bit(b.bitcast(code.load(seen, 0), INT_VECTOR)), code.integer(EXPONENT_BITS))
-        small = b.fcmp_ordered("<", code.largest(values[1]), ir.Constant(DOUBLE, 1.0))
+        bits = code.any_bit(code.load(seen, 0).bits()) & EXPONENT_BITS
+        small = code.largest(values[1]) < 1
         total = carried(code, grid, carried(code, grid, values[2 + words :]))
         for k, word in enumerate(total):
             code.store(word, result, 8 * k)
-        quiet = b.and_(b.icmp_signed("==", bits, code.integer(0)), small)
-        b.ret(b.select(quiet, order, code.integer(FIRED)))
-        return self.made
+        quiet = (bits == 0) & small
+        b.ret(code.select(quiet, order, FIRED))
+        return made
 
-    def _next(self, n: Value, values: list[Value], along: WordRows) -> list[Value]:
+    def _next(self, n: Operand, values: list[Operand], along: WordRows) -> list[Operand]:
         """Zeros, the largest word, v_(n+1) and the sum up to it."""
         code, words, rows = self.code, self.grid.words, self.rows
         assert isinstance(rows, WordRows)
@@ -141,17 +138,19 @@ class _ColumnCode(SeriesCode):
         rates, wide = self._rates(0, rows.end_sums(), y, wide)
         raised, wide = self._raised(rates, wide)
         quotient, wide = self._divided(n, self._times(raised), wide)
-        following, zeros, wide = rows.keep(code.builder.add(n, code.integer(1)), quotient, zeros, wide)
-        return [zeros, wide, *following, *(code.add(a, c) for a, c in zip(total, following, strict=True))]
+        following, zeros, wide = rows.keep(n + 1, quotient, zeros, wide)
+        return [zeros, wide, *following, *(a + c for a, c in zip(total, following, strict=True))]
 
-    def sources(self, vector: int, gathered: list[Value], y: list[Value]) -> list[tuple[list[Value], list[Value]]]:
+    def sources(
+        self, vector: int, gathered: list[Operand], y: list[Operand]
+    ) -> list[tuple[list[Operand], list[Operand]]]:
         own = SeriesCode.sources(self, vector, gathered, y)
         if not self.of_data:
             return own
         code, words = self.code, self.grid.words
-        at = code.address(self.made.args[13], code.builder.mul(self.n, code.integer(16 * words)))
+        at = code.address(code.arguments[13], self.n * (16 * words))
         sums, b_n = ([code.load(at, 8 * (words * half + k)) for k in range(words)] for half in range(2))
-        slopes = self.made.args[14]
+        slopes = code.arguments[14]
         for k, (_, source) in enumerate(SeriesCode.sources(self, vector, sums, b_n)):
             own.append(([code.load(slopes, 8 * (words * k + i)) for i in range(words)], source))
         return own
@@ -159,21 +158,21 @@ class _ColumnCode(SeriesCode):
     def write_gather(self) -> None:
         """Write ``gather(rows, places, sums, seen, order, result)``: the gathered sums of b and b_n, for n < order."""
         arguments = [POINTER, INT_POINTER, POINTER, POINTER, INT, POINTER]
-        made, self.code = function(self.module, "gather", ir.VoidType(), arguments)
-        rows, places, sums, seen, order, result = made.args
-        code, b, words = self.code, self.code.builder, self.grid.words
+        _, self.code = function(self.module, "gather", ir.VoidType(), arguments)
+        code, words = self.code, self.grid.words
+        rows, places, sums, seen, order, result = code.arguments
         kept = WordRows(code, self.grid, 1, most_orders(self.grid) + 2, rows, sums, places, seen, list(self.kernels))
         code.store(code.zero, seen, 0)
 
-        def one(n: Value, _: list[Value]) -> None:
+        def one(n: Operand, _: list[Operand]) -> None:
             products = kept.products(n, code.integer(words - 1), 0)
             b_n = [component(code, word) for word in kept.stored(n, 0)]
-            at = b.mul(n, code.integer(16 * words))
+            at = n * (16 * words)
             for k, word in enumerate([*self._gathered(carried(code, self.grid, products)), *b_n]):
-                code.store(word, result, b.add(at, code.integer(8 * k)))
+                code.store(word, result, at + 8 * k)
 
         code.loop(0, order, one, [])
-        b.ret_void()
+        code.builder.ret_void()
 
 
 @once

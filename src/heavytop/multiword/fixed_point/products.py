@@ -5,21 +5,19 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLE,
     INT,
     INT_POINTER,
-    INT_VECTOR,
     LANES,
     POINTER,
-    VECTOR,
     Code,
     Doubles,
     Index,
-    Value,
+    Operand,
     function,
 )
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Sum
@@ -57,11 +55,11 @@ class Rows(ABC):
     grid: Grid
     vectors: int
     orders: int
-    rows: Value
-    sums: Value
-    places: Value
-    seen: Value
-    kernels: list[Value]
+    rows: Operand
+    sums: Operand
+    places: Operand
+    seen: Operand
+    kernels: list[ir.Function]
 
     @staticmethod
     @abstractmethod
@@ -70,7 +68,7 @@ class Rows(ABC):
 
     @staticmethod
     @abstractmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[ir.Function]:
         """The functions that sum products; which is best depends on how many registers there are, no result does."""
 
     @staticmethod
@@ -79,31 +77,31 @@ class Rows(ABC):
         """The eight lanes of L of an order, out of the rows."""
 
     @abstractmethod
-    def stored(self, n: Value, vector: int) -> list[Value]:
+    def stored(self, n: Operand, vector: int) -> list[Operand]:
         """L of an order as K words, not carried."""
 
     @abstractmethod
-    def begin(self, y: list[Value], wide: Value) -> Value:
+    def begin(self, y: list[Operand], wide: Operand) -> Operand:
         """Store y_0; gives the largest word over its limit."""
 
     @abstractmethod
-    def keep(self, n: Index, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
+    def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
         """Store y_n; gives y_n as it was stored, the zeros from now on, and the largest word over its limit.
 
         zeros: an integer about leading zeros, which begins at 0.
         """
 
     @abstractmethod
-    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
+    def products(self, n: Operand, zeros: Operand, vector: int) -> list[Operand]:
         """S_n = Σ L_m ∘ R_(n−m) of a vector: K words, not carried."""
 
-    def sides(self, y: list[Value]) -> list[list[Value]]:
+    def sides(self, y: list[Operand]) -> list[list[Operand]]:
         """R, and L of each vector, word by word."""
         words = self.grid.words
         parts = [y[words * v : words * (v + 1)] for v in range(self.vectors)]
         return [_side(self.code, parts[0], RIGHT), *(_side(self.code, part, LEFT) for part in parts)]
 
-    def largest_sum(self, y: list[Value]) -> Value:
+    def largest_sum(self, y: list[Operand]) -> Operand:
         """The largest sum of |words| of a component, a double, as the last word is kept; infinite beyond a double."""
         code, words = self.code, self.grid.words
         largest = code.zero
@@ -114,13 +112,13 @@ class Rows(ABC):
             largest = code.larger(one, largest)
         return code.largest(largest)
 
-    def watch(self, wide: Value, value: Value, k: int, bits: int = WIDEST) -> Value:
+    def watch(self, wide: Operand, value: Operand, k: int, bits: int = WIDEST) -> Operand:
         """The largest word so far, over 2^bits of its unit."""
-        share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-bits / self.grid.unit(k)))
+        share = self.code.absolute(value) * (2.0**-bits / self.grid.unit(k))
         return self.code.larger(share, wide)
 
 
-def _side(code: Code, y: list[Value], which: Sum) -> list[Value]:
+def _side(code: Code, y: list[Operand], which: Sum) -> list[Operand]:
     signs = code.constant(which.sign)
     return [
         code.fma(code.shuffle(word, code.zero, which.second), signs, code.shuffle(word, code.zero, which.first))
@@ -144,10 +142,10 @@ _PRODUCTS = 120
 _ROUND = 1.5 * 2.0**52
 
 
-def rounded(code: Code, value: Value, place: int = 0) -> Value:
+def rounded(code: Code, value: Operand, place: int = 0) -> Operand:
     """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
     big = code.constant(_ROUND * 2.0**place)
-    return code.subtract(code.add(value, big), big)
+    return value + big - big
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +162,7 @@ class _Tiles:
 _WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
 
 
-def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Value:
+def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir.Function:
     """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
 
     Split at 2^24: what is whole multiples of that is added to the level before.
@@ -172,8 +170,7 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Va
     made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
     made.linkage = "internal"
     made.attributes.add("noinline")
-    left, right, where, orders, sums = made.args
-    b = code.builder
+    left, right, where, orders, sums = code.arguments
     pairs = [
         [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
     ]
@@ -183,9 +180,9 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Va
     most = _PRODUCTS // max(map(len, pairs))
     begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
 
-    def order(m: Value, values: list[Value]) -> list[Value]:
-        at, found = b.load(code.address(where, m)), list(values)
-        one, other = code.address(left, at), code.address(right, b.neg(at))
+    def order(m: Operand, values: list[Operand]) -> list[Operand]:
+        at, found = code.load_one(where, m), list(values)
+        one, other = code.address(left, at), code.address(right, -at)
         a = [code.load(one, LANES * i) for i in range(side)]
         for j in range(side):
             c = code.load(other, LANES * j)
@@ -195,34 +192,32 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Va
                     found[place] = code.multiply_add(a[i], c, found[place])
         return found
 
-    def group(g: Value, _: list[Value]) -> None:
-        start = b.mul(g, code.integer(most))
-        stop = b.add(start, code.integer(most))
-        stop = b.select(b.icmp_signed("<", stop, orders), stop, orders)
+    def group(g: Operand, _: list[Operand]) -> None:
+        start = g * most
+        stop = code.smaller(start + most, orders)
         _add_levels(code, sums, begins, code.loop(start, stop, order, [code.zero] * begins[-1]))
 
-    code.loop(0, b.sdiv(b.add(orders, code.integer(most - 1)), code.integer(most)), group, [])
-    b.ret_void()
+    code.loop(0, (orders + (most - 1)) // most, group, [])
+    code.builder.ret_void()
     return made
 
 
-def _add_levels(code: Code, sums: Value, begins: list[int], values: list[Value]) -> None:
+def _add_levels(code: Code, sums: Operand, begins: list[int], values: list[Operand]) -> None:
     """sums += the values of each level, split at 2^24."""
     carries, rest = [], []
     for level in range(len(begins) - 1):
         first, *others = values[begins[level] : begins[level + 1]]
         for value in others:
-            first = code.add(first, value)
+            first += value
         carries.append(rounded(code, first, BITS))
-        rest.append(code.subtract(first, carries[-1]))
-    down = code.constant(2.0**-BITS)
+        rest.append(first - carries[-1])
     for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
         place = LANES * level
-        total = code.add(code.load(sums, place), value)
-        code.store(code.multiply_add(carry, down, total), sums, place)
+        total = code.load(sums, place) + value
+        code.store(code.multiply_add(carry, 2.0**-BITS, total), sums, place)
 
 
-def write_sums(module: ir.Module, wide: bool) -> Value:
+def write_sums(module: ir.Module, wide: bool) -> ir.Function:
     """(left, right, where, orders, levels, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels.
 
     sums begins with what is whole multiples of a level before the first.  where counts doubles, a digit has eight.
@@ -238,46 +233,45 @@ def write_sums(module: ir.Module, wide: bool) -> Value:
     made, code = function(module, "sum_products", ir.VoidType(), arguments)
     made.linkage = "internal"
     made.attributes.add("noinline")
-    left, right, where, orders, levels, sums = made.args
+    left, right, where, orders, levels, sums = code.arguments
     b, tile, group = code.builder, code.integer(LANES * side), code.integer(_PRODUCTS // side)
-    many = b.icmp_signed(">", levels, code.integer(len(triangles)))
-    with b.if_then(b.not_(many)):
+    with b.if_then(~(levels > len(triangles))):
         _call(code, triangles, levels, [left, right, where, orders, sums])
         b.ret_void()
-    parts = b.sdiv(b.add(levels, code.integer(side - 1)), code.integer(side))
+    parts = (levels + (side - 1)) // side
 
-    def some(g: Value, _: list[Value]) -> None:
-        start = b.mul(g, group)
-        rest = b.sub(orders, start)
-        count = b.select(b.icmp_signed("<", rest, group), rest, group)
+    def some(g: Operand, _: list[Operand]) -> None:
+        start = g * group
+        rest = orders - start
+        count = code.smaller(rest, group)
 
-        def one(i: Value, _: list[Value]) -> None:
-            def other(j: Value, _: list[Value]) -> None:
-                ahead = b.add(i, j)
-                both = [code.address(base, b.mul(k, tile)) for base, k in ((left, i), (right, j))]
-                places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
-                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(side))), [*both, *places])
+        def one(i: Operand, _: list[Operand]) -> None:
+            def other(j: Operand, _: list[Operand]) -> None:
+                ahead = i + j
+                both = [code.address(base, k * tile) for base, k in ((left, i), (right, j))]
+                places = [code.address(where, start), count, code.address(sums, ahead * tile)]
+                _call(code, tiles, levels - ahead * side, [*both, *places])
 
-            code.loop(0, b.sub(parts, i), other, [])
+            code.loop(0, parts - i, other, [])
 
         code.loop(0, parts, one, [])
 
-    code.loop(0, b.sdiv(b.add(orders, b.sub(group, code.integer(1))), group), some, [])
+    code.loop(0, (orders + (group - 1)) // group, some, [])
     b.ret_void()
     return made
 
 
-def _call(code: Code, tiles: list[Value], levels: Value, arguments: list[Value]) -> None:
+def _call(code: Code, tiles: list[ir.Function], levels: Operand, arguments: list[Operand]) -> None:
     """The tile of so many levels, if there are any, or the last."""
     b = code.builder
     end = b.append_basic_block("end")
     blocks = [b.append_basic_block(f"levels_{d}") for d in range(1, len(tiles) + 1)]
     switch = b.switch(levels, blocks[-1])
-    switch.add_case(code.integer(0), end)
+    switch.add_case(0, end)
     for d, (tile, block) in enumerate(zip(tiles, blocks, strict=True), 1):
-        switch.add_case(code.integer(d), block)
+        switch.add_case(d, block)
         b.position_at_end(block)
-        b.call(tile, arguments)
+        code.call(tile, arguments)
         b.branch(end)
     b.position_at_end(end)
 
@@ -317,7 +311,7 @@ class DigitRows(Rows):
         return ProductSize(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[ir.Function]:
         return [write_sums(module, wide)]
 
     @staticmethod
@@ -331,129 +325,120 @@ class DigitRows(Rows):
             for lane in range(LANES)
         ]
 
-    def stored(self, n: Value, vector: int) -> list[Value]:
+    def stored(self, n: Operand, vector: int) -> list[Operand]:
         code, grid, count = self.code, self.grid, digits_of(self.grid)
-        row = code.integer(self.size(grid, self.vectors, 1).row)
-        at = code.address(self.rows, code.builder.mul(n, row))
+        at = code.address(self.rows, n * self.size(grid, self.vectors, 1).row)
         found = [code.zero] * grid.words
         for j in range(count):
             exponent = _HEAD - BITS * (j + 1)
             digit = code.load(at, LANES * (_BEFORE + count * (1 + vector) + j))
-            value = code.multiply(digit, code.constant(2.0**exponent))
+            value = digit * 2.0**exponent
             k = min(max(0, -(exponent // grid.bits) - 1), grid.words - 1)  # the first word whose unit is no larger
             if k:  # what is large beside that unit goes to the word before
                 big = code.constant(grid.centre(k - 1))
-                high = code.subtract(code.add(value, big), big)
-                found[k - 1] = code.add(found[k - 1], high)
-                value = code.subtract(value, high)
-            found[k] = code.add(found[k], value)
+                high = value + big - big
+                found[k - 1] += high
+                value -= high
+            found[k] += value
         return found
 
-    def begin(self, y: list[Value], wide: Value) -> Value:
+    def begin(self, y: list[Operand], wide: Operand) -> Operand:
         return self.keep(0, y, self.code.integer(0), wide)[2]
 
-    def keep(self, n: Index, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
-        code, b, grid = self.code, self.code.builder, self.grid
+    def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
+        code, grid = self.code, self.grid
         for place, word in enumerate(y):
             wide = self.watch(wide, word, place % grid.words, grid.most_bits(place % grid.words))
-        count, start = digits_of(grid), b.mul(code.integer(n), code.integer(self.size(grid, self.vectors, 1).row))
+        count, start = digits_of(grid), code.integer(n) * self.size(grid, self.vectors, 1).row
         at = code.address(self.rows, start)
         for part, words in enumerate(self.sides(y)):
             for j, digit in enumerate(self._digits(words)):
                 code.store(digit, at, LANES * (_BEFORE + part * count + j))
         # |y| < 2^(e + 1), in bits of a double
-        size = b.bitcast(self.largest_sum(y), INT)
-        exponent = b.sub(b.lshr(size, code.integer(52)), code.integer(1023))
-        z = b.sdiv(self._larger(b.sub(code.integer(_HEAD - 4), exponent), code.integer(0)), code.integer(BITS))
-        z = self._smaller(z, code.integer(count - 1))
+        size = self.largest_sum(y).bits()
+        exponent = size.unsigned_shift(52) - 1023
+        z = code.smaller(code.larger(_HEAD - 4 - exponent, 0) // BITS, count - 1)
         self._put_place(n, z)
-        return y, self._larger(z, zeros), wide
+        return y, code.larger(z, zeros), wide
 
-    def _put_place(self, n: Index, z: Value) -> None:
-        code, b = self.code, self.code.builder
-        row = code.integer(self.size(self.grid, self.vectors, 1).row)
-        b.store(z, code.address(self.places, n))
-        place = b.add(b.mul(code.integer(n), row), b.mul(z, code.integer(LANES)))
-        b.store(place, code.address(self._where, n))
+    def _put_place(self, n: Index, z: Operand) -> None:
+        code = self.code
+        row = self.size(self.grid, self.vectors, 1).row
+        code.store_one(z, self.places, n)
+        code.store_one(code.integer(n) * row + z * LANES, self._where, n)
 
     @property
-    def _where(self) -> Value:
+    def _where(self) -> Operand:
         return self.code.address(self.places, self.orders)
 
-    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
-        code, b, count = self.code, self.code.builder, digits_of(self.grid)
+    def products(self, n: Operand, zeros: Operand, vector: int) -> list[Operand]:
+        code, count = self.code, digits_of(self.grid)
         level = self._level(n, zeros)
         for k in range(count + 1):
             code.store(code.zero, self.sums, LANES * k)
-        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        row = self.size(self.grid, self.vectors, 1).row
         first = code.address(self.rows, LANES * (_BEFORE + count * (1 + vector)))
-        right = code.address(self.rows, b.add(b.mul(n, row), code.integer(LANES * _BEFORE)))
+        right = code.address(self.rows, n * row + LANES * _BEFORE)
         arguments = [
             first,
-            code.address(right, b.mul(level, code.integer(LANES))),
+            code.address(right, level * LANES),
             self._where,
-            b.add(n, code.integer(1)),
-            b.sub(code.integer(count), level),
-            code.address(self.sums, b.mul(level, code.integer(LANES))),
+            n + 1,
+            count - level,
+            code.address(self.sums, level * LANES),
         ]
-        b.call(self.kernels[0], arguments)
+        code.call(self.kernels[0], arguments)
         return self._words([code.load(self.sums, LANES * k) for k in range(count + 1)])
 
-    def _level(self, n: Value, most: Value) -> Value:
+    def _level(self, n: Operand, most: Operand) -> Operand:
         """s; where some z(m) exceeds s + 2, it counts as s + 2, so that s is looked for again."""
         code, b = self.code, self.code.builder
         before, search = b.block, b.append_basic_block("level")
         b.branch(search)
         b.position_at_end(search)
-        largest = b.phi(INT)
-        largest.add_incoming(most, before)
-        half = b.add(b.ashr(n, code.integer(1)), code.integer(1))
+        largest = code.phi(INT)
+        code.arrive([largest], [most], before)
+        half = (n >> 1) + 1
 
-        def lower(m: Value, values: list[Value]) -> list[Value]:
-            pair = [b.load(code.address(self.places, k)) for k in (m, b.sub(n, m))]
-            return [self._smaller(values[0], b.add(*pair))]
+        def lower(m: Operand, values: list[Operand]) -> list[Operand]:
+            one, other = (code.load_one(self.places, k) for k in (m, n - m))
+            return [code.smaller(values[0], one + other)]
 
         level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
-        limit = b.add(level, code.integer(_BEFORE))
+        limit = level + _BEFORE
         again, found = b.append_basic_block("again"), b.append_basic_block("found")
-        b.cbranch(b.icmp_signed(">", largest, limit), again, found)
+        b.cbranch(largest > limit, again, found)
         b.position_at_end(again)
 
-        def clip(m: Value, _: list[Value]) -> None:
-            self._put_place(m, self._smaller(b.load(code.address(self.places, m)), limit))
+        def clip(m: Operand, _: list[Operand]) -> None:
+            self._put_place(m, code.smaller(code.load_one(self.places, m), limit))
 
-        code.loop(0, b.add(n, code.integer(1)), clip, [])
-        largest.add_incoming(limit, b.block)
+        code.loop(0, n + 1, clip, [])
+        code.arrive([largest], [limit])
         b.branch(search)
         b.position_at_end(found)
         return level
 
-    def _smaller(self, a: Value, c: Value) -> Value:
-        return self.code.builder.select(self.code.builder.icmp_signed("<", a, c), a, c)
-
-    def _larger(self, a: Value, c: Value) -> Value:
-        return self.code.builder.select(self.code.builder.icmp_signed(">", a, c), a, c)
-
-    def _digits(self, words: list[Value]) -> list[Value]:
+    def _digits(self, words: list[Operand]) -> list[Operand]:
         """The digits of words, the last rounded."""
         code, grid, count = self.code, self.grid, digits_of(self.grid)
-        found: list[Value] = [None] * count
+        found: list[Any] = [None] * count
         for k, word in enumerate(words):
             rest = _times(code, word, _raised(grid))
             for j in range(self._first_digit(k), count):
                 exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
                 piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
-                found[j] = piece if found[j] is None else code.add(found[j], piece)
+                found[j] = piece if found[j] is None else found[j] + piece
                 if exact:
                     break
-                rest = code.subtract(rest, piece)
+                rest -= piece
         carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
         carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
         return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
-    def _carried(self, digit: Value, out: Value, into: Value) -> Value:
-        value = digit if out is None else self.code.subtract(digit, out)
-        return value if into is None else self.code.add(value, into)
+    def _carried(self, digit: Operand, out: Operand | None, into: Operand | None) -> Operand:
+        value = digit if out is None else digit - out
+        return value if into is None else value + into
 
     def _place(self, j: int) -> int:
         """log2 u_j."""
@@ -463,20 +448,20 @@ class DigitRows(Rows):
         """Where the digits of word k begin."""
         return max(0, (_HEAD + self.grid.bits * k + BITS - 2) // BITS - 1)
 
-    def _words(self, sums: list[Value]) -> list[Value]:
+    def _words(self, sums: list[Operand]) -> list[Operand]:
         """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
         code, grid = self.code, self.grid
-        found: list[Value] = [None] * grid.words
+        found: list[Any] = [None] * grid.words
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
             rest = _times(code, sums[index], unit + _raised(grid))
             for k in range(min(grid.words - 1, max(0, (3 - unit - SUM_BITS) // grid.bits)), grid.words):
                 exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
                 piece = rest if exact else rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
-                found[k] = piece if found[k] is None else code.add(found[k], piece)
+                found[k] = piece if found[k] is None else found[k] + piece
                 if exact:
                     break
-                rest = code.subtract(rest, piece)
+                rest -= piece
         return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in found]
 
 
@@ -485,11 +470,11 @@ def _raised(grid: Grid) -> int:
     return 500 if grid.total > 800 else 0
 
 
-def _times(code: Code, value: Value, exponent: int) -> Value:
+def _times(code: Code, value: Operand, exponent: int) -> Operand:
     """value 2^exponent."""
     while exponent:
         part = max(-1000, min(1000, exponent))
-        value, exponent = code.multiply(value, code.constant(2.0**part)), exponent - part
+        value, exponent = value * 2.0**part, exponent - part
     return value
 
 
@@ -510,7 +495,7 @@ class WordRows(Rows):
         return ProductSize(row, row * orders, 8 * grid.words, grid.words + 2)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Value]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[ir.Function]:
         return [write_long_kernel(module, grid, row)] if grid.relative else write_kernels(module, grid, row)
 
     @staticmethod
@@ -519,44 +504,41 @@ class WordRows(Rows):
         block = rows[start : start + 8 * grid.words]
         return [exact(block[lane::8]) for lane in range(8)]
 
-    def stored(self, n: Value, vector: int) -> list[Value]:
+    def stored(self, n: Operand, vector: int) -> list[Operand]:
         code, words = self.code, self.grid.words
-        row = code.integer(self.size(self.grid, self.vectors, 1).row)
-        at = code.address(self.rows, code.builder.mul(n, row))
+        at = code.address(self.rows, n * self.size(self.grid, self.vectors, 1).row)
         return [code.load(at, 8 * (words * (1 + vector) + k)) for k in range(words)]
 
-    def begin(self, y: list[Value], wide: Value) -> Value:
-        code = self.code
+    def begin(self, y: list[Operand], wide: Operand) -> Operand:
         self._put(0, y)
-        code.builder.store(code.integer(0), code.address(self.places, 0))
+        self.code.store_one(0, self.places, 0)
         for k in range(1, self.grid.words + 2):
-            code.builder.store(code.integer(_FAR), code.address(self.places, k))
+            self.code.store_one(_FAR, self.places, k)
         return wide
 
-    def keep(self, n: Value, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value, Value]:
-        code, b, words = self.code, self.code.builder, self.grid.words
+    def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
+        code, words = self.code, self.grid.words
         zeros_after = self._leading_zeros(y, zeros)
 
-        def begin(k: Value, _: list[Value]) -> None:
-            b.store(n, code.address(self.places, b.add(k, code.integer(1))))
+        def begin(k: Operand, _: list[Operand]) -> None:
+            code.store_one(n, self.places, k + 1)
 
         # several at once, where the first order is far smaller than the state
         code.loop(zeros, zeros_after, begin, [])
-        folded: list[Value] = []
+        folded: list[Operand] = []
         for v in range(self.vectors):
             one, wide = self._folded(y[words * v : words * (v + 1)], zeros_after, wide)
             folded += one
         self._put(n, folded)
         return folded, zeros_after, wide
 
-    def _put(self, n: Index, y: list[Value]) -> None:
+    def _put(self, n: Index, y: list[Operand]) -> None:
         code = self.code
-        row = code.integer(self.size(self.grid, self.vectors, 1).row)
-        at = code.address(self.rows, code.builder.mul(code.integer(n), row))
+        at = code.address(self.rows, code.integer(n) * self.size(self.grid, self.vectors, 1).row)
         for k, word in enumerate(word for one in self.sides(y) for word in one):
             code.store(word, at, 8 * k)
 
-    def products(self, n: Value, zeros: Value, vector: int) -> list[Value]:
+    def products(self, n: Operand, zeros: Operand, vector: int) -> list[Operand]:
         self.begin_sums()
         self.add_products(n, (self, zeros), (self, zeros), vector)
         return self.end_sums()
@@ -567,92 +549,85 @@ class WordRows(Rows):
             self.code.store(centre, self.sums, 8 * k)
 
     def add_products(
-        self, n: Value, lefts: tuple[WordRows, Value], rights: tuple[WordRows, Value], vector: int
+        self, n: Operand, lefts: tuple[WordRows, Operand], rights: tuple[WordRows, Operand], vector: int
     ) -> None:
         """S += Σ L_m ∘ R_(n−m), L and R each of rows with a number of leading zeros."""
         # for each number u of leading zero words on the left and w on the right, where orders have those
         code, b, words = self.code, self.code.builder, self.grid.words
-        row = self.code.integer(self.size(self.grid, self.vectors, 1).row)
-        one, zero = code.integer(1), code.integer(0)
+        row = self.size(self.grid, self.vectors, 1).row
 
-        def smaller(a: Value, c: Value) -> Value:
-            return b.select(b.icmp_signed("<", a, c), a, c)
+        def place(rows: WordRows, k: Operand) -> Operand:
+            return code.load_one(rows.places, k)
 
-        def larger(a: Value, c: Value) -> Value:
-            return b.select(b.icmp_signed(">", a, c), a, c)
+        def left(u: Operand, _: list[Operand]) -> None:
+            begin, end = place(lefts[0], u), place(lefts[0], u + 1)
 
-        def place(rows: WordRows, k: Value) -> Value:
-            return b.load(code.address(rows.places, k))
-
-        def left(u: Value, _: list[Value]) -> None:
-            begin, end = place(lefts[0], u), place(lefts[0], b.add(u, one))
-
-            def right(w: Value, _: list[Value]) -> None:
-                low = larger(larger(begin, b.add(b.sub(n, place(rights[0], b.add(w, one))), one)), zero)
-                high = smaller(smaller(end, b.add(b.sub(n, place(rights[0], w)), one)), b.add(n, one))
-                count = b.sub(high, low)
-                with b.if_then(b.icmp_signed(">", count, zero)):
-                    at = b.add(b.mul(low, row), b.mul(u, code.integer(8)))
-                    against = b.add(b.mul(b.sub(n, low), row), b.mul(w, code.integer(8)))
-                    skipped = b.add(u, w)
+            def right(w: Operand, _: list[Operand]) -> None:
+                low = code.larger(code.larger(begin, n - place(rights[0], w + 1) + 1), 0)
+                high = code.smaller(code.smaller(end, n - place(rights[0], w) + 1), n + 1)
+                count = high - low
+                with b.if_then(count > 0):
+                    at = low * row + u * 8
+                    against = (n - low) * row + w * 8
+                    skipped = u + w
                     arguments = [
-                        code.address(lefts[0].rows, b.add(at, code.integer(8 * words * (1 + vector)))),
+                        code.address(lefts[0].rows, at + 8 * words * (1 + vector)),
                         code.address(rights[0].rows, against),
                         count,
-                        code.address(self.sums, b.mul(skipped, code.integer(8))),
+                        code.address(self.sums, skipped * 8),
                         self.seen,
                     ]
                     self._call(skipped, arguments)
 
-            code.loop(0, smaller(b.sub(code.integer(words), u), b.add(rights[1], one)), right, [])
+            code.loop(0, code.smaller(words - u, rights[1] + 1), right, [])
 
-        code.loop(0, b.add(lefts[1], one), left, [])
+        code.loop(0, lefts[1] + 1, left, [])
 
-    def end_sums(self) -> list[Value]:
+    def end_sums(self) -> list[Operand]:
         """S as K words, not carried, after a look at each."""
-        code, b, words, seen = self.code, self.code.builder, self.grid.words, self.seen
+        code, words, seen = self.code, self.grid.words, self.seen
         found = [code.load(self.sums, 8 * k) for k in range(words)]
-        watched = Accumulator(code, self.grid, 0, found, b.bitcast(code.load(seen, 0), INT_VECTOR))
+        watched = Accumulator(code, self.grid, 0, found, code.load(seen, 0).bits())
         watched.look_at_all()
-        code.store(b.bitcast(watched.seen, VECTOR), seen, 0)
+        code.store(watched.seen.of_bits(), seen, 0)
         return summed(code, self.grid, found)
 
-    def _call(self, skipped: Value, arguments: list[Value]) -> None:
+    def _call(self, skipped: Operand, arguments: list[Operand]) -> None:
         """The kernel for the levels behind ``skipped`` leading zero words."""
-        b, words = self.code.builder, self.grid.words
+        code, b, words = self.code, self.code.builder, self.grid.words
         if self.grid.relative:
-            b.call(self.kernels[0], [*arguments, b.sub(self.code.integer(words), skipped)])
+            code.call(self.kernels[0], [*arguments, words - skipped])
             return
         end = b.append_basic_block("called")
         switch = b.switch(skipped, end)
         for k in range(words):
             block = b.append_basic_block(f"skipped_{k}")
-            switch.add_case(self.code.integer(k), block)
+            switch.add_case(k, block)
             b.position_at_end(block)
-            b.call(self.kernels[words - 1 - k], arguments)
+            code.call(self.kernels[words - 1 - k], arguments)
             b.branch(end)
         b.position_at_end(end)
 
-    def _leading_zeros(self, y: list[Value], before: Value) -> Value:
+    def _leading_zeros(self, y: list[Operand], before: Operand) -> Operand:
         """How many leading words are 0 in every lane, all but the last at most; never fewer than before."""
-        code, b, words = self.code, self.code.builder, self.grid.words
-        count, only = code.integer(0), ir.Constant(ir.IntType(1), 1)
+        code, words = self.code, self.grid.words
+        count, only = code.integer(0), code.true
         for k in range(words - 1):
             largest = code.absolute(y[k])
             for v in range(1, self.vectors):
                 largest = code.larger(code.absolute(y[words * v + k]), largest)
-            only = b.and_(only, b.fcmp_ordered("==", code.largest(largest), ir.Constant(DOUBLE, 0.0)))
-            count = b.select(only, code.integer(k + 1), count)
-        return b.select(b.icmp_signed(">", count, before), count, before)
+            only &= code.largest(largest) == 0
+            count = code.select(only, k + 1, count)
+        return code.larger(count, before)
 
-    def _folded(self, y: list[Value], zeros: Value, wide: Value) -> tuple[list[Value], Value]:
+    def _folded(self, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand]:
         """Words that count as 0 and are not: added to the first that does not."""
-        code, b = self.code, self.code.builder
+        code = self.code
         found, left = [], code.zero
         for k, word in enumerate(y):
             value = passed_on(code, self.grid, left, word)
             wide = self.watch(wide, value, k, self.grid.most_bits(k))
-            skipped = b.icmp_signed("<", code.integer(k), zeros)
-            found.append(b.select(skipped, code.zero, value))
-            left = b.select(skipped, value, code.zero)
+            skipped = code.integer(k) < zeros
+            found.append(code.select(skipped, code.zero, value))
+            left = code.select(skipped, value, code.zero)
         return found, wide

@@ -20,16 +20,15 @@ from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
     INT_POINTER,
-    INT_VECTOR,
     INTEGERS,
     POINTER,
     VECTOR,
     Code,
     Index,
     Machine,
+    Operand,
     Processor,
     Stepping,
-    Value,
     compiled,
     function,
 )
@@ -92,39 +91,37 @@ class SeriesCode:
     system: System
     vectors: int
     wide: bool
-    made: Value = field(init=False)
     code: Code = field(init=False)
     rows: Rows = field(init=False)
 
-    def write(self) -> Value:
+    def write(self) -> ir.Function:
         """The function."""
         kind = rows_of(self.grid)
         room = most_orders(self.grid) + 2
         row = kind.size(self.grid, self.vectors, 1).row
         kernels = kind.write_kernels(self.module, self.grid, row, self.wide)
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER]
-        self.made, self.code = function(self.module, "series", INT, arguments)
-        state, _, _, rows, sums, places, seen, _, _, result = self.made.args
+        made, self.code = function(self.module, "series", INT, arguments)
+        state, _, _, rows, sums, places, seen, _, _, result = self.code.arguments
         code, b = self.code, self.code.builder
         words = self.grid.words
         y = [code.load(state, 8 * k) for k in range(words * self.vectors)]
         self.rows = kind(code, self.grid, self.vectors, room, rows, sums, places, seen, kernels)
         code.store(code.zero, seen, 0)
         orders, small, wide, total = self._orders(y)
-        bits = b.and_(code.any_bit(b.bitcast(code.load(seen, 0), INT_VECTOR)), code.integer(EXPONENT_BITS))
-        in_range = b.icmp_signed("==", bits, code.integer(0))
-        quiet = b.and_(in_range, b.fcmp_ordered("<", code.largest(wide), ir.Constant(DOUBLE, 1.0)))
-        settled = b.icmp_signed(">=", small, code.integer(2))
+        bits = code.any_bit(code.load(seen, 0).bits()) & EXPONENT_BITS
+        quiet = (bits == 0) & (code.largest(wide) < 1)
+        settled = small >= 2
         for v in range(self.vectors):
             one = total[words * v : words * (v + 1)]
             one = carried(code, self.grid, carried(code, self.grid, one))
             for k, word in enumerate(one):
                 code.store(word, result, 8 * (words * v + k))
-        found = b.select(settled, orders, code.integer(UNSETTLED))
-        b.ret(b.select(quiet, found, code.integer(FIRED)))
-        return self.made
+        found = code.select(settled, orders, UNSETTLED)
+        b.ret(code.select(quiet, found, FIRED))
+        return made
 
-    def _orders(self, first: list[Value]) -> tuple[Value, Value, Value, list[Value]]:
+    def _orders(self, first: list[Operand]) -> tuple[Operand, Operand, Operand, list[Operand]]:
         """The loop over orders: their number, how many were small at the end, the largest word, the sum."""
         code, b = self.code, self.code.builder
         wide_before = self.rows.begin(first, code.zero)
@@ -132,41 +129,37 @@ class SeriesCode:
         head, body, out = (b.append_basic_block(name) for name in ("orders", "order", "summed"))
         b.branch(head)
         b.position_at_end(head)
-        n, zeros, small = (b.phi(INT) for _ in range(3))
-        wide = b.phi(VECTOR)
-        y, total = ([b.phi(VECTOR) for _ in first] for _ in range(2))
+        n, zeros, small = (code.phi(INT) for _ in range(3))
+        wide = code.phi(VECTOR)
+        y, total = ([code.phi(VECTOR) for _ in first] for _ in range(2))
         floating = range(self.grid.words - 1, len(first), self.grid.words) if not self.grid.whole else ()
-        rest = {k: b.phi(VECTOR) for k in floating}
+        rest = {k: code.phi(VECTOR) for k in floating}
         carried = [n, zeros, small, wide, *y, *total, *rest.values()]
         begin = [code.integer(0)] * 3 + [wide_before, *first, *first, *(code.zero for _ in rest)]
-        for phi, value in zip(carried, begin, strict=True):
-            phi.add_incoming(value, entry)
-        more = b.icmp_signed("<", n, code.integer(most_orders(self.grid)))
-        b.cbranch(b.and_(more, b.icmp_signed("<", small, code.integer(2))), body, out)
+        code.arrive(carried, begin, entry)
+        b.cbranch((n < most_orders(self.grid)) & (small < 2), body, out)
         b.position_at_end(body)
-        after = b.add(n, code.integer(1))
+        after = n + 1
         found, wide_after = self._order(n, zeros, wide, y)
         following, zeros_after, wide_after = self.rows.keep(after, found, zeros, wide_after)
         size = self.rows.largest_sum(following)
-        limit = ir.Constant(DOUBLE, self.grid.smallest)
-        counted = b.add(small, code.integer(1))
-        small_after = b.select(b.fcmp_ordered("<=", size, limit), counted, code.integer(0))
-        sums = [code.add(a, c) for a, c in zip(total, following, strict=True)]
+        counted = small + 1
+        small_after = code.select(size <= self.grid.smallest, counted, 0)
+        sums = [a + c for a, c in zip(total, following, strict=True)]
         lost = []
         for k, before in rest.items():
             sums[k], error = code.two_sum(total[k], following[k])
-            lost.append(code.add(before, error))
+            lost.append(before + error)
         values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
-        for phi, value in zip(carried, values, strict=True):
-            phi.add_incoming(value, b.block)
+        code.arrive(carried, values)
         b.branch(head)
         b.position_at_end(out)
-        return n, small, wide, [code.add(word, rest[k]) if k in rest else word for k, word in enumerate(total)]
+        return n, small, wide, [word + rest[k] if k in rest else word for k, word in enumerate(total)]
 
-    def _order(self, n: Value, zeros: Value, wide: Value, y: list[Value]) -> tuple[list[Value], Value]:
+    def _order(self, n: Operand, zeros: Operand, wide: Operand, y: list[Operand]) -> tuple[list[Operand], Operand]:
         """y_(n+1) and the largest word over its limit."""
         words = self.grid.words
-        found: list[Value] = []
+        found: list[Operand] = []
         for v in range(self.vectors):
             products = self.rows.products(n, zeros, v)
             rates, wide = self._rates(v, products, y[words * v : words * (v + 1)], wide)
@@ -175,19 +168,21 @@ class SeriesCode:
             found += quotient
         return found, wide
 
-    def _rates(self, vector: int, sums: list[Value], y: list[Value], wide: Value) -> tuple[list[Value], Value]:
+    def _rates(
+        self, vector: int, sums: list[Operand], y: list[Operand], wide: Operand
+    ) -> tuple[list[Operand], Operand]:
         """A ∘ gathered S + Σ B ∘ permuted y, and the largest word."""
         grid, gathered = self.grid, self._gathered(carried(self.code, self.grid, sums))
         wide = self.rows.watch(wide, gathered[0], 0, grid.most_bits(0))
         total = self._bounded_rates(vector, gathered, y) if grid.bounded else self._watched_rates(vector, gathered, y)
         return carried(self.code, grid, total), wide
 
-    def _constants(self, row: int) -> list[Value]:
+    def _constants(self, row: int) -> list[Operand]:
         """The words of a row of the constants."""
         words = self.grid.words
-        return [self.code.load(self.made.args[1], 8 * (words * row + i)) for i in range(words)]
+        return [self.code.load(self.code.arguments[1], 8 * (words * row + i)) for i in range(words)]
 
-    def _bounded_rates(self, vector: int, gathered: list[Value], y: list[Value]) -> list[Value]:
+    def _bounded_rates(self, vector: int, gathered: list[Operand], y: list[Operand]) -> list[Operand]:
         code, grid, (permutations, second) = self.code, self.grid, beside(self.system)
         place = (1 + len(permutations)) * vector
         found = bounded_product(code, grid, self._constants(place), gathered)
@@ -198,29 +193,31 @@ class SeriesCode:
             linear = bounded_product(code, grid, self._constants(place + k), moved)
             if second:
                 parts = [[code.shuffle(word, code.zero, half) for half in _HALVES] for word in linear]
-                linear = [code.add(one, other) for one, other in parts]
+                linear = [one + other for one, other in parts]
             if k > 1:  # sums of more products than two beside the first would outgrow their words
                 found = carried(code, grid, found)
-            found = [code.add(a, b) for a, b in zip(found, linear, strict=True)]
+            found = [a + b for a, b in zip(found, linear, strict=True)]
         return found
 
-    def _watched_rates(self, vector: int, gathered: list[Value], y: list[Value]) -> list[Value]:
-        code, b, grid, seen = self.code, self.code.builder, self.grid, self.made.args[6]
-        gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
+    def _watched_rates(self, vector: int, gathered: list[Operand], y: list[Operand]) -> list[Operand]:
+        code, grid, seen = self.code, self.grid, self.code.arguments[6]
+        gathered_bits = code.load(seen, 0).bits()
         result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
         for factors, source in self.sources(vector, gathered, y):
             result.add_product(factors, source, each=True, below=not grid.whole)
         result.look_at_all()
-        code.store(b.bitcast(result.seen, VECTOR), seen, 0)
+        code.store(result.seen.of_bits(), seen, 0)
         return summed(code, grid, result.sums)
 
-    def sources(self, vector: int, gathered: list[Value], y: list[Value]) -> list[tuple[list[Value], list[Value]]]:
+    def sources(
+        self, vector: int, gathered: list[Operand], y: list[Operand]
+    ) -> list[tuple[list[Operand], list[Operand]]]:
         """The words of A and each B, and what they are multiplied by."""
         linear = turned(self.system)
         sources = [gathered, *([self.code.shuffle(word, self.code.zero, lanes) for word in y] for lanes in linear)]
         return [(self._constants((1 + len(linear)) * vector + k), source) for k, source in enumerate(sources)]
 
-    def _gathered(self, total: list[Value]) -> list[Value]:
+    def _gathered(self, total: list[Operand]) -> list[Operand]:
         code, zero = self.code, self.code.zero
         found = []
         for word in total:
@@ -229,51 +226,50 @@ class SeriesCode:
                 for column in GATHERED
             ]
             third, fourth = (code.constant([*(sign for _, sign in column), 0, 0]) for column in GATHERED[2:])
-            others = code.fma(parts[3], fourth, code.multiply(parts[2], third))
-            found.append(code.add(code.add(parts[0], parts[1]), others))
+            others = code.fma(parts[3], fourth, parts[2] * third)
+            found.append(parts[0] + parts[1] + others)
         return found
 
-    def _raised(self, words: list[Value], wide: Value) -> tuple[list[Value], Value]:
+    def _raised(self, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
         """Multiplied by 16 as often as is asked; seldom at all."""
-        code, sixteen = self.code, self.code.constant(16.0)
 
-        def once(_: Value, values: list[Value]) -> list[Value]:
-            products = [code.multiply(word, sixteen) for word in values[:-1]]
+        def once(_: Operand, values: list[Operand]) -> list[Operand]:
+            products = [word * 16.0 for word in values[:-1]]
             widest = values[-1]
             for k, word in enumerate(products):
                 widest = self.rows.watch(widest, word, k)
-            return [*carried(code, self.grid, products), widest]
+            return [*carried(self.code, self.grid, products), widest]
 
-        values = code.loop(0, self.made.args[8], once, [*words, wide])
+        values = self.code.loop(0, self.code.arguments[8], once, [*words, wide])
         return values[:-1], values[-1]
 
-    def _times(self, words: list[Value]) -> list[Value]:
+    def _times(self, words: list[Operand]) -> list[Operand]:
         """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
         code, found, left = self.code, [], None
-        factor = code.spread(self.made.args[7])
+        factor = code.spread(self.code.arguments[7])
         for k, word in enumerate(words):
             big = code.constant(self.grid.centre(k))
-            high = code.subtract(code.fma(word, factor, big), big)
-            low = code.fma(word, factor, code.negative(high))
+            high = code.fma(word, factor, big) - big
+            low = code.fma(word, factor, -high)
             found.append(high if left is None else passed_on(code, self.grid, left, high))
             left = low
         return found
 
-    def _divided(self, n: Value, words: list[Value], wide: Value) -> tuple[list[Value], Value]:
+    def _divided(self, n: Operand, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
         """Divided by n + 1, digit by digit: each remainder is exact and goes to the next word."""
-        code, b = self.code, self.code.builder
-        after = b.sitofp(b.add(n, code.integer(1)), DOUBLE)
-        divisor, inverse = code.spread(after), code.spread(b.load(code.address(self.made.args[2], n)))
-        found, rest = [], None
+        code = self.code
+        after = (n + 1).to_double()
+        divisor, inverse = code.spread(after), code.spread(code.load_one(self.code.arguments[2], n))
+        found, rests = [], list[Operand]()
         for k, word in enumerate(words):
-            value = word if rest is None else passed_on(code, self.grid, rest, word)
+            value = passed_on(code, self.grid, rests[-1], word) if rests else word
             wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else WIDEST)
             big = code.constant(self.grid.centre(k))
-            quotient = code.subtract(code.fma(value, inverse, big), big)
-            rest = code.fma(code.negative(quotient), divisor, value)
+            quotient = code.fma(value, inverse, big) - big
+            rests.append(code.fma(-quotient, divisor, value))
             found.append(quotient)
         if not self.grid.whole:
-            found[-1] = code.fma(rest, inverse, found[-1])
+            found[-1] = code.fma(rests[-1], inverse, found[-1])
         return found, wide
 
 
@@ -303,46 +299,46 @@ def samples_at_once(grid: Grid) -> int:
     return max(1, _WORDS_AT_ONCE // grid.words)
 
 
-def write_samples(module: ir.Module, grid: Grid, vectors: int) -> Value:
+def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
     """Write ``samples(rows, order, at, first, last, result)``: from the first sample to before the last.
 
     rows: those of ``series``, and order what it gave.  at: K words of x for each sample, |x| at most 1, word 1 and on
     rounded.  result: a row of :func:`sample_row` for each.
     """
     made, code = function(module, "samples", ir.VoidType(), [POINTER, INT, POINTER, INT, INT, POINTER])
-    coefficients, order, at, first, last, result = made.args
-    b, words, count = code.builder, grid.words, samples_at_once(grid)
-    kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, None, None, None, [])
+    coefficients, order, at, first, last, result = code.arguments
+    words, count, null = grid.words, samples_at_once(grid), code.null
+    kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, null, null, null, [])
     width = words * vectors + 1
 
-    def several(block: Value, _: list[Value]) -> None:
-        begin = b.add(first, b.mul(block, code.integer(count)))
-        places = [code.least(b.add(begin, code.integer(i)), b.sub(last, code.integer(1))) for i in range(count)]
-        starts = [code.address(at, b.mul(place, code.integer(words))) for place in places]
-        x = [[code.spread(b.load(code.address(start, k))) for k in range(words)] for start in starts]
+    def several(block: Operand, _: list[Operand]) -> None:
+        begin = first + block * count
+        places = [code.smaller(begin + i, last - 1) for i in range(count)]
+        starts = [code.address(at, place * words) for place in places]
+        x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in starts]
 
-        def term(k: Value, values: list[Value]) -> list[Value]:
-            rows, found = [kept.stored(b.sub(order, k), v) for v in range(vectors)], []
+        def term(k: Operand, values: list[Operand]) -> list[Operand]:
+            rows, found = [kept.stored(order - k, v) for v in range(vectors)], []
             for i in range(count):
                 sums, largest = [], values[width * (i + 1) - 1]
                 for v, row in enumerate(rows):
                     place = width * i + words * v
                     product = bounded_product(code, grid, x[i], values[place : place + words])
-                    total = carried(code, grid, [code.add(one, other) for one, other in zip(product, row, strict=True)])
+                    total = carried(code, grid, [one + other for one, other in zip(product, row, strict=True)])
                     largest = code.larger(code.absolute(total[0]), largest)
                     sums += total
                 found += [*sums, largest]
             return found
 
-        values = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * (width * count))
+        values = code.loop(0, order + 1, term, [code.zero] * (width * count))
         for i, place in enumerate(places):
-            row = code.address(result, b.mul(place, code.integer(8 * width)))
+            row = code.address(result, place * (8 * width))
             for index, value in enumerate(values[width * i : width * (i + 1)]):
                 code.store(value, row, 8 * index)
 
-    blocks = b.sdiv(b.add(b.sub(last, first), code.integer(count - 1)), code.integer(count))
+    blocks = (last - first + (count - 1)) // count
     code.loop(0, blocks, several, [])
-    b.ret_void()
+    code.builder.ret_void()
     return made
 
 
@@ -393,72 +389,68 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
 class _Advance(Stepping):
     """Writes ``advance``."""
 
-    def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Value) -> None:
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: ir.Function) -> None:
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, POINTER, POINTER, INT_POINTER, INT]
         self.made, code = function(module, "advance", INT, arguments)
-        self.scratch, self.result = self.made.args[:7], self.made.args[7]
-        clock, counts, most = self.made.args[8:]
+        self.scratch, self.result = code.arguments[:7], code.arguments[7]
+        clock, counts, most = code.arguments[8:]
         super().__init__(code, clock, counts, most, STATUS)
         self.grid, self.size, self.series = grid, grid.words * vectors, series
 
-    def covered(self) -> Value:
-        return self.code.builder.fcmp_ordered(">=", self.time(TIME), self.time(TARGET))
+    def covered(self) -> Operand:
+        return self.time(TIME) >= self.time(TARGET)
 
-    def write_step(self) -> Value:
+    def write_step(self) -> Operand:
         """One step; whether it stands."""
         code, b = self.code, self.code.builder
         halvings = self.count(HALVINGS)
-        length = _power(code, halvings)
-        exponent = b.sub(self.count(EXCESS), halvings)
-        raises = b.ashr(b.add(exponent, code.integer(3)), code.integer(2))
-        raises = b.select(b.icmp_signed(">", raises, code.integer(0)), raises, code.integer(0))
-        rest = b.sub(b.shl(raises, code.integer(2)), exponent)
-        factor = b.fmul(self.time(SIGN), _power(code, rest))
-        orders = b.call(self.series, [*self.scratch, factor, raises, self.result])
-        good = b.icmp_signed(">=", orders, code.integer(0))
+        length = _power(halvings)
+        exponent = self.count(EXCESS) - halvings
+        raises = code.larger((exponent + 3) >> 2, 0)
+        rest = (raises << 2) - exponent
+        factor = self.time(SIGN) * _power(rest)
+        orders = code.call(self.series, [*self.scratch, factor, raises, self.result])
+        good = orders >= 0
         time = self.time(TIME)
-        after = b.fadd(time, length)
-        moves = b.fcmp_ordered("==", b.fsub(after, time), length)
-        good = b.and_(good, moves)
+        after = time + length
+        moves = after - time == length
+        good &= moves
         with b.if_then(good):
             for k in range(self.size):
                 code.store(code.load(self.scratch[0], 8 * k), self.result, 8 * (self.size + k))
                 code.store(code.load(self.result, 8 * k), self.scratch[0], 8 * k)
-            b.store(time, code.address(self.clock, BEGAN))
-            b.store(after, code.address(self.clock, TIME))
+            code.store_one(time, self.clock, BEGAN)
+            code.store_one(after, self.clock, TIME)
             self.set_count(orders, ORDERS)
-        with b.if_then(b.not_(good)):
-            self.set_count(b.add(self.count(REDONE), code.integer(1)), REDONE)
-            exhausted = b.icmp_signed(">=", halvings, self.count(MOST))
-            status = b.select(exhausted, code.integer(CAPACITY), code.integer(FINE))
-            self.set_count(b.select(moves, status, code.integer(TOO_SMALL)), STATUS)
+        with b.if_then(~good):
+            self.set_count(self.count(REDONE) + 1, REDONE)
+            exhausted = halvings >= self.count(MOST)
+            status = code.select(exhausted, CAPACITY, FINE)
+            self.set_count(code.select(moves, status, TOO_SMALL), STATUS)
         self._set_length(good, orders, halvings, length)
         return good
 
-    def _set_length(self, good: Value, orders: Value, halvings: Value, length: Value) -> None:
-        code, b, one = self.code, self.code.builder, self.code.integer(1)
-        few, many = (code.integer(int(share * self.grid.total)) for share in (_FEW_ORDERS, _MANY_ORDERS))
-        doubled = b.fadd(length, length)
-        quotient = b.fdiv(self.time(TIME), doubled)
-        whole = b.sitofp(b.fptosi(quotient, INT), DOUBLE)
-        aligned = b.fcmp_ordered("==", quotient, whole)
-        longer = b.and_(b.and_(good, aligned), b.icmp_signed("<=", orders, few))
-        longer = b.and_(longer, b.icmp_signed(">", halvings, self.count(FEWEST)))
-        shorter = b.or_(b.not_(good), b.icmp_signed(">", orders, many))
-        following = b.select(shorter, b.add(halvings, one), halvings)
-        self.set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
+    def _set_length(self, good: Operand, orders: Operand, halvings: Operand, length: Operand) -> None:
+        few, many = (int(share * self.grid.total) for share in (_FEW_ORDERS, _MANY_ORDERS))
+        doubled = length + length
+        quotient = self.time(TIME) / doubled
+        aligned = quotient == quotient.to_integer().to_double()
+        longer = good & aligned & (orders <= few) & (halvings > self.count(FEWEST))
+        shorter = ~good | (orders > many)
+        following = self.code.select(shorter, halvings + 1, halvings)
+        self.set_count(self.code.select(longer, halvings - 1, following), HALVINGS)
 
 
 class _Follow:
     """Writes ``follow``."""
 
-    def __init__(self, module: ir.Module, grid: Grid, vectors: int, advance: Value, samples: Value) -> None:
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, advance: ir.Function, samples: ir.Function) -> None:
         arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
         kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
-        made, self.code = function(module, "follow", ir.VoidType(), kinds)
+        _, self.code = function(module, "follow", ir.VoidType(), kinds)
         self.grid, self.row, self.functions = grid, sample_row(grid, vectors), (advance, samples)
-        self.arrays, (self.times, self.at, self.progress, *rest) = made.args[:10], made.args[10:]
-        self.count, self.most, self.result = rest
+        self.arrays = self.code.arguments[:10]
+        self.times, self.at, self.progress, self.count, self.most, self.result = self.code.arguments[10:]
 
     def write(self) -> None:
         """The loop over times and steps."""
@@ -467,76 +459,73 @@ class _Follow:
         b.branch(head)
         b.position_at_end(head)
         done, taken = (self._word(self.progress, place) for place in range(2))
-        running = b.icmp_signed("==", self._word(self.arrays[9], STATUS), code.integer(FINE))
-        left = b.and_(b.icmp_signed("<", done, self.count), b.icmp_signed("<", taken, self.most))
-        b.cbranch(b.and_(running, left), inside, out)
+        running = self._word(self.arrays[9], STATUS) == FINE
+        left = (done < self.count) & (taken < self.most)
+        b.cbranch(running & left, inside, out)
         b.position_at_end(inside)
         target = self._word(self.times, done)
-        b.cbranch(b.fcmp_ordered("<=", target, self._clock(TIME)), sample, step)
+        b.cbranch(target <= self._clock(TIME), sample, step)
         b.position_at_end(step)
-        b.store(target, code.address(self.arrays[8], TARGET))
-        more = b.call(self.functions[0], [*self.arrays, b.sub(self.most, taken)])
-        b.store(b.add(taken, more), code.address(self.progress, 1))
+        code.store_one(target, self.arrays[8], TARGET)
+        more = code.call(self.functions[0], [*self.arrays, self.most - taken])
+        code.store_one(taken + more, self.progress, 1)
         b.branch(head)
         b.position_at_end(sample)
         known = self._while(done, self.count, self._is_known)
         order = self._word(self.arrays[9], ORDERS)
-        b.call(self.functions[1], [self.arrays[3], order, self.at, done, known, self.result])
+        code.call(self.functions[1], [self.arrays[3], order, self.at, done, known, self.result])
         good = self._while(done, known, self._is_in_range)
-        b.store(good, code.address(self.progress, 0))
-        b.cbranch(b.icmp_signed(">", good, done), head, out)
+        code.store_one(good, self.progress, 0)
+        b.cbranch(good > done, head, out)
         b.position_at_end(out)
         b.ret_void()
 
-    def _while(self, start: Value, stop: Value, holds: Callable[[Value], Value]) -> Value:
+    def _while(self, start: Operand, stop: Operand, holds: Callable[[Operand], Operand]) -> Operand:
         """The first place from ``start`` on that ``holds`` does not, ``stop`` at the latest."""
-        b = self.code.builder
+        code, b = self.code, self.code.builder
         entry, head, body, out = b.block, *map(b.append_basic_block, ("while", "holds", "so_far"))
         b.branch(head)
         b.position_at_end(head)
-        place = b.phi(INT)
-        place.add_incoming(start, entry)
-        b.cbranch(b.icmp_signed("<", place, stop), body, out)
+        place = code.phi(INT)
+        code.arrive([place], [start], entry)
+        b.cbranch(place < stop, body, out)
         b.position_at_end(body)
-        found, after = holds(place), b.add(place, self.code.integer(1))
-        place.add_incoming(after, b.block)
+        found, after = holds(place), place + 1
+        code.arrive([place], [after])
         b.cbranch(found, head, out)
         b.position_at_end(out)
         return place
 
-    def _is_known(self, place: Value) -> Value:
+    def _is_known(self, place: Operand) -> Operand:
         """Whether a time is in the last step and its words are exact, a bit; puts them.
 
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
-        code, b, grid = self.code, self.code.builder, self.grid
+        code, grid = self.code, self.grid
         time, began, end = self._word(self.times, place), self._clock(BEGAN), self._clock(TIME)
-        rest = b.fdiv(b.fsub(time, began), b.fsub(end, began))
-        zero, one = (ir.Constant(DOUBLE, value) for value in (0.0, 1.0))
-        near = b.fcmp_ordered("<=", time, b.fadd(began, began))
-        known = b.and_(b.fcmp_ordered("<=", time, end), b.or_(near, b.fcmp_ordered("==", began, zero)))
+        rest = (time - began) / (end - began)
+        near = time <= began + began
+        known = (time <= end) & (near | (began == 0))
         for k in range(grid.words):
-            digits = b.fmul(rest, ir.Constant(DOUBLE, 1 / grid.unit(k)))
+            digits = rest * (1 / grid.unit(k))
             low = code.floor(digits)
-            above = b.fcmp_ordered(">=", b.fsub(digits, low), ir.Constant(DOUBLE, 0.5))
-            word = b.fmul(b.fadd(low, b.select(above, one, zero)), ir.Constant(DOUBLE, grid.unit(k)))
-            at = b.add(b.mul(place, code.integer(grid.words)), code.integer(k))
-            b.store(word, code.address(self.at, at))
-            rest = b.fsub(rest, word)
-        return b.and_(known, b.fcmp_ordered("==", rest, zero))
+            above = digits - low >= 0.5
+            word = (low + code.select(above, 1.0, 0.0)) * grid.unit(k)
+            code.store_one(word, self.at, place * grid.words + k)
+            rest -= word
+        return known & (rest == 0)
 
-    def _is_in_range(self, place: Value) -> Value:
+    def _is_in_range(self, place: Operand) -> Operand:
         """Whether the partial sums of a sample were in their range, a bit."""
-        row = self.code.address(self.result, self.code.builder.mul(place, self.code.integer(self.row)))
+        row = self.code.address(self.result, place * self.row)
         largest = self.code.load(row, self.row - 8)
-        limit = self.code.constant(most_of(self.grid))
-        return self.code.all_of(self.code.builder.fcmp_ordered("<=", largest, limit))
+        return self.code.all_of(largest <= most_of(self.grid))
 
-    def _clock(self, place: int) -> Value:
+    def _clock(self, place: int) -> Operand:
         return self._word(self.arrays[8], place)
 
-    def _word(self, array: Value, place: Index) -> Value:
-        return self.code.builder.load(self.code.address(array, place))
+    def _word(self, array: Operand, place: Index) -> Operand:
+        return self.code.load_one(array, place)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:
@@ -545,7 +534,6 @@ def raises_of(exponent: int) -> tuple[float, int]:
     return 2.0 ** (exponent - 4 * raises), raises
 
 
-def _power(code: Code, halvings: Value) -> Value:
+def _power(halvings: Operand) -> Operand:
     """2^-halvings."""
-    b = code.builder
-    return b.bitcast(b.shl(b.sub(code.integer(1023), halvings), code.integer(52)), DOUBLE)
+    return ((1023 - halvings) << 52).of_bits()

@@ -117,7 +117,9 @@ def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in ordered if len(numpy.unique(columns[name])) > 1)[:2]
 
 
-def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: NDArray[np.float64]) -> CellMap | None:
+def cell_map(
+    x: tuple[str, NDArray[np.float64]], y: tuple[str, NDArray[np.float64]], lost: NDArray[np.float64]
+) -> CellMap | None:
     """Medians over at most 24 by 24 cells; cells of single values where there are no more of them.  NaN is left out."""
     kept = numpy.isfinite(lost) & numpy.isfinite(x[1]) & numpy.isfinite(y[1])
     if not kept.any():
@@ -140,7 +142,7 @@ def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: NDArray[np.float64]) 
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
 
-def _edges(values: NDArray[np.float64]) -> Any:
+def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
     single = numpy.unique(values)
     if len(single) > _CELLS:
         return numpy.linspace(single[0], single[-1], _CELLS + 1)

@@ -146,7 +146,7 @@ def _integrals(case: Case) -> tuple[Integral, ...]:
     return holding(case.top, case.start, case.system)
 
 
-def _rounded(numbers: NDArray[np.float64]) -> Any:
+def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
 
     All of them are below 2^53, so that each quotient is the exact number rounded once.
