@@ -10,7 +10,7 @@ from flint import acb, arb, arb_mat
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.hess import Hess, HessPendulum
-from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, RATIO, Segment, System2, Transfer, plan
+from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, Disc, Segment, System2, Transfer, plan
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
@@ -107,12 +107,14 @@ def test_pendulums_swing_turn_over_and_start_from_rest(omega, gamma, turning):
 def test_the_first_terms_left_out_lie_within_the_tail():
     with working_precision(200):
         system = System2(*map(ball, SYSTEM))
-        segment = Segment.of(system, 0.0, 0.4, system.bound(arb(0.4) / RATIO, 0.4))
+        disc = Disc.of(system, 0.0, 0.3)
+        segment = Segment.of(system, disc)
     with working_precision(600):
-        longer = Segment.of(system, 0.0, 0.4, system.bound(arb(0.4) / RATIO, 0.4))
-        for short, long in zip(segment.parts, longer.parts, strict=True):
+        longer = Segment.of(system, disc)
+        largest = segment.growth.upper(), (segment.growth * disc.widest).upper()
+        for short, long, limit in zip(segment.parts, longer.parts, largest * 2, strict=True):
             for order, coefficient in enumerate(long.coeffs()[: 2 * len(short)]):
-                assert abs(coefficient).upper() * RATIO**order <= segment.growth.upper()
+                assert abs(coefficient).upper() * arb(disc.radius) ** order <= limit
                 if order < len(short):
                     assert short[order].overlaps(coefficient)
 
@@ -123,11 +125,11 @@ def test_polynomials_of_bits_that_count_hold_those_of_all_bits():
         with working_precision(900):
             fine = System2(*map(ball, system))
         with working_precision(200):
-            for left, radius, bound in plan(System2(*map(ball, system)))[-2:]:
-                short = Segment.of(System2(*map(ball, system)), left, radius, bound)
+            for disc in plan(System2(*map(ball, system)))[-2:]:
+                short = Segment.of(System2(*map(ball, system)), disc)
                 with working_precision(900):
-                    long = Segment.of(fine, left, radius, bound)
-                for end in (left, left + 2 * radius / RATIO):
+                    long = Segment.of(fine, disc)
+                for end in (disc.left, disc.right):
                     given = short.at(arb(end)).entries()
                     with working_precision(900):
                         true = long.at(arb(end)).entries()
@@ -260,12 +262,14 @@ def test_what_the_plan_of_the_linear_system_counts():
         few, many = (System2(arb(1), arb(2) ** -k, arb(1), arb(2) ** (-k // 2) / 3, arb(1) / 5) for k in (4, 20))
         assert len(plan(few)) < len(plan(many)) < MOST_SEGMENTS
         for system in (few, many):
-            for left, radius, bound in plan(system):
-                # no disc meets a cut, κr is within its limit, and κ is right on the circle
-                assert left * left + float(system.width()) ** 2 > radius * radius
-                assert radius * float(bound) <= 33
-                for entry in system.entries(arb(left) + radius / RATIO + radius * acb(0, 1)):
-                    assert abs(entry) <= bound
+            for disc in plan(system):
+                # no disc holds a zero, κr is within its limit, and κ is right on the circle
+                for zero in (acb(0, 1), ((acb(0, system.width()) - disc.place) / 2).tan()):
+                    assert abs(zero) > disc.radius
+                assert disc.radius * float(disc.steepness) <= 33
+                for z in (acb(0, disc.radius), acb(-disc.radius), acb(disc.radius)):
+                    for entry in system.entries(disc.place + 2 * z.atan()):
+                        assert abs(2 * entry / (1 + z * z)) <= disc.steepness
         with pytest.raises(OutOfReach, match="more than 96 segments"):
             plan(System2(arb(1), arb(2) ** -400, arb(1), arb(2) ** -200, arb(1) / 5))
         with pytest.raises(OutOfReach, match="more than 96 segments"):

@@ -7,54 +7,60 @@ With s = m + d cos θ, ρ² = 2 (E − s), ω = K/ρ² and D = 1/√(2 (top − 
 E and top lie above the gap; b and c are analytic but for cuts upwards from iβ and downwards from −iβ, and the same at
 2π, 4π, ..., where cosh β = (E − m)/d.
 
-*Tail.*  On a disc of radius r < √(x² + β²) about a place x, 0 ≤ x ≤ π, let |b|, |c| ≤ κ: their largest values are on
-its circle, which is covered by balls.  A solution with |u|, |v| ≤ 1 in the middle is analytic in the disc and at most
-e^(κr) (Gronwall's lemma along a radius), so that its Taylor coefficients are at most e^(κr)/r^n, and what follows the
-first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r).  Segments reach r/R to either side of their
-places and grow away from 0 with the discs; where κr is large they are shorter.  There are log(1/β) of them for small β
-(M·γ all but 0) and κ for large κ (moments of very different size): both are counted before any of them is made.
+*Without roots.*  About a place x let z = tan ½(θ − x) and w = 1 + z².  Then ρ² = P/w and 2 (top − s) = Q/w with
+quadratic polynomials P and Q of z, and with U = u √(Pw), V = v √(w/Q), W = v √(P/Q), in derivatives by z,
+
+    u' = K V/P − β W/w
+    U' = ½ (P'/P + w'/w) U + K w W/P − β P V/w
+    V' = ½ (w'/w − Q'/Q) V − (K w u/P + β U/w)/Q
+    W' = ½ (P'/P − Q'/Q) W − (K U/P + β P u/w)/Q
+
+A quotient by a quadratic polynomial takes two products a term, so that L terms take 32 L of them.
+
+*Tail.*  On a disc |z| < r without zeros of P, Q and w let κ be the largest value on its circle of
+
+    |K| √|w|/(|P| √|Q|) + |β| √|P|/(|w| √|Q|),
+
+which bounds |du/dz|/|v| and |dv/dz|/|u| in it, whatever the signs of the roots: a sum of sizes of analytic functions is
+largest on the circle, which is covered by balls.  A solution with |u|, |v| ≤ 1 in the middle is analytic in the disc
+and at most e^(κr) (Gronwall's lemma along a radius), so that its Taylor coefficients are at most e^(κr)/r^n, and what
+follows the first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r); for V that times the largest √|w/Q|.
+Segments reach r/R to either side of their places and grow away from 0 with the discs; where κr is large they are
+shorter.  There are log(1/β) of them for small β (M·γ all but 0) and κ for large κ (moments of very different size):
+both are counted before any of them is made.
 
 *The matrix.*  Y(θ), Y(0) = 1, is the product over segments of 0 ≤ θ ≤ π.  b and c are even, so with J = diag(1, −1)
 Y(−θ) = J Y(θ) J, and the matrix over a period is Y(2π) = J Y(π)⁻¹ J Y(π).  det Y = 1.
 
-*The polynomials.*  In units of the half length r/R of a segment the n-th coefficient is about R^-n, and n log2 R bits
-fewer of it count.  n u_n = Σ_j b_(n−1−j) v_j, and so on.  Terms of the lower half of a range, once known, are
-multiplied into the sums of its upper half all at once, halves of halves likewise: products of polynomials, which cost
-less than their terms one by one.  Every factor is rounded to the bits that count (:func:`_trimmed`), and its ball holds
-what that took away.
+*Bits.*  The n-th term is about R^-n of the first, so that n log2 R fewer bits of it count, and it is computed in these.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import ceil, hypot, log2, pi
+from math import atan, ceil, cos, log2, pi, sin, sinh, sqrt
 from typing import Any
 
-from flint import acb, arb, arb_mat, arb_poly, arb_series
+from flint import acb, arb, arb_mat, arb_poly
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.flint.balls import (
-    Balls,
-    Undecided,
-    current_length,
-    current_precision,
-    series_length,
-    working_precision,
-)
+from heavytop.exact.flint.balls import Undecided, current_precision, working_precision
 
 _RATIO_BITS = 2
 RATIO = 2**_RATIO_BITS
-"""R: how many times a segment's half length the radius of its disc is."""
-_SHARE, _WIDEST = 0.85, 2.0
-"""The radius of a disc over its distance from a cut; its largest."""
+"""R: how many times a segment's half length in z the radius of its disc is."""
+_SHARE, _WIDEST = 0.85, 32.0
+"""The radius of a disc over its distance from the nearest zero; the largest β that this is looked up at."""
 _STEEPEST = 32
 """The largest κr."""
 _ARCS, _BOUND_BITS = 64, 64
+_GUARD, _BLOCK = 32, 16
+"""Bits beyond those that count; terms that are computed in the same bits."""
 MOST_SEGMENTS = 96
-_MOST_WORK, _WORK_BITS = 2048, 256
+_MOST_WORK, _WORK_BITS = 16384, 256
 """Segments times the square of the working precision over so many bits: some 15 s of one core."""
-Matrix = tuple[Any, Any, Any, Any]
+Quadratic = tuple[arb, arb, arb]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,82 +75,124 @@ class System2:
 
     def entries(self, phase: Any) -> tuple[Any, Any]:
         """(b, c) at a number or series, real or complex."""
-        short = _short if isinstance(phase, arb_series) else _same
-        sine = short((phase / 2).sin())
-        lowered = short(4 * self.reach * short(sine * sine))
+        sine = (phase / 2).sin()
+        lowered = 4 * self.reach * sine * sine
         square = 2 * self.energy + lowered
         inverse = square.rsqrt()
-        factor = short((2 * self.top + lowered).rsqrt() * inverse / 2)
-        turning, bending = short(self.torque * inverse), short(self.skew * square)
+        factor = (2 * self.top + lowered).rsqrt() * inverse / 2
+        turning, bending = self.torque * inverse, self.skew * square
         return factor * (turning - bending), -factor * (turning + bending)
+
+    def quadratics(self, place: arb) -> tuple[Quadratic, Quadratic]:
+        """P and Q about a place, by their coefficients of 1, z, z²."""
+        sine, cosine = (place / 2).sin(), (place / 2).cos()
+        lowered = 4 * self.reach * sine**2, 8 * self.reach * sine * cosine, 4 * self.reach * cosine**2
+        first, second = ((2 * x + lowered[0], lowered[1], 2 * x + lowered[2]) for x in (self.energy, self.top))
+        return first, second
 
     def width(self) -> arb:
         """β."""
         return 2 * (self.energy / (2 * self.reach)).sqrt().asinh()
 
-    def bound(self, place: arb, radius: float) -> arb:
-        """κ on the disc; not finite where the disc meets a cut."""
+    def bound(self, place: float, radius: float) -> tuple[arb, arb]:
+        """κ on the disc and the largest √|w/Q|; not finite where a zero all but lies in it."""
         with working_precision(_BOUND_BITS):
-            largest = arb(0)
+            steepness, widest = arb(0), arb(0)
+            # c ((z + b/2c)² + gap): no zero is found where two are near each other
+            shapes = [
+                (c, b / c / 2, 4 * x * (x + 2 * self.reach) / c**2)
+                for x, (_, b, c) in zip((self.energy, self.top), self.quadratics(arb(place)), strict=True)
+            ]
             # an arc of 2π/64 lies in a box of half its length about its middle
             spread = acb(arb(0, radius * pi / _ARCS), arb(0, radius * pi / _ARCS))
             for arc in range(_ARCS):
-                angle = acb(0, 2 * arb.pi() * arc / _ARCS).exp()
-                for entry in self.entries(place + radius * angle + spread):
-                    largest = largest.max(abs(entry).upper())
-            return largest
+                z = radius * acb(0, 2 * arb.pi() * arc / _ARCS).exp() + spread
+                p, q = (abs(c * ((z + shift) ** 2 + gap)) for c, shift, gap in shapes)
+                w = abs(1 + z**2)
+                here = abs(self.torque) * w.sqrt() / p + abs(self.skew) * p.sqrt() / w
+                steepness, widest = steepness.max((here / q.sqrt()).upper()), widest.max((w / q).sqrt().upper())
+            return steepness, widest
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """One about a place, and the segment in it.
+
+    left, right: its ends.  radius: r.  steepness: κ.  widest: the largest √|w/Q|.
+    """
+
+    left: float
+    place: float
+    right: float
+    radius: float
+    steepness: arb
+    widest: arb
+
+    @classmethod
+    def of(cls, system: System2, left: float, radius: float) -> Disc:
+        """The one whose segment begins at ``left``."""
+        place = left + 2 * atan(radius / RATIO)
+        return cls(left, place, 2 * place - left, radius, *system.bound(place, radius))
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Y about one place: polynomials in (θ − place)/half of so many terms.
+    """Y about one place: polynomials in z of so many terms, u and V of its columns.
 
-    half: r/R.  growth: e^(κr).
+    growth: e^(κr).  roots: Q.
     """
 
-    place: arb
-    half: float
+    disc: Disc
     growth: arb
+    roots: Quadratic
     parts: tuple[arb_poly, ...]
 
     @classmethod
-    def of(cls, system: System2, left: float, radius: float, bound: arb) -> Segment:
-        """The segment that begins at ``left``, at the working precision; bound: κ."""
-        place, half = arb(left) + radius / RATIO, radius / RATIO
-        growth = (radius * bound).exp()
-        length = ceil((current_precision() + 8 + log2(float(growth.upper()))) / _RATIO_BITS) + 2
-        return cls(place, half, growth, polynomials(system, place, half, length))
+    def of(cls, system: System2, disc: Disc) -> Segment:
+        """At the working precision."""
+        growth = (disc.radius * disc.steepness).exp()
+        bits = ceil(current_precision() + 8 + log2(float(growth.upper())))
+        length, (first, second) = ceil(bits / _RATIO_BITS) + 2, system.quadratics(arb(disc.place))
+        # u, U, V and W of a solution that begins with (1, 0), and of one with (0, 1)
+        scale, zero = 1 / second[0].sqrt(), arb(0)
+        starts = (arb(1), first[0].sqrt(), zero, zero), (zero, zero, scale, scale * first[0].sqrt())
+        parts = [part for start in starts for part in _series(system, first, second, start, length, bits)]
+        return cls(disc, growth, second, tuple(parts))
 
     def at(self, phase: arb) -> arb_mat:
         """Y(phase) Y(place)⁻¹."""
-        away = (phase - self.place) / self.half
-        size, length = abs(away).upper() / RATIO, len(self.parts[0])
-        tail = arb(0, (self.growth * size**length / (1 - size)).upper()) if size < 1 else arb("nan")
-        one, two, three, four = (part(away) + tail for part in self.parts)
-        return arb_mat([[one, two], [three, four]])
+        z = ((phase - self.disc.place) / 2).tan()
+        size, length = abs(z).upper() / self.disc.radius, len(self.parts[0])
+        tail = (self.growth * size**length / (1 - size)).upper() if size < 1 else arb("nan")
+        a, b, c = self.roots
+        back = ((a + z * (b + z * c)) / (1 + z * z)).sqrt()
+        (u, v), (other_u, other_v) = (
+            (first(z) + arb(0, tail), (second(z) + arb(0, (tail * self.disc.widest).upper())) * back)
+            for first, second in (self.parts[:2], self.parts[2:])
+        )
+        return arb_mat([[u, other_u], [v, other_v]])
 
 
-def plan(system: System2) -> list[tuple[float, float, arb]]:
-    """Where each segment begins, the radius of its disc, and κ there.
+def plan(system: System2) -> list[Disc]:
+    """The discs over 0 ≤ θ ≤ π.
 
     Raises Undecided where the working precision does not suffice, OutOfReach for more than MOST_SEGMENTS.
     """
     width, left = float(system.width().lower()), 0.0
     if not width > 0:
         raise Undecided
-    found: list[tuple[float, float, arb]] = []
+    found: list[Disc] = []
     while left < pi:
-        radius = min(_WIDEST, _SHARE * hypot(left, width))
+        disc = Disc.of(system, left, _SHARE * _distance(left, width))
         while True:
-            bound = system.bound(arb(left) + radius / RATIO, radius)
-            if not bound.is_finite():
+            if not (disc.steepness.is_finite() and disc.widest.is_finite()):
                 raise Undecided
-            steep = float(radius * bound)
+            steep = float(disc.radius * disc.steepness)
             if steep <= _STEEPEST:
                 break
-            radius *= max(_STEEPEST / steep / 2, 2.0**-100)
-        found.append((left, radius, bound))
-        left += 2 * radius / RATIO
+            disc = Disc.of(system, left, disc.radius * max(0.9 * _STEEPEST / steep, 2.0**-100))
+        found.append(disc)
+        left = disc.right
         if len(found) > MOST_SEGMENTS:
             raise OutOfReach(
                 f"The linear system over the period has more than {MOST_SEGMENTS} segments: M·gamma is all but 0, or "
@@ -154,14 +202,19 @@ def plan(system: System2) -> list[tuple[float, float, arb]]:
     return found
 
 
+def _distance(place: float, width: float) -> float:
+    """How far z = 0 is from the nearest zero of P, Q and w; farther away from 0 it is no less."""
+    sine, half = sin(place / 2), sinh(min(width, _WIDEST) / 2)
+    return min(1.0, sqrt((half**2 + sine**2) / (half**2 + cos(place / 2) ** 2)))
+
+
 @dataclass(frozen=True, slots=True)
 class Transfer:
     """Y at any phase.
 
-    lefts: where the segments begin.  before: Y at their places.  period: Y(2π).
+    before: Y at the places of the segments.  period: Y(2π).
     """
 
-    lefts: tuple[float, ...]
     segments: tuple[Segment, ...]
     before: tuple[arb_mat, ...]
     period: arb_mat
@@ -180,15 +233,13 @@ class Transfer:
                 "Ask for fewer digits.",
             )
         now = arb_mat([[1, 0], [0, 1]])
-        lefts, segments, before = [], [], []
-        for left, radius, bound in planned:
-            segment = Segment.of(system, left, radius, bound)
-            right = left + 2 * radius / RATIO
-            lefts.append(left)
+        segments, before = [], []
+        for disc in planned:
+            segment = Segment.of(system, disc)
             segments.append(segment)
-            before.append(_adjugate(segment.at(arb(left))) * now)
-            now = segment.at(arb(right) if right < pi else arb.pi()) * before[-1]
-        return cls(tuple(lefts), tuple(segments), tuple(before), _mirrored(_adjugate(now)) * now)
+            before.append(_adjugate(segment.at(arb(disc.left))) * now)
+            now = segment.at(arb(disc.right) if disc.right < pi else arb.pi()) * before[-1]
+        return cls(tuple(segments), tuple(before), _mirrored(_adjugate(now)) * now)
 
     def at(self, phase: arb, turns: int) -> arb_mat:
         """Y(phase + 2π turns)."""
@@ -209,53 +260,44 @@ class Transfer:
 
     def _inside(self, phase: arb) -> arb_mat:
         """Y at 0 ≤ phase ≤ π, or about there."""
-        number = max(0, bisect_right(self.lefts, float(phase)) - 1)
+        number = max(0, bisect_right(self.segments, float(phase), key=lambda segment: segment.disc.left) - 1)
         return self.segments[number].at(phase) * self.before[number]
 
 
-def polynomials(system: System2, place: arb, half: float, length: int) -> tuple[arb_poly, ...]:
-    """The first ``length`` Taylor coefficients in ε of Y(place + half ε), Y(place) = 1: four polynomials, by rows."""
-    with series_length(length):
-        b, c = (half * entry for entry in system.entries(arb_series([place, half], prec=length)))
-    rates = _trimmed(b.coeffs()), _trimmed(c.coeffs())
-    # by columns: u and v of Y's first, u and v of its second
-    y = [[arb(one)] + [arb(0)] * (length - 1) for one in (1, 0, 0, 1)]
-    _fill(y, [[arb(0)] * length for _ in y], rates, 0, length)
-    return arb_poly(y[0]), arb_poly(y[2]), arb_poly(y[1]), arb_poly(y[3])
-
-
-def _fill(y: list[list[arb]], sums: list[list[arb]], rates: tuple[list[arb], list[arb]], first: int, last: int) -> None:
-    """The terms ``first`` to ``last`` − 1 of u and v, whose ``sums`` hold what the terms before contribute to n u_n."""
-    if last - first == 1:
-        for row, total in zip(y, sums, strict=True):
-            if first:
-                (row[first],) = _trimmed([total[first] / first])
-        return
-    middle = (first + last) // 2
-    _fill(y, sums, rates, first, middle)
-    # the terms that they are multiplied by are about R^-first
-    b, c = (arb_poly(_trimmed(rate[: last - first - 1], first)) for rate in rates)
-    for k, rate in enumerate((b, c, b, c)):
-        # u' = b v and v' = c u
-        product = rate * arb_poly(y[k ^ 1][first:middle])
-        for n in range(middle, last):
-            sums[k][n] += product[n - 1 - first]
-    _fill(y, sums, rates, middle, last)
-
-
-def _short(series: arb_series) -> arb_series:
-    """The series with the bits that count."""
-    return arb_series(_trimmed(series.coeffs()), prec=current_length())
-
-
-def _same(number: Balls) -> Balls:
-    return number
-
-
-def _trimmed(values: list[arb], order: int = 0) -> list[arb]:
-    """Balls around the values with no bits below R^order 2^-precision, or 1/16."""
-    unit = arb(2) ** min(order * _RATIO_BITS, current_precision() - 4)
-    return [value + unit - unit for value in values]
+def _series(
+    system: System2, first: Quadratic, second: Quadratic, start: tuple[arb, ...], length: int, bits: int
+) -> tuple[arb_poly, arb_poly]:
+    """The first ``length`` Taylor coefficients of u and V from (u, U, V, W) at z = 0, the first in ``bits`` bits."""
+    (p, p1, p2), (q, q1, q2) = ((a, b / a, c / a) for a, b, c in (first, second))
+    k_p, k_pq, skew = system.torque / p, system.torque / (p * q), system.skew
+    skew_p, skew_q, skew_pq = skew * p, skew / q, skew * p / q
+    half_p, half_q = p1 / 2, q1 / 2
+    # each behind two zeros: the solution, its quotients by P/p and by w, and what is over Q/q
+    solution = u, _, v, w = tuple([arb(0), arb(0), value] for value in start)
+    over_p = u_p, uu_p, v_p, w_p = tuple([arb(0), arb(0)] for _ in solution)
+    over_w = u_w, uu_w, v_w, w_w = tuple([arb(0), arb(0)] for _ in solution)
+    for_v, for_w = [arb(0), arb(0)], [arb(0), arb(0)]
+    for begin in range(0, length - 1, _BLOCK):
+        with working_precision(max(_BOUND_BITS, bits + _GUARD - _RATIO_BITS * begin)):
+            for n in range(begin, min(begin + _BLOCK, length - 1)):
+                for whole, quotient in zip(solution, over_p, strict=True):
+                    quotient.append(whole[-1] - p1 * quotient[-1] - p2 * quotient[-2])
+                for whole, quotient in zip(solution, over_w, strict=True):
+                    quotient.append(whole[-1] - quotient[-2])
+                own, other = half_q * v[-1] + q2 * v[-2], k_pq * (u_p[-1] + u_p[-3]) + skew_q * uu_w[-1]
+                for_v.append(own + other - q1 * for_v[-1] - q2 * for_v[-2])
+                own, other = half_q * w[-1] + q2 * w[-2], skew_pq * (u_w[-1] + p1 * u_w[-2] + p2 * u_w[-3])
+                for_w.append(own + other + k_pq * uu_p[-1] - q1 * for_w[-1] - q2 * for_w[-2])
+                own, other = half_p * uu_p[-1] + p2 * uu_p[-2], v_w[-1] + p1 * v_w[-2] + p2 * v_w[-3]
+                slopes = (
+                    k_p * v_p[-1] - skew * w_w[-1],
+                    own + uu_w[-2] + k_p * (w_p[-1] + w_p[-3]) - skew_p * other,
+                    v_w[-2] - for_v[-1],
+                    half_p * w_p[-1] + p2 * w_p[-2] - for_w[-1],
+                )
+                for values, slope in zip(solution, slopes, strict=True):
+                    values.append(slope / (n + 1))
+    return arb_poly(u[2:]), arb_poly(v[2:])
 
 
 def _power(matrix: arb_mat, exponent: int) -> arb_mat:
