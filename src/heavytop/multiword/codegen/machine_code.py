@@ -142,6 +142,7 @@ VECTOR = ir.VectorType(DOUBLE, LANES)
 INT_VECTOR = ir.VectorType(INT, LANES)
 POINTER = DOUBLE.as_pointer()
 INT_POINTER = INT.as_pointer()
+_VECTOR_POINTER = VECTOR.as_pointer()
 _INDEX = ir.IntType(32)
 _INDICES = ir.VectorType(_INDEX, LANES)
 _MASK = ir.IntType(LANES)
@@ -154,7 +155,7 @@ def _operator(of_doubles: str, of_integers: str, swapped: bool = False) -> Calla
     def written(self: Operand, other: Number) -> Operand:
         write = getattr(self.builder, of_doubles if _is_double(self.type) else of_integers)
         b = _typed(self.type, other)
-        return Operand(self.builder, write(b, self) if swapped else write(self, b))
+        return Operand(self.builder, write(b, self.raw) if swapped else write(self.raw, b))
 
     return written
 
@@ -162,14 +163,14 @@ def _operator(of_doubles: str, of_integers: str, swapped: bool = False) -> Calla
 def _relation(sign: str) -> Callable[[Operand, Number], Operand]:
     def written(self: Operand, other: Number) -> Operand:
         compare = self.builder.fcmp_ordered if _is_double(self.type) else self.builder.icmp_signed
-        return Operand(self.builder, compare(sign, self, _typed(self.type, other)))
+        return Operand(self.builder, compare(sign, self.raw, _typed(self.type, other)))
 
     return written
 
 
 def _conversion(operation: str, to: ir.Type) -> Callable[[Operand], Operand]:
     def written(self: Operand) -> Operand:
-        return Operand(self.builder, getattr(self.builder, operation)(self, _like(self.type, to)))
+        return Operand(self.builder, getattr(self.builder, operation)(self.raw, _like(self.type, to)))
 
     return written
 
@@ -181,11 +182,10 @@ class Operand:
     of its type.  LLVM's builder takes it as it is.
     """
 
-    __slots__ = ("builder", "get_reference", "raw", "type")
+    __slots__ = ("builder", "raw", "type")
 
     def __init__(self, builder: ir.IRBuilder, raw: ir.Value) -> None:
-        self.builder, self.raw = builder, raw
-        self.type, self.get_reference = raw.type, raw.get_reference
+        self.builder, self.raw, self.type = builder, raw, raw.type
 
     __add__, __radd__ = _operator("fadd", "add"), _operator("fadd", "add", swapped=True)
     __sub__, __rsub__ = _operator("fsub", "sub"), _operator("fsub", "sub", swapped=True)
@@ -202,10 +202,14 @@ class Operand:
     extended = _conversion("zext", INT)  # a flag, to 0 or 1
 
     def __neg__(self) -> Operand:
-        return Operand(self.builder, (self.builder.fneg if _is_double(self.type) else self.builder.neg)(self))
+        return Operand(self.builder, (self.builder.fneg if _is_double(self.type) else self.builder.neg)(self.raw))
 
     def __invert__(self) -> Operand:
-        return Operand(self.builder, self.builder.not_(self))
+        return Operand(self.builder, self.builder.not_(self.raw))
+
+    def get_reference(self) -> str:
+        """As LLVM's builder asks for it."""
+        return str(self.raw.get_reference())
 
     def __bool__(self) -> bool:
         raise TypeError("An operand of the machine code is not known when the code is made.")
@@ -218,7 +222,7 @@ Pair: TypeAlias = tuple[Operand, Operand]
 
 
 def _is_double(kind: ir.Type) -> bool:
-    return bool(getattr(kind, "element", kind) == DOUBLE)
+    return isinstance(getattr(kind, "element", kind), ir.DoubleType)
 
 
 def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
@@ -227,9 +231,9 @@ def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
 
 
 def _typed(kind: ir.Type, value: Number) -> ir.Value:
-    """An operand as it is; a number as a constant of that type."""
-    if not isinstance(value, (int, float)):
-        return value
+    """What LLVM's builder has of an operand; a number as a constant of that type."""
+    if isinstance(value, Operand):
+        return value.raw
     return ir.Constant(kind, float(value) if _is_double(kind) else int(value))
 
 
@@ -250,14 +254,14 @@ class Code:
         """What LLVM's builder made."""
         return Operand(self.builder, raw)
 
-    def _intrinsic(self, name: str, result: ir.Type, arguments: Sequence[Operand]) -> Operand:
+    def _intrinsic(self, name: str, result: ir.Type, arguments: Sequence[ir.Value]) -> Operand:
         known = self.module.globals.get(name)
         function = known or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
-        return self.call(function, arguments)
+        return self.value(self.builder.call(function, arguments))
 
     def call(self, function: ir.Function, arguments: Sequence[Operand]) -> Operand:
         """What a function gives."""
-        return self.value(self.builder.call(function, arguments))
+        return self.value(self.builder.call(function, [argument.raw for argument in arguments]))
 
     def constant(self, value: float | Sequence[float]) -> Operand:
         """The same double in every lane, or eight."""
@@ -271,28 +275,28 @@ class Code:
         """``a`` where a bit is set, else ``b``; both may be numbers, of the type that they have in Python."""
         kind = INT if isinstance(a, int) else DOUBLE
         kinds = [value.type for value in (a, b) if isinstance(value, Operand)] or [_like(condition.type, kind)]
-        return self.value(self.builder.select(condition, _typed(kinds[0], a), _typed(kinds[0], b)))
+        return self.value(self.builder.select(condition.raw, _typed(kinds[0], a), _typed(kinds[0], b)))
 
     def unsigned_less(self, a: Operand, b: int) -> Operand:
         """Whether an integer is less and not negative."""
-        return self.value(self.builder.icmp_unsigned("<", a, _typed(INT, b)))
+        return self.value(self.builder.icmp_unsigned("<", a.raw, _typed(INT, b)))
 
     def fma(self, a: Operand, b: Number, c: Number) -> Operand:
         """a b + c, rounded once."""
         name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
-        return self._intrinsic(name, a.type, (a, _typed(a.type, b), _typed(a.type, c)))
+        return self._intrinsic(name, a.type, (a.raw, _typed(a.type, b), _typed(a.type, c)))
 
     def multiply_add(self, a: Operand, b: Number, c: Operand) -> Operand:
         """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
-        return self._intrinsic("llvm.fmuladd.v8f64", VECTOR, (a, _typed(VECTOR, b), c))
+        return self._intrinsic("llvm.fmuladd.v8f64", VECTOR, (a.raw, _typed(VECTOR, b), c.raw))
 
     def floor(self, a: Operand) -> Operand:
         """The largest integer that is not above a double, a double."""
-        return self._intrinsic("llvm.floor.f64", DOUBLE, (a,))
+        return self._intrinsic("llvm.floor.f64", DOUBLE, (a.raw,))
 
     def absolute(self, a: Operand) -> Operand:
         """|a|."""
-        return self._intrinsic("llvm.fabs.v8f64", VECTOR, (a,))
+        return self._intrinsic("llvm.fabs.v8f64", VECTOR, (a.raw,))
 
     def larger(self, a: Operand, b: Number) -> Operand:
         """max(a, b) lane by lane, for numbers that are not NaN."""
@@ -304,7 +308,7 @@ class Code:
 
     def largest(self, a: Operand) -> Operand:
         """The largest |lane|, a double; NaN lanes are passed over."""
-        return self._intrinsic("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a),))
+        return self._intrinsic("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a).raw,))
 
     def finite(self, a: Operand) -> Operand:
         """Whether every lane is a finite number, a bit."""
@@ -312,28 +316,28 @@ class Code:
 
     def all_of(self, bits: Operand) -> Operand:
         """Whether eight bits are set, a bit."""
-        return self.value(self.builder.bitcast(bits, _MASK)) == (1 << LANES) - 1
+        return self.value(self.builder.bitcast(bits.raw, _MASK)) == (1 << LANES) - 1
 
     def any_of(self, bits: Operand) -> Operand:
         """Whether one of eight bits is set, a bit."""
-        return self.value(self.builder.bitcast(bits, _MASK)) != 0
+        return self.value(self.builder.bitcast(bits.raw, _MASK)) != 0
 
     def any_bit(self, a: Operand) -> Operand:
         """The bits that are set in any lane of eight integers, an integer."""
-        return self._intrinsic("llvm.vector.reduce.or.v8i64", INT, (a,))
+        return self._intrinsic("llvm.vector.reduce.or.v8i64", INT, (a.raw,))
 
     def shuffle(self, a: Operand, b: Operand, lanes: Sequence[int]) -> Operand:
         """Lanes 0 to 7 of ``a`` and 8 to 15 of ``b``, in that order."""
-        return self.value(self.builder.shuffle_vector(a, b.raw, ir.Constant(_INDICES, list(lanes))))
+        return self.value(self.builder.shuffle_vector(a.raw, b.raw, ir.Constant(_INDICES, list(lanes))))
 
     def lane(self, a: Operand, lane: int) -> Operand:
         """One lane, a double."""
-        return self.value(self.builder.extract_element(a, ir.Constant(_INDEX, lane)))
+        return self.value(self.builder.extract_element(a.raw, ir.Constant(_INDEX, lane)))
 
     def spread(self, scalar: Operand) -> Operand:
         """A double in every lane."""
         undefined = ir.Constant(VECTOR, ir.Undefined)
-        first = self.builder.insert_element(undefined, scalar, ir.Constant(_INDEX, 0))
+        first = self.builder.insert_element(undefined, scalar.raw, ir.Constant(_INDEX, 0))
         return self.value(self.builder.shuffle_vector(first, undefined, ir.Constant(_INDICES, [0] * LANES)))
 
     def two_sum(self, a: Operand, b: Operand) -> Pair:
@@ -352,26 +356,28 @@ class Code:
         product = a * b
         return product, self.fma(a, b, -product)
 
+    def _place(self, base: Operand, offset: Index) -> ir.Value:
+        return self.builder.gep(base.raw, [_typed(INT, offset)])
+
     def address(self, base: Operand, offset: Index) -> Operand:
         """Where ``base[offset]`` is."""
-        return self.value(self.builder.gep(base, [_typed(INT, offset)]))
+        return self.value(self._place(base, offset))
 
     def load_one(self, base: Operand, offset: Index) -> Operand:
         """``base[offset]``, a double or an integer."""
-        return self.value(self.builder.load(self.address(base, offset)))
+        return self.value(self.builder.load(self._place(base, offset)))
 
     def store_one(self, value: Number, base: Operand, offset: Index) -> None:
         """Put a double or an integer to ``base[offset]``."""
-        self.builder.store(_typed(base.type.pointee, value), self.address(base, offset))
+        self.builder.store(_typed(base.type.pointee, value), self._place(base, offset))
 
     def load(self, base: Operand, offset: Index) -> Operand:
         """The eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
-        place = self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer())
-        return self.value(self.builder.load(place, align=64))
+        return self.value(self.builder.load(self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64))
 
     def store(self, value: Operand, base: Operand, offset: Index) -> None:
         """Put eight doubles to ``base[offset]`` and on, aligned to 64 bytes."""
-        self.builder.store(value, self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer()), align=64)
+        self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
         """What comes from one block or another."""
