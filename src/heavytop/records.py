@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
 
+from heavytop.errors import quoted
 from heavytop.precision import log10 as log10_of
 
 SCHEMA = "heavytop-report/2"
@@ -420,7 +421,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
         if given != derived:
             for name, old, new in zip(_DERIVED, given, derived, strict=True):
                 if old not in ("", new):
-                    raise ValueError(f"{name} is {old[:60]!r}, where {new[:60]!r} follows")
+                    raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
                 msgspec.structs.force_setattr(self, name, new)
 
     @property

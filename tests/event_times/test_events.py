@@ -188,10 +188,31 @@ def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
 
 
 @pytest.mark.parametrize("digits", [None, 20])
+def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
+    free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
+    for power in range(1, 10):
+        for function, first in ((f"gamma1**{power}", math.pi / 2), (f"gamma2**{power}/gamma1**2", math.pi)):
+            found = ht.events(free, start, 6, function, digits=digits)
+            times = found.times if digits is None else found.times_numpy()
+            expected = np.arange(first, 6, math.pi) if power % 2 else []
+            assert len(times) == len(expected)
+            assert np.allclose(times, expected, rtol=0, atol=1e-13)
+
+
+def test_a_zero_of_third_order_that_is_no_power_is_undecided() -> None:
+    free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))
+    with pytest.raises(OutOfReach, match=r"Near t = 3\.14159265359 .* changes sign or only touches"):
+        ht.events(free, start, 4, "(1 + gamma1)*gamma2", digits=2)
+
+
+@pytest.mark.parametrize("digits", [None, 20])
 def test_a_function_that_is_zero_along_the_motion_is_refused(digits) -> None:
     start = ht.State((0, 0, 1), ("-3/5", "4/5", 0))
     for function in ("omega2", "omega1*gamma2", "gamma1**2 + gamma2**2 = 1", "omega3**2/2 + gamma1 = -1/10"):
         with pytest.raises(InputError, match="is zero along this motion"):
+            ht.events(PENDULUM, start, 10, function, digits=digits)
+    for function in ("gamma1/omega2", "gamma1/(gamma1**2 + gamma2**2 - 1)**2"):
+        with pytest.raises(InputError, match="is divided by 0 along this motion"):
             ht.events(PENDULUM, start, 10, function, digits=digits)
     with pytest.raises(InputError, match="is zero at every sample"):
         ht.events(PENDULUM, start, 10, lambda omega, gamma: abs(omega[1]))

@@ -212,6 +212,19 @@ def test_a_start_of_w_0_has_its_first_component_positive() -> None:
         assert abs(found.quaternions()[0] - [0, 0.6, 0.8, 0]).max() < 1e-15
 
 
+@pytest.mark.parametrize("form", ["double", "extended"])
+def test_components_of_one_size_have_the_sign_of_the_convention(form: str) -> None:
+    """Which of them is the largest hangs on the rounding of the matrix."""
+    free = ht.HeavyTop((3, 2, 1), 0, (0, 0, 0))
+    for q in product((-1, 0, 1), repeat=4):
+        if any(q):
+            still = ht.State((0, 0, 0), attitude=ht.Attitude.quaternion(*q, normalize=True))
+            run = ht.propagate(free, still, [1], form)
+            expected = np.array(q) / np.linalg.norm(q) * next(part for part in q if part)
+            assert abs(run.quaternions()[0] - expected).max() < 1e-15
+            assert abs(np.array(run.texts("quaternion")[0], dtype=float) - expected).max() < 1e-15
+
+
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_euler_angles_of_every_sequence_rebuild_the_matrix(sequence: str, known: Reference) -> None:
     run = ht.propagate(TOP, START, [Fraction(k, 3) for k in range(1, 20)], attitude=True)

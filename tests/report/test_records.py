@@ -82,7 +82,7 @@ def test_a_report_is_a_value_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["system", "precision", "horizon", "measure", "against"])
 def test_what_follows_from_the_key_of_a_row_is_never_another(name: str) -> None:
     known = row()
-    with pytest.raises(ValueError, match=f"{name} is 'another'"):
+    with pytest.raises(ValueError, match=f"{name} = 'another' is not what follows"):
         msgspec.structs.replace(known, **{name: "another"})
     assert msgspec.structs.replace(known, **{name: ""}) == known
     document = msgspec.to_builtins(known)

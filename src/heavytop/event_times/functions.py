@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterator, Sequence, Sized
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -171,12 +171,14 @@ def _require_degree(a: Ratio, b: Ratio) -> None:
 class EventFunction:
     """A function of (Ω, γ).
 
-    name: as it was given, or the callable's.  numerator, denominator: polynomials over the rational numbers without a
-    common factor; None for a callable that is sampled, ``call``.
+    name: as it was given, or the callable's.  numerator, square, denominator: polynomials over the rational numbers,
+    of which it is numerator · square² / denominator, the numerator without a square: it changes sign where this one
+    does.  None for a callable that is sampled, ``call``.
     """
 
     name: str
     numerator: Any = None
+    square: Any = None
     denominator: Any = None
     call: Callable[[Any, Any], Any] | None = None
 
@@ -210,7 +212,16 @@ def event_function(given: Any) -> EventFunction:
     found = found.reduced()
     if found.numerator.is_constant() and found.denominator.is_constant():
         raise InputError(f"The function {quoted(name)} does not depend on the state.", _REMEDY)
-    return EventFunction(name, found.numerator, found.denominator)
+    return EventFunction(name, *_without_square(found.numerator), found.denominator)
+
+
+def _without_square(polynomial: Any) -> tuple[Any, Any]:
+    """(f, g), of which the polynomial is f g² and f has no square."""
+    constant, factors = polynomial.factor_squarefree()
+    rest, square = _context.constant(constant), _context.constant(1)
+    for factor, power in factors:
+        rest, square = rest * factor ** (power % 2), square * factor ** (power // 2)
+    return rest, square
 
 
 def _tried(given: Callable[[Any, Any], Any]) -> Ratio | None:
@@ -289,8 +300,8 @@ def turned(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> Event
         for part in range(2)
         for i in range(3)
     ]
-    numerator, denominator = (each.compose(*forms) for each in (function.numerator, function.denominator))
-    return EventFunction(function.name, numerator, denominator)
+    parts = (function.numerator, function.square, function.denominator)
+    return EventFunction(function.name, *(each.compose(*forms) for each in parts))
 
 
 def terms_of(polynomial: Any) -> list[tuple[tuple[int, ...], fmpq]]:
@@ -342,21 +353,20 @@ def _rational(value: Any) -> fmpq:
 
 
 def start_series(
-    polynomial: Any, system: System, parameters: Parameters, start: Sequence[Fraction]
-) -> Iterator[Fraction]:
-    """The Taylor coefficients of a polynomial along the motion from an exact start, in powers of t, exactly."""
+    polynomials: Sequence[Any], system: System, parameters: Parameters, start: Sequence[Fraction]
+) -> list[list[Fraction]]:
+    """The Taylor coefficients of polynomials along the motion from an exact start, in powers of t, exactly."""
     from heavytop.exact.closed_form import taylor
+    from heavytop.exact.flint.balls import coefficient, series_length
 
     rows = taylor(system.field, parameters, start, _DERIVATIVES)
     y = [[fmpq(v.numerator, v.denominator) / math.factorial(n) for n, v in enumerate(row)] for row in rows]
-    terms = terms_of(polynomial)
-    from heavytop.exact.flint.balls import coefficient, series_length
-
     with series_length(_DERIVATIVES):
         series = [fmpq_series(row, prec=_DERIVATIVES) for row in y]
-        whole = composed(terms, series, fmpq_series([0], prec=_DERIVATIVES))
-        found = [coefficient(whole, n) for n in range(_DERIVATIVES)]
-    return iter([Fraction(int(c.p), int(c.q)) for c in found])
+        zero = fmpq_series([0], prec=_DERIVATIVES)
+        whole = [composed(terms_of(each), series, zero) for each in polynomials]
+        found = [[coefficient(each, n) for n in range(_DERIVATIVES)] for each in whole]
+    return [[Fraction(int(c.p), int(c.q)) for c in each] for each in found]
 
 
 def first_term(
@@ -364,21 +374,24 @@ def first_term(
 ) -> tuple[int, Fraction]:
     """(order, coefficient) of the first term of the numerator along the motion from an exact start.
 
-    Raises InputError where there is none to order 24: such a function is zero along the motion.
+    Raises InputError where the function is zero along the motion to order 24, or what it is divided by is.
     """
     from heavytop.exact.flint.balls import whole_evaluation
 
     @whole_evaluation
-    def series() -> list[Fraction]:
-        return list(start_series(function.numerator, system, parameters, start))
+    def first() -> list[tuple[int, Fraction] | None]:
+        parts = function.numerator, function.square, function.denominator
+        series = start_series(parts, system, parameters, start)
+        return [next(((n, value) for n, value in enumerate(each) if value), None) for each in series]
 
-    for order, value in enumerate(series()):
-        if value:
-            return order, value
+    numerator, square, denominator = first()
+    if numerator is not None and square is not None and denominator is not None:
+        return numerator
+    fault = "is divided by 0" if denominator is None else "is zero"
     raise InputError(
-        f"The function {quoted(function.name)} is zero along this motion: its first {_DERIVATIVES} derivatives at "
+        f"The function {quoted(function.name)} {fault} along this motion: the first {_DERIVATIVES} derivatives at "
         "t = 0 vanish.",
-        "A change of sign needs a function that is not zero all the time; choose another one.",
+        "A change of sign needs a function that is defined and not zero all the time; choose another one.",
     )
 
 

@@ -42,7 +42,7 @@ _EXTRA_BITS = 64
 _SHORT_ORDER, _SHORT_BITS, _WIDE = 28, 96, Fraction(1, 2**10)
 """Over a wider part a polynomial is evaluated by its leading coefficients, in so many bits; the others are a ball."""
 _NARROW = Fraction(1, 2**16)
-"""Over a part that is not wider it is evaluated as it stands."""
+"""Over a part that is not wider it is evaluated as it stands first: near a multiple zero that is too coarse."""
 
 
 class ProvenEvent(NamedTuple):
@@ -99,7 +99,11 @@ class _Piece:
                 self.short[id(what)] = _shortened(what)
             with working_precision(_SHORT_BITS, _SHORT_ORDER + 1):
                 return _range(self.short[id(what)], middle, half)
-        return _range(what, middle, half) if half > _NARROW else what(ball(middle) + arb(0, ball(half).upper()))
+        if half <= _NARROW:
+            found = what(ball(middle) + arb(0, ball(half).upper()))
+            if half == 0 or _sign(found):
+                return found
+        return _range(what, middle, half)
 
     def part(self, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
         """The s of two scaled times, as far as this step goes."""
@@ -107,12 +111,13 @@ class _Piece:
 
 
 def _range(what: Any, middle: Fraction, half: Fraction) -> Any:
-    """What a polynomial takes within ``half`` of ``middle``: its coefficients there, added up."""
+    """What a polynomial takes within ``half`` of ``middle``: its coefficients there, added up.
+
+    The constant one is the value there, as narrow as it is over a part without width.
+    """
     moved = what(arb_poly([ball(middle), ball(half)]))
-    total = moved[0]
-    for n in range(1, len(moved)):
-        total = total + arb(0, abs(moved[n]).upper())
-    return total
+    others = sum((abs(moved[n]).upper() for n in range(1, len(moved))), arb(0))
+    return what(ball(middle)) + arb(0, others.upper())
 
 
 def _shortened(what: Any) -> Any:

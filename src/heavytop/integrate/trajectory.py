@@ -101,11 +101,9 @@ def _start(run: Trajectory) -> list[float]:
     problem = run.problem
     start, xi = (problem.start, problem.xi) if run.frame is None else (run.frame, run.frame.xi)
     assert xi is not None  # without ξ no attitude was computed
-    rows = rows_of(start.gamma, xi)
-    products = quaternion_products(rows)
-    multiple = max(zip(products, range(4), strict=True), key=lambda each: each[0][each[1]])[0]
-    sign = first_sign(multiple, 2**_SIGN_BITS * problem.precision.eps)
-    return [sign * float(value) for value in quaternion_of_rows(rows, SimpleNamespace(sqrt=_root))]
+    q = quaternion_of_rows(rows_of(start.gamma, xi), SimpleNamespace(sqrt=_root))
+    sign = first_sign(q, 2**_SIGN_BITS * problem.precision.eps)
+    return [sign * float(value) for value in q]
 
 
 def _root(value: Any) -> Fraction:

@@ -48,6 +48,17 @@ class Header:
     degrees: bool
     others: tuple[str, ...]
 
+    def of_state(self) -> dict[str, int]:
+        """The places of t, omega1 to omega3, gamma1 to gamma3, as far as they are there; InputError for one twice."""
+        found = {} if self.time is None else {"t": self.time}
+        for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
+            components = self.places.get(quantity, {})
+            for component, place in components.items():
+                axis = _AXES.get(component) or str(int(component) + ("0" in components))
+                if axis <= "3" and found.setdefault(f"{name}{axis}", place) != place:
+                    raise InputError(f"The column {name}{axis} stands twice.", "Give each column once.")
+        return found
+
 
 def header(names: Sequence[str]) -> Header:
     """The meaning of every column; raises InputError for one that stands twice."""
@@ -452,11 +463,8 @@ def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[F
     return found, name == "euler" and (any(marked) or said.angles == "degrees")
 
 
-def times(document: Mapping[str, Any]) -> list[Any]:
-    """The column t, or the list of times: exact numbers, or what is to be read as such."""
-    if "lines" not in document:
-        found = document.get("times")
-        return found if isinstance(found, list) else []
+def times(document: Mapping[str, Any]) -> list[Fraction]:
+    """The column t of a text table; raises InputError that names the line of what is not a finite number."""
     found = []
     for number, text in zip(document["lines"], document["times"], strict=True):
         value = cell(text, f"Line {number}, column t")

@@ -358,9 +358,7 @@ def of_arrays(
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
     states = [rounded_state([component(value) for value in row], form) for row in rows]
-    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
-    names = named(name, "name"), named(integrator, "integrator")
-    return GivenTrajectory(*names, top, start, which, form, times, states, outcome, 0, {}, "")
+    return _in_memory((name, integrator), top, start, which, form, times, states)
 
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
@@ -595,25 +593,24 @@ def of_observed_arrays(
     values = {name: [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)] for name, rows in arrays.items()}
     places = [f"row {i}" for i in range(len(times))]
     found, states = observed(body, raw, said, values, places, form, normalize)
+    require_physical(found.posed.top, found.posed.start)
+    which = system_of(body, HEAVY_TOP)
+    return _in_memory(names, found.posed.top, found.posed.start, which, form, times, states, found)
+
+
+def _in_memory(
+    names: tuple[str, str],
+    top: HeavyTop,
+    start: State,
+    which: System,
+    form: Precision,
+    times: list[Fraction],
+    states: list[tuple[Fraction, ...] | None],
+    found: Observed | None = None,
+) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    top, start = found.posed.top, found.posed.start
-    require_physical(top, start)
-    return GivenTrajectory(
-        name,
-        integrator,
-        top,
-        start,
-        system_of(body, HEAVY_TOP),
-        form,
-        times,
-        states,
-        outcome,
-        0,
-        {},
-        "",
-        observed=found,
-    )
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, "", observed=found)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
