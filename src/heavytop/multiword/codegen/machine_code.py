@@ -380,11 +380,11 @@ class Code:
         self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
-        """What comes from one block or another."""
+        """What is one value or another, as :meth:`add_incoming` says for each block before."""
         return self.value(self.builder.phi(kind))
 
-    def arrive(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
-        """What comes from the block ``before``, or from the one that is being written."""
+    def add_incoming(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
+        """What ``phis`` are behind the block ``before``, or behind the one that is being written."""
         for phi, value in zip(phis, values, strict=True):
             phi.raw.add_incoming(_typed(phi.type, value), before or self.builder.block)
 
@@ -401,12 +401,12 @@ class Code:
         b.branch(head)
         b.position_at_end(head)
         index, carried = self.phi(INT), [self.phi(value.type) for value in values]
-        self.arrive([index, *carried], [start, *values], before)
+        self.add_incoming([index, *carried], [start, *values], before)
         inside, after = b.append_basic_block("body"), b.append_basic_block("after")
         b.cbranch(index < stop, inside, after)
         b.position_at_end(inside)
-        self.arrive(carried, body(index, carried) or [])
-        self.arrive([index], [index + 1])
+        self.add_incoming(carried, body(index, carried) or [])
+        self.add_incoming([index], [index + 1])
         b.branch(head)
         b.position_at_end(after)
         return carried
@@ -422,8 +422,8 @@ class Code:
             with otherwise:
                 second, after_second = other(), b.block
         chosen = [self.phi(value.type) for value in first]
-        self.arrive(chosen, first, after_first)
-        self.arrive(chosen, second, after_second)
+        self.add_incoming(chosen, first, after_first)
+        self.add_incoming(chosen, second, after_second)
         return chosen
 
 
@@ -477,13 +477,13 @@ class Stepping(ABC):
         b.branch(head)
         b.position_at_end(head)
         taken = code.phi(INT)
-        code.arrive([taken], [0], entry)
+        code.add_incoming([taken], [0], entry)
         running = self.count(self.status) == 0
         wanted = (taken < self.most) & ~self.covered()
         b.cbranch(running & wanted, body, out)
         b.position_at_end(body)
         good = self.write_step()
-        code.arrive([taken], [taken + good.extended()])
+        code.add_incoming([taken], [taken + good.extended()])
         b.branch(head)
         b.position_at_end(out)
         b.ret(taken)
