@@ -232,9 +232,7 @@ def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
 
 def _typed(kind: ir.Type, value: Number) -> ir.Value:
     """What LLVM's builder has of an operand; a number as a constant of that type."""
-    if isinstance(value, Operand):
-        return value.raw
-    return ir.Constant(kind, float(value) if _is_double(kind) else int(value))
+    return value.raw if isinstance(value, Operand) else ir.Constant(kind, +value)  # of True it is 1
 
 
 class Code:
@@ -283,7 +281,7 @@ class Code:
 
     def fma(self, a: Operand, b: Number, c: Number) -> Operand:
         """a b + c, rounded once."""
-        name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
+        name = "llvm.fma.v8f64" if isinstance(a.type, ir.VectorType) else "llvm.fma.f64"
         return self._intrinsic(name, a.type, (a.raw, _typed(a.type, b), _typed(a.type, c)))
 
     def multiply_add(self, a: Operand, b: Number, c: Operand) -> Operand:
