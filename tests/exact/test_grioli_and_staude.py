@@ -7,9 +7,7 @@ import pytest
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.grioli import Grioli, grioli_motion
-from heavytop.exact.cases.staude import (
-    staude_motion,
-)
+from heavytop.exact.cases.staude import Staude, staude_motion
 from heavytop.exact.catalogue import find
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
