@@ -314,7 +314,7 @@ class GivenTrajectory:
     outcome: Outcome
     steps: int
     flags: dict[str, str]
-    sha256: str
+    sha256: str = ""
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
     observed: Observed | None = None
@@ -599,7 +599,7 @@ def _in_memory(
 ) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, "", observed=found)
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=found)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
