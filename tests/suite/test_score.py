@@ -188,7 +188,7 @@ def test_a_file_that_cannot_be_scored_is_refused_in_words(change: dict, message:
         ("a.json", '{"a": "\xff"}'.encode("latin-1"), "cannot be read"),
         ("a.csv", "", "The first line is not t,omega1"),
         ("a.csv", "t,omega1\n1,2\n", "The first line is not t,omega1"),
-        ("a.csv", f"{HEADER}\n1,2,3\n", "Row 1 has 3 columns, not 7"),
+        ("a.csv", f"{HEADER}\n1,2,3\n", "Line 2 has 3 columns, not 7"),
         ("a.csv", f"{HEADER}\n1,2,3,4,5,6,7\n", "The key inertia is missing"),
         ("a.txt", "", "neither .json nor .csv"),
         ("x" * 100 + ".json", None, "cannot be read"),

@@ -93,7 +93,7 @@ def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Pat
         (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 stands twice"),
         (table("t,a,b,c,d,e,f"), "The first line is not t,omega1.*: omega1, omega2"),
         (table(None, order=range(3)), "there is no header, and Row 1 has 3 columns, not 7"),
-        (table() + "1,2\n", "Row 6 has 2 columns, not 7"),
+        (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "does not come after"),
         (table() + "3,1,1,1,0,0,abc\n", "'abc' is not a finite number"),
         (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 states are too many.*"),

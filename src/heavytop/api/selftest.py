@@ -7,16 +7,101 @@ healthy integrator, as any candidate is with its baseline.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
-from heavytop.comparison.compare import CONTROL, Trial, compare, trial
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.comparison.compare import Differences, compare
 from heavytop.comparison.noise import Policy
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
+from heavytop.errors import InputError
 from heavytop.integrate.broken import FAULTS
 from heavytop.kinds import KINDS
+from heavytop.precision import exact, log10
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.suite.plan import expand, load
 from heavytop.suite.rows import Task
 from heavytop.suite.run import rows
+
+CONTROL = "control"
+_ALARMS = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
+_SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What the comparison said of one fault.
+
+    caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
+    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where one was
+    caught.
+    """
+
+    fault: str
+    about: str
+    detectable: bool
+    verdict: str
+    caught_by: list[tuple[str, list[str]]]
+    shift: tuple[str, float] | None
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the alarm is raised just where it should be."""
+        return self.detectable == bool(self.caught_by)
+
+    def to_json(self) -> dict[str, Any]:
+        """One entry of `selftest --json`."""
+        return {
+            "fault": self.fault,
+            "about": self.about,
+            "detectable": self.detectable,
+            "verdict": self.verdict,
+            "caught_by": [{"metric": metric, "cases": cases} for metric, cases in self.caught_by],
+            "largest_shift": None if self.shift is None else {"metric": self.shift[0], "decades": self.shift[1]},
+        }
+
+
+def trial(name: str, comparison: Differences) -> Trial:
+    """What came of the control, or of the fault of that name."""
+    alarms: dict[str, list[tuple[float, str]]] = {}
+    quiet: list[tuple[bool, float, str]] = []
+    for finding in comparison.findings:
+        case = finding.row.case
+        label = f"{finding.row.key.kind}: {finding.metric or finding.reason}"
+        moved = _decades(finding)
+        if finding.verdict in _ALARMS:
+            alarms.setdefault(label, []).append((moved, case))
+        else:
+            quiet.append((finding.verdict is Verdict.BETTER, moved, f"{label} of {case}"))
+    strongest = sorted(alarms.items(), key=lambda item: -max(item[1])[0])
+    shift = max(quiet) if quiet and not alarms else None
+    if name == CONTROL:
+        about, detectable = "nothing; other roundings", False
+    else:
+        about, detectable = FAULTS[name].about, FAULTS[name].detectable
+    return Trial(
+        name,
+        about,
+        detectable,
+        comparison.verdict,
+        [(label, [case for _, case in cases]) for label, cases in strongest],
+        None if shift is None else (shift[2], shift[1]),
+    )
+
+
+def _decades(finding: Finding) -> float:
+    """How far the value moved; infinite where one of the two is not a number, or only one of them is 0."""
+    try:
+        old, new = (log10(exact(value or "")) for value in (finding.baseline, finding.candidate))
+    except InputError:
+        return 0.0 if finding.baseline == finding.candidate else float("inf")
+    if old is None or new is None:
+        return 0.0 if old == new else float("inf")
+    return abs(new - old)
 
 
 def tasks(plan: str = "selftest") -> list[Task]:
@@ -41,3 +126,29 @@ def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]
 
 def _report(measured: Sequence[Row]) -> Report:
     return Report(SCHEMA, {}, {}, list(measured))
+
+
+def in_words(trials: Sequence[Trial]) -> RenderableType:
+    """A table of the faults: verdict, and what caught each or how far below every alarm it lies."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("fault", "what is wrong", "verdict", "caught by, strongest first"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("fault", "verdict"))
+    for trial in trials:
+        style = "" if trial.as_expected else "bold red"
+        table.add_row(
+            Text(trial.fault, style=style), Text(trial.about), Text(trial.verdict, style=style), Text(_words(trial))
+        )
+    wrong = [trial.fault for trial in trials if not trial.as_expected]
+    said = f"Not as expected: {', '.join(wrong)}." if wrong else "Every fault that can be seen was seen, and no other."
+    return Group(table, Text(), Text(said, style="bold red" if wrong else "green"))
+
+
+def _words(trial: Trial) -> str:
+    if trial.caught_by:
+        lines = [f"{metric} ({', '.join(cases)})" for metric, cases in trial.caught_by[:_SHOWN]]
+        more = len(trial.caught_by) - _SHOWN
+        return "\n".join(lines + ([f"and {more} more"] if more > 0 else []))
+    if trial.shift is None or trial.shift[1] == 0:
+        return "nothing moved"
+    taken = "read as an improvement" if trial.verdict == "better" else "inside its allowance"
+    return f"nothing: {trial.shift[0]} moved most, by {trial.shift[1]:.2f} decades, {taken}"

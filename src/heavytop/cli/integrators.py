@@ -188,7 +188,5 @@ def selftest(
     if json:
         print_json({"trials": [trial.to_json() for trial in trials]})
     else:
-        from heavytop.render.text import selftest_text
-
-        show_on_terminal(selftest_text(trials))
+        show_on_terminal(detectors.in_words(trials))
     return 0 if all(trial.as_expected for trial in trials) else 1

@@ -6,8 +6,8 @@ import hashlib
 import json
 import re
 import sys
-import unicodedata
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
@@ -24,7 +24,6 @@ from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physical
 from heavytop.trajectories import columns as observed_columns
-from heavytop.trajectories import columns as observed_file
 from heavytop.trajectories.observed import (
     LONGEST_NAME,
     MOST,
@@ -48,13 +47,7 @@ VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
-_OMEGA = ("omega", "om", "w", "ω", "angularvelocity")
-_GAMMA = ("gamma", "gam", "g", "γ")
-_CLASSIC = {"p": "omega1", "q": "omega2", "r": "omega3"}
-_TIME = ("t", "time")
-_AXES = {"x": 1, "y": 2, "z": 3}
-_WORD = re.compile(r"([^\W\d]+?)(\d|[xyz])?")
-_UNIT = re.compile(r"\s*[\[(/].*$")
+_ALL_COLUMNS = "Give every row all of its columns."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
 
@@ -100,15 +93,18 @@ class TextTable:
         first = _cells(body[0], separator)
         if not _is_number(first[0]):
             header, body, self.lines = first, body[1:], self.lines[1:]
-        if header is not None:
-            found = observed_columns.header(header)
-            if found.time is not None and observed_columns.is_more_than_states(found):
-                self.header, self.width = found, len(header)
-                self.notes += unread(found.others, header)
-                self.cells = _split(body, self.lines, separator, len(header))
-                return
-        places = self._places(header, len(first))
-        self.rows = _in_order(body, separator, places, len(header or COLUMNS))
+        names = self._without_header(len(first)) if header is None else header
+        self.cells = _split(body, self.lines, separator, len(names))
+        found = observed_columns.header(names)
+        if found.time is not None and observed_columns.is_more_than_states(found):
+            self.header, others = found, list(found.others)
+        else:
+            places = found.of_state()
+            if missing := [name for name in COLUMNS if name not in places]:
+                raise _no_header(missing)
+            self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
+            others = [name for place, name in enumerate(names) if place not in places.values()]
+        self.notes += unread(others, names)
 
     def _key(self, comment: str, known: Sequence[str]) -> bool:
         """Take in ``key: value`` or ``key = value``; whether it was one."""
@@ -126,23 +122,16 @@ class TextTable:
         self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
         return True
 
-    def _places(self, header: list[str] | None, width: int) -> list[int]:
-        """Where the columns t Ω1 Ω2 Ω3 γ1 γ2 γ3 stand in a row."""
-        if header is None:
-            if width != len(COLUMNS):
-                raise InputError(
-                    f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
-                    f"not {len(COLUMNS)}.",
-                    "Give a header that names the columns.",
-                )
-            self.notes.append(f"there is no header; the columns are taken as {' '.join(COLUMNS)}")
-            return list(range(width))
-        found = _columns(header)
-        missing = [name for name in COLUMNS if name not in found]
-        if missing:
-            raise _no_header(missing)
-        self.notes += unread([name for place, name in enumerate(header) if place not in found.values()], header)
-        return [found[name] for name in COLUMNS]
+    def _without_header(self, width: int) -> Sequence[str]:
+        """The columns of a table that does not name them."""
+        if width != len(COLUMNS):
+            raise InputError(
+                f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
+                f"not {len(COLUMNS)}.",
+                "Give a header that names the columns.",
+            )
+        self.notes.append(f"there is no header; the columns are taken as {' '.join(COLUMNS)}")
+        return COLUMNS
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
@@ -178,25 +167,10 @@ def _is_number(text: str) -> bool:
     return bool(re.fullmatch(r"[+-]?(\.?\d.*|nan(\(.*\))?|inf(inity)?)", text, re.IGNORECASE))
 
 
-def _in_order(body: list[str], separator: str | None, places: list[int], width: int) -> list[list[str]]:
-    rows = []
-    for index, line in enumerate(body, 1):
-        cells = _cells(line, separator)
-        if len(cells) != width:
-            decimal_commas = separator == "," and len(cells) == 2 * width
-            remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else REMEDY
-            raise InputError(f"Row {index} has {len(cells)} columns, not {width}.", remedy)
-        # where a semicolon separates, a comma is the point of a decimal
-        rows.append([cells[place].replace(",", ".") if separator == ";" else cells[place] for place in places])
-    return rows
-
-
 def _is_header(names: list[str]) -> bool:
     """Whether the words of a comment name the columns."""
-    if len(_columns(names)) == len(COLUMNS):
-        return True
-    found = observed_columns.header(names) if len(set(names)) == len(names) else None
-    return found is not None and found.time is not None and not found.others and bool(found.places)
+    found = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
+    return len(found.of_state()) == len(COLUMNS) or (found.time is not None and not found.others and bool(found.places))
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
@@ -205,42 +179,12 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
     for number, line in zip(lines, body, strict=True):
         cells = _cells(line, separator)
         if len(cells) != width:
-            raise InputError(
-                f"Line {number} has {len(cells)} columns, not {width}.", "Give every row all of its columns."
-            )
+            decimal_commas = separator == "," and len(cells) == 2 * width
+            remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
+            raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
+        # where a semicolon separates, a comma is the point of a decimal
         rows.append([each.replace(",", ".") for each in cells] if separator == ";" else cells)
     return rows
-
-
-def _columns(names: list[str]) -> dict[str, int]:
-    """The place of each column whose name is understood; raises InputError for one that stands twice."""
-    meant = [_meaning(name) for name in names]
-    # counted from 0: omega0, omega1, omega2
-    for vector in ("omega", "gamma"):
-        if f"{vector}0" in meant:
-            meant = [f"{vector}{int(m[-1]) + 1}" if m.startswith(vector) else m for m in meant]
-    found: dict[str, int] = {}
-    for place, name in enumerate(meant):
-        if name in found:
-            raise InputError(f"The column {name} stands twice.", "Give each column once.")
-        if name in COLUMNS:
-            found[name] = place
-    return found
-
-
-def _meaning(name: str) -> str:
-    """t, omega1, ..., gamma3, or what is not understood as it is; Ω₁, w_x, \\Omega_{1} and time [s] are."""
-    plain = unicodedata.normalize("NFKC", _UNIT.sub("", name)).lower()
-    plain = re.sub(r"[\s_{}\\.^-]", "", plain)
-    if plain in _TIME:
-        return "t"
-    if plain in _CLASSIC:
-        return _CLASSIC[plain]
-    match = _WORD.fullmatch(plain)
-    if match is None or match[2] is None:
-        return name
-    axis = _AXES.get(match[2], match[2])
-    return f"omega{axis}" if match[1] in _OMEGA else f"gamma{axis}" if match[1] in _GAMMA else name
 
 
 # Whether a trajectory file and the case that it is said to be of agree.
@@ -280,7 +224,7 @@ def _rounded_alike(new: Fraction, old: Fraction) -> bool:
 
 _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
-_KEYS |= {"outcome", "steps", *observed_file.KEYS}
+_KEYS |= {"outcome", "steps", *observed_columns.KEYS}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
 _NOT_READ |= {
     "times_given",
@@ -322,8 +266,9 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     try:
         document, notes = (_json(text), []) if is_json else _table(text)
         name = "given" if piped else path.stem
-        given = _observed if observed_file.is_observed(document) else _given
-        return given(document, name, hashlib.sha256(content).hexdigest(), case, notes, normalize)
+        given = _observed if observed_columns.is_observed(document) else _given
+        found = given(document, name, case, normalize)
+        return replace(found, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -365,17 +310,13 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     return table.keys | columns, table.notes
 
 
-def _given(
-    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> GivenTrajectory:
+def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
         raise too_many(len(document["times"]))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
     which = system_of(_system(document, case), top)
-    times = list(check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")]))
-    if not any(times):
-        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+    times = _times(document)
     if case is not None:
         require_case(case, top, start, which, at_start)
     require_physical(top, start)
@@ -390,29 +331,15 @@ def _given(
     start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
-    return GivenTrajectory(
-        top=top,
-        start=start,
-        system=which,
-        precision=precision,
-        times=times,
-        states=states,
-        sha256=sha256,
-        notes=tuple(notes),
-        **_about(document, stem, case, None in states),
-    )
+    about = _about(document, stem, case, None in states)
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
 
 
-def _observed(
-    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> GivenTrajectory:
+def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
-    listed = _list(document, "times") if "lines" not in document else observed_file.times(document)
-    times = list(check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed]))
-    if not any(times):
-        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
-    said = observed_file.convention(document, document.get("header"))
-    table = observed_file.columns(document, said)
+    times = _times(document)
+    said = observed_columns.convention(document, document.get("header"))
+    table = observed_columns.columns(document, said)
     require_states(times, table.places)
     body = _body(document, case)
     which = system_of(_system(document, case), body)
@@ -422,19 +349,22 @@ def _observed(
     raw = _raw_start(document, table, not times[0], said, case)
     precision = _precision(document, table.texts)
     found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
-    require_physical(found.posed.top, found.posed.start)
-    return GivenTrajectory(
-        top=found.posed.top,
-        start=found.posed.start,
-        system=which,
-        precision=precision,
-        times=times,
-        states=rows,
-        sha256=sha256,
-        notes=tuple(notes),
-        observed=found,
-        **_about(document, stem, case, None in rows),
-    )
+    top, start = found.posed.top, found.posed.start
+    require_physical(top, start)
+    about = _about(document, stem, case, None in rows) | {"observed": found}
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
+
+
+def _times(document: dict[str, Any]) -> list[Fraction]:
+    """The times, exact and in order; raises InputError where there is none but 0."""
+    if "lines" in document:
+        given = observed_columns.times(document)
+    else:
+        given = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+    times = list(check_times(given))
+    if not any(times):
+        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+    return times
 
 
 def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
@@ -453,12 +383,12 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 
 def _raw_start(
-    document: dict[str, Any], table: observed_file.ColumnTable, at_start: bool, said: Any, case: Case | None
+    document: dict[str, Any], table: observed_columns.ColumnTable, at_start: bool, said: Any, case: Case | None
 ) -> RawStart:
     """The start of the file, or of the case where the file says nothing of it."""
-    if case is not None and not document.keys() & {"omega", "gamma", *observed_file.STARTS}:
+    if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
         return RawStart("gamma", case.start.gamma, case.start.omega)
-    return observed_file.start(document, table, at_start, said)
+    return observed_columns.start(document, table, at_start, said)
 
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
@@ -527,10 +457,7 @@ def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[
     value = document.get(key)
     if value is None:
         raise InputError(f"The key {key} is missing.", REMEDY)
-    if not isinstance(value, list) or (count is not None and len(value) != count):
-        what = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
-        raise InputError(f"{key} {what}.", f"Give {count} numbers." if count else "Give a list.")
-    return value
+    return observed_columns.listed(value, key, count)
 
 
 def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:

@@ -30,7 +30,7 @@ from heavytop.precision import (
     round_to,
     shown,
 )
-from heavytop.top.attitude import Angle, Attitude, perpendicular
+from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -209,14 +209,8 @@ def of_quaternion(q: Sequence[Fraction]) -> Rows:
 
 def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     """w, x, y, z of the direction of a rotation matrix, of no unit length; by the largest of the four."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    candidates = (
-        [1 + a + e + i, h - f, c - g, d - b],
-        [h - f, 1 + a - e - i, b + d, c + g],
-        [c - g, b + d, 1 - a + e - i, f + h],
-        [d - b, c + g, f + h, 1 - a - e + i],
-    )
-    return list(max(enumerate(candidates), key=lambda pair: pair[1][pair[0]])[1])
+    first, second, third = map(_triple, rows)
+    return list(max(enumerate(quaternion_products((first, second, third))), key=lambda pair: pair[1][pair[0]])[1])
 
 
 def require_direction(values: Sequence[Fraction], what: str) -> None:
@@ -320,7 +314,7 @@ class GivenTrajectory:
     outcome: Outcome
     steps: int
     flags: dict[str, str]
-    sha256: str
+    sha256: str = ""
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
     observed: Observed | None = None
@@ -358,9 +352,7 @@ def of_arrays(
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
     states = [rounded_state([component(value) for value in row], form) for row in rows]
-    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
-    names = named(name, "name"), named(integrator, "integrator")
-    return GivenTrajectory(*names, top, start, which, form, times, states, outcome, 0, {}, "")
+    return _in_memory((name, integrator), top, start, which, form, times, states)
 
 
 def require_states(times: list[Fraction], rows: list[Any]) -> None:
@@ -503,13 +495,8 @@ def posed(
     rows = rotation(start, said, precision, normalize)
     omega = body_omega(start, said, rows)
     in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
-    w, gamma, xi = (_vector(v) for v in in_principal)
+    w, gamma, xi = (_triple(v) for v in in_principal)
     return body, start, Posed(top, State(w, gamma), xi, axes, body.centre)
-
-
-def _vector(values: Sequence[Fraction]) -> Vector:
-    a, b, c = values
-    return a, b, c
 
 
 def observed(
@@ -595,25 +582,24 @@ def of_observed_arrays(
     values = {name: [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)] for name, rows in arrays.items()}
     places = [f"row {i}" for i in range(len(times))]
     found, states = observed(body, raw, said, values, places, form, normalize)
+    require_physical(found.posed.top, found.posed.start)
+    which = system_of(body, HEAVY_TOP)
+    return _in_memory(names, found.posed.top, found.posed.start, which, form, times, states, found)
+
+
+def _in_memory(
+    names: tuple[str, str],
+    top: HeavyTop,
+    start: State,
+    which: System,
+    form: Precision,
+    times: list[Fraction],
+    states: list[tuple[Fraction, ...] | None],
+    found: Observed | None = None,
+) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    top, start = found.posed.top, found.posed.start
-    require_physical(top, start)
-    return GivenTrajectory(
-        name,
-        integrator,
-        top,
-        start,
-        system_of(body, HEAVY_TOP),
-        form,
-        times,
-        states,
-        outcome,
-        0,
-        {},
-        "",
-        observed=found,
-    )
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=found)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:

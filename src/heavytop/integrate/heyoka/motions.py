@@ -85,12 +85,14 @@ class Stepper:
 
     def _steps_short_of(self, target: OrderedRing) -> int:
         """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
-        if self._one_by_one or not self._largest_step or self._beyond(target):
+        distance = float(target - self.engine.time)
+        if not self.forwards:
+            distance = -distance
+        if self._one_by_one or not self._largest_step or distance < 2 * self._largest_step:
             return 1
-        distance = abs(float(target - self.engine.time))
         # many steps average out; each of a few may be as long as the longest so far
         if distance > 100 * self._largest_step:
-            expected = distance / self._mean_step
+            expected = distance / (self._mean_step or abs(float(self.time)) / self.steps)
             self._foreseen = self._foreseen or self.steps + expected
             count = self._part * expected
             if self._spread is not None:
@@ -105,20 +107,23 @@ class Stepper:
 
     def single(self) -> Outcome:
         """One step, whose polynomial is then at hand."""
-        before, state, began = self.engine.time, self.engine.state.copy(), perf_counter()
-        self._before = state, self.engine.dtime, self.steps
-        outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
+        engine = self.engine
+        state, before, began = engine.state.copy(), engine.dtime, perf_counter()
+        self._before = state, before, self.steps
+        outcome, length = (engine.step if self.forwards else engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
-        self._covers, now = True, self.engine.time
+        self._covers, now = True, engine.time
         if outcome == self._not_finite or now - now != 0:  # infinity and nan
-            if not at_rest(state, self.engine.tc):
+            if not at_rest(state, engine.tc):
                 return Outcome.NON_FINITE
             self.rest = state
             return Outcome.SUCCESS
-        if now == before:
+        if now == before[0]:
             return Outcome.STEP_TOO_SMALL
-        self._went(1)
-        self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
+        self._went(1, now)
+        size = abs(float(length))
+        if size > self._largest_step:
+            self._largest_step = size
         return Outcome.SUCCESS
 
     def _several(self, count: int, target: OrderedRing) -> Outcome:
@@ -130,7 +135,7 @@ class Stepper:
         self._largest_step = max(self._largest_step, abs(float(largest)))
         failed = outcome == self._not_finite
         if failed or self._beyond(target):
-            # what has been seen of the steps behind the target says how many lie before it
+            # until the next step counts: the steps behind the target say how many lie before it
             self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
             self._spread = None
             self.engine.state[:] = state
@@ -141,14 +146,14 @@ class Stepper:
             else:
                 self._largest_step *= 1.5
             return Outcome.SUCCESS
-        self._went(done)
+        self._went(done, self.engine.time)
         self._covers = False
         return Outcome.SUCCESS
 
-    def _went(self, steps: int) -> None:
+    def _went(self, steps: int, time: Any) -> None:
         self.steps += steps
-        self.time = self.engine.time
-        self._mean_step, self._part = abs(float(self.time)) / self.steps, 0.95
+        self.time = time
+        self._mean_step, self._part = 0.0, 0.95
 
     def polynomial(self) -> Any:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""

@@ -232,9 +232,7 @@ def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
 
 def _typed(kind: ir.Type, value: Number) -> ir.Value:
     """What LLVM's builder has of an operand; a number as a constant of that type."""
-    if isinstance(value, Operand):
-        return value.raw
-    return ir.Constant(kind, float(value) if _is_double(kind) else int(value))
+    return value.raw if isinstance(value, Operand) else ir.Constant(kind, +value)  # of True it is 1
 
 
 class Code:
@@ -283,7 +281,7 @@ class Code:
 
     def fma(self, a: Operand, b: Number, c: Number) -> Operand:
         """a b + c, rounded once."""
-        name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
+        name = "llvm.fma.v8f64" if isinstance(a.type, ir.VectorType) else "llvm.fma.f64"
         return self._intrinsic(name, a.type, (a.raw, _typed(a.type, b), _typed(a.type, c)))
 
     def multiply_add(self, a: Operand, b: Number, c: Operand) -> Operand:
@@ -380,11 +378,11 @@ class Code:
         self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
-        """What comes from one block or another."""
+        """What is one value or another, as :meth:`add_incoming` says for each block before."""
         return self.value(self.builder.phi(kind))
 
-    def arrive(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
-        """What comes from the block ``before``, or from the one that is being written."""
+    def add_incoming(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
+        """What ``phis`` are behind the block ``before``, or behind the one that is being written."""
         for phi, value in zip(phis, values, strict=True):
             phi.raw.add_incoming(_typed(phi.type, value), before or self.builder.block)
 
@@ -412,13 +410,13 @@ class Code:
         b.branch(head)
         b.position_at_end(head)
         index, carried = self.phi(INT), [self.phi(value.type) for value in values]
-        self.arrive([index, *carried], [start, *values], before)
+        self.add_incoming([index, *carried], [start, *values], before)
         inside, after = b.append_basic_block("body"), b.append_basic_block("after")
         going = index < stop
         b.cbranch(going & holds(carried) if holds else going, inside, after)
         b.position_at_end(inside)
-        self.arrive(carried, body(index, carried) or [])
-        self.arrive([index], [index + 1])
+        self.add_incoming(carried, body(index, carried) or [])
+        self.add_incoming([index], [index + 1])
         b.branch(head)
         b.position_at_end(after)
         return index, carried
@@ -434,8 +432,8 @@ class Code:
             with otherwise:
                 second, after_second = other(), b.block
         chosen = [self.phi(value.type) for value in first]
-        self.arrive(chosen, first, after_first)
-        self.arrive(chosen, second, after_second)
+        self.add_incoming(chosen, first, after_first)
+        self.add_incoming(chosen, second, after_second)
         return chosen
 
 
@@ -489,13 +487,13 @@ class Stepping(ABC):
         b.branch(head)
         b.position_at_end(head)
         taken = code.phi(INT)
-        code.arrive([taken], [0], entry)
+        code.add_incoming([taken], [0], entry)
         running = self.count(self.status) == 0
         wanted = (taken < self.most) & ~self.covered()
         b.cbranch(running & wanted, body, out)
         b.position_at_end(body)
         good = self.write_step()
-        code.arrive([taken], [taken + good.extended()])
+        code.add_incoming([taken], [taken + good.extended()])
         b.branch(head)
         b.position_at_end(out)
         b.ret(taken)

@@ -415,9 +415,9 @@ class Recurrence:
             switch.add_case(n, block)
             b.position_at_end(block)
             known = [code.phi(value.type) for value in (*sides, *last)]
-            code.arrive(known, [*sides, *last], entry)
+            code.add_incoming(known, [*sides, *last], entry)
             if incoming is not None:
-                code.arrive(known, incoming, before)
+                code.add_incoming(known, incoming, before)
             incoming, before = self._plain_order(n, known), block
             following = blocks.get(n + 1, after)
             b.cbranch(order == n + 1, after, following)

@@ -400,8 +400,8 @@ class _Follow:
         head, inside, step, sample, one, out = map(b.append_basic_block, ("head", "in", "step", "at", "one", "out"))
         b.branch(head)
         b.position_at_end(head)
-        done, taken = (self._word(self.progress, place) for place in range(2))
-        running = self._word(self.arrays[2], STATUS) == 0
+        done, taken = (code.load_one(self.progress, place) for place in range(2))
+        running = code.load_one(self.arrays[2], STATUS) == 0
         left = (done < self.count) & (taken < self.most)
         b.cbranch(running & left, inside, out)
         b.position_at_end(inside)
@@ -436,22 +436,19 @@ class _Follow:
         b.cbranch(sure, put, otherwise)
         b.position_at_end(put)
         result = code.address(self.result, done * (16 * self.layout.vectors))
-        low_order, order = (self._word(self.arrays[2], place) for place in (USED, ORDER))
+        low_order, order = (code.load_one(self.arrays[2], place) for place in (USED, ORDER))
         _put_samples(self.rows, (low_order, order), times, result)
         code.store_one(code.smaller(end, self.count), self.progress, 0)
         b.branch(head)
 
     def _target(self, place: Operand) -> Pair:
-        return self._word(self.times[0], place), self._word(self.times[1], place)
+        return self.code.load_one(self.times[0], place), self.code.load_one(self.times[1], place)
 
     def _covered(self, place: Operand) -> Operand:
         return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(place))
 
     def _clock(self, place: int) -> Operand:
-        return self._word(self.arrays[1], place)
-
-    def _word(self, array: Operand, place: Index) -> Operand:
-        return self.code.load_one(array, place)
+        return self.code.load_one(self.arrays[1], place)
 
 
 class _Step(Stepping):

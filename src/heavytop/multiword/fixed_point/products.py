@@ -397,7 +397,7 @@ class DigitRows(Rows):
         b.branch(search)
         b.position_at_end(search)
         largest = code.phi(INT)
-        code.arrive([largest], [most], before)
+        code.add_incoming([largest], [most], before)
         half = (n >> 1) + 1
 
         def lower(m: Operand, values: list[Operand]) -> list[Operand]:
@@ -414,7 +414,7 @@ class DigitRows(Rows):
             self._put_place(m, code.smaller(code.load_one(self.places, m), limit))
 
         code.loop(0, n + 1, clip, [])
-        code.arrive([largest], [limit])
+        code.add_incoming([largest], [limit])
         b.branch(search)
         b.position_at_end(found)
         return level

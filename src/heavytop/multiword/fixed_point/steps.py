@@ -25,7 +25,6 @@ from heavytop.multiword.codegen.machine_code import (
     POINTER,
     VECTOR,
     Code,
-    Index,
     Machine,
     Operand,
     Processor,
@@ -137,7 +136,7 @@ class SeriesCode:
         rest = {k: code.phi(VECTOR) for k in floating}
         carried = [n, zeros, small, wide, *y, *total, *rest.values()]
         begin = [code.integer(0)] * 3 + [wide_before, *first, *first, *(code.zero for _ in rest)]
-        code.arrive(carried, begin, entry)
+        code.add_incoming(carried, begin, entry)
         b.cbranch((n < most_orders(self.grid)) & (small < 2), body, out)
         b.position_at_end(body)
         after = n + 1
@@ -152,7 +151,7 @@ class SeriesCode:
             sums[k], error = code.two_sum(total[k], following[k])
             lost.append(before + error)
         values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
-        code.arrive(carried, values)
+        code.add_incoming(carried, values)
         b.branch(head)
         b.position_at_end(out)
         return n, small, wide, [word + rest[k] if k in rest else word for k, word in enumerate(total)]
@@ -470,12 +469,12 @@ class _Follow:
         head, inside, step, sample, out = map(b.append_basic_block, ("head", "in", "step", "at", "out"))
         b.branch(head)
         b.position_at_end(head)
-        done, taken = (self._word(self.progress, place) for place in range(2))
-        running = self._word(self.arrays[9], STATUS) == FINE
+        done, taken = (code.load_one(self.progress, place) for place in range(2))
+        running = code.load_one(self.arrays[9], STATUS) == FINE
         left = (done < self.count) & (taken < self.most)
         b.cbranch(running & left, inside, out)
         b.position_at_end(inside)
-        target = self._word(self.times, done)
+        target = code.load_one(self.times, done)
         b.cbranch(target <= self._clock(TIME), sample, step)
         b.position_at_end(step)
         code.store_one(target, self.arrays[8], TARGET)
@@ -484,7 +483,7 @@ class _Follow:
         b.branch(head)
         b.position_at_end(sample)
         known = self._while(done, self.count, self._is_known)
-        order = self._word(self.arrays[9], ORDERS)
+        order = code.load_one(self.arrays[9], ORDERS)
         code.call(self.functions[1], [self.arrays[3], order, self.at, done, known, self.result])
         good = self._while(done, known, self._is_in_range)
         code.store_one(good, self.progress, 0)
@@ -499,11 +498,11 @@ class _Follow:
         b.branch(head)
         b.position_at_end(head)
         place = code.phi(INT)
-        code.arrive([place], [start], entry)
+        code.add_incoming([place], [start], entry)
         b.cbranch(place < stop, body, out)
         b.position_at_end(body)
         found, after = holds(place), place + 1
-        code.arrive([place], [after])
+        code.add_incoming([place], [after])
         b.cbranch(found, head, out)
         b.position_at_end(out)
         return place
@@ -514,7 +513,7 @@ class _Follow:
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
         code, grid = self.code, self.grid
-        time, began, end = self._word(self.times, place), self._clock(BEGAN), self._clock(TIME)
+        time, began, end = code.load_one(self.times, place), self._clock(BEGAN), self._clock(TIME)
         rest = (time - began) / (end - began)
         near = time <= began + began
         known = (time <= end) & (near | (began == 0))
@@ -534,10 +533,7 @@ class _Follow:
         return self.code.all_of(largest <= most_of(self.grid))
 
     def _clock(self, place: int) -> Operand:
-        return self._word(self.arrays[8], place)
-
-    def _word(self, array: Operand, place: Index) -> Operand:
-        return self.code.load_one(array, place)
+        return self.code.load_one(self.arrays[8], place)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:
