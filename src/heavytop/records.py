@@ -427,7 +427,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     @property
     def identity(self) -> Identity:
         """What makes it the same row in another report, and what it is called there."""
-        return Identity(self.key, self.measure, self.case, self.system, self.integrator, self.precision)
+        return Identity(self.key, self.case, self.integrator)
 
     def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
         """The metric of that quantity, if it is there."""
@@ -438,16 +438,15 @@ class Identity(NamedTuple):
     """A row's key, and the names under which other programs know it."""
 
     key: RowKey
-    measure: str
     case: str
-    system: str
     integrator: str
-    precision: str
 
     @property
     def named(self) -> dict[str, str]:
         """Its part of JSON documents."""
-        return {name: getattr(self, name) for name in self._fields[1:]} | {"horizon": self.key.horizon}
+        key = self.key
+        named = {"measure": key.kind, "case": self.case, "system": key.system, "integrator": self.integrator}
+        return named | {"precision": key.precision, "horizon": key.horizon}
 
     @property
     def elsewhere(self) -> Identity:

@@ -28,7 +28,7 @@ from heavytop.api.plot_data import (
     principal,
     samples,
 )
-from heavytop.document.svg import COLOURS, decades
+from heavytop.document.svg import COLOURS, decades, new_figure
 from heavytop.errors import InputError, quoted
 from heavytop.event_times.functions import Events, ReferenceEvents, Section, component
 from heavytop.integrate.trajectory import Trajectory
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter, Animation, FuncAnimation
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
 
 __all__ = ["animate", "digits", "drift", "error", "herpolhode", "phase", "poincare", "polhode", "sphere"]
@@ -415,19 +414,10 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     return FFMpegWriter(fps=fps)
 
 
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _flat(axes: Axes | None) -> Axes:
     """Plane axes: those given, or new ones."""
     if axes is None:
-        axes = _figure(6.4, 4.0).add_subplot()
+        axes = new_figure(6.4, 4.0).add_subplot()
     elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
         raise InputError(f"axes = {quoted(axes)} are no plane axes of matplotlib.", "Give what plt.subplots() returns.")
     axes.grid(visible=True, color=_GREY, alpha=0.25, lw=0.6)
@@ -440,7 +430,7 @@ def _flat(axes: Axes | None) -> Axes:
 def _solid(axes: Axes3D | None) -> Axes3D:
     """Three-dimensional axes: those given, or new ones."""
     if axes is None:
-        axes = _figure(5.2, 5.0).add_subplot(projection="3d")
+        axes = new_figure(5.2, 5.0).add_subplot(projection="3d")
     elif getattr(axes, "name", "") != "3d":
         raise InputError(f"axes = {quoted(axes)} are no three-dimensional axes.", 'Use add_subplot(projection="3d").')
     axes.view_init(_ELEVATION, _AZIMUTH)

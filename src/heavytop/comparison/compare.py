@@ -78,7 +78,7 @@ class WorseMotions(msgspec.Struct, frozen=True):
     @property
     def sentence(self) -> str:
         """What a comparison says of it; empty where no motion got worse."""
-        name = f"{self.row.case} by {self.row.integrator} {self.row.precision}"
+        name = f"{self.row.case} by {self.row.integrator} {self.row.key.precision}"
         if self.reason:
             return f"The motions of {name} are not compared one by one: {self.reason}."
         if not self.worse:

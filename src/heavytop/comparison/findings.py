@@ -325,13 +325,13 @@ def _digits(row: Row | None) -> float | None:
 
 def _curve(row: Identity) -> tuple[str, str, str]:
     """Case, integrator and format: what the settings of one work-precision curve share."""
-    return row.case, row.key.subject.name, row.precision
+    return row.case, row.key.subject.name, row.key.precision
 
 
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
-    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, row.precision) if part)
+    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, key.precision) if part)
     end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
     return f"{_case(row)}{end} ({inside})"
 

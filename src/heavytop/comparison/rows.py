@@ -242,7 +242,7 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
     @property
     def method(self) -> tuple[str, str]:
         """Whose it is: the integrator and its format."""
-        return self.row.key.subject.name, self.row.precision
+        return self.row.key.subject.name, self.row.key.precision
 
     def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
         """The finding; where it is slight and its integrator gained more than that, the same."""

@@ -33,8 +33,9 @@ def computed_by(row: Row) -> str:
 
 def row_name(row: Identity, with_kind: bool = True) -> str:
     """Its kind, case, system where it is not the heavy top, subject and format."""
-    system = "" if row.system == HEAVY_TOP.name else row.system
-    parts = (row.key.kind if with_kind else "", row.case, system, row.integrator, row.precision)
+    key = row.key
+    system = "" if key.system == HEAVY_TOP.name else key.system
+    parts = (key.kind if with_kind else "", row.case, system, row.integrator, key.precision)
     return " ".join(part for part in parts if part)
 
 

@@ -18,6 +18,7 @@ from heavytop.display import printable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
 """Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""
@@ -74,6 +75,16 @@ def quiet_style() -> Iterator[None]:
     }
     with matplotlib.rc_context(settings):
         yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of so many inches, without pyplot."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def new_axes(x: str, y: str, height: float = 2.8, right: float = 0.12) -> Any:

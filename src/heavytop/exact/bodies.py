@@ -278,13 +278,8 @@ class BodyMotion:
         return self._evaluated(time, bits, evaluate)
 
     @property
-    def start_gamma(self) -> Vector:
-        """γ at t = 0 in the axes given; of an irrational attitude to 256 bits."""
-        return self.start.gamma
-
-    @property
     def start_xi(self) -> Vector | None:
-        """ξ at t = 0 in the axes given, as :attr:`start_gamma`; None for |γ| ≠ 1 where no attitude was given."""
+        """ξ at t = 0 in the axes given, to 256 bits where irrational; None for |γ| ≠ 1 where no attitude was given."""
         xi = self.resolved.xi
         return None if xi is None else rotated(self.resolved.axes, xi)
 

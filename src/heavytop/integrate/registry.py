@@ -48,7 +48,7 @@ from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import DoubleTimes, HeavyTop, State
 
 GROUP = "heavytop.peers"
 """The entry point under which other packages name theirs."""
@@ -490,7 +490,7 @@ def _square_in_doubles(problem: Problem) -> float:
         return math.inf
 
 
-def _is_near(problem: Problem, end: Fraction) -> bool:
+def _is_near(problem: Problem, end: OrderedRing) -> bool:
     """True only where the end is in reach by far; in doubles."""
     try:
         return float(end) ** 2 * _square_in_doubles(problem) < _FAR_BELOW**2
@@ -498,13 +498,16 @@ def _is_near(problem: Problem, end: Fraction) -> bool:
         return False
 
 
-def require_reach(problem: Problem, end: Fraction, step_limit: int | None = None, step: Fraction | None = None) -> None:
+def require_reach(
+    problem: Problem, end: OrderedRing, step_limit: int | None = None, step: Fraction | None = None
+) -> None:
     """Raises OutOfReach where a run to the time ``end`` takes more than :data:`MOST_STEPS` :func:`expected_steps`.
 
     A run that ``step_limit`` ends early is in reach.
     """
     if (step_limit is not None and step_limit <= MOST_STEPS) or (step is None and _is_near(problem, end)):
         return
+    end = exact(end)
     steps = expected_steps(problem, end, step)
     if steps > MOST_STEPS:
         raise OutOfReach(
@@ -537,7 +540,8 @@ def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
         **more: Any,
     ) -> Any:
         if len(times):  # what is wrong with times is for the integrator to say
-            require_reach(Problem.of(top, start, precision, system), exact(times[-1]), options.get("step_limit"))
+            end = times.doubles[-1] if type(times) is DoubleTimes else exact(times[-1])
+            require_reach(Problem.of(top, start, precision, system), end, options.get("step_limit"))
         return run(top, start, times, precision, system=system, **more)
 
     return call

@@ -133,8 +133,6 @@ def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any
 
 
 ATTITUDE_ERROR, POSITION_ERROR = "attitude_error", "position_error"
-OVERLAP = Fraction(1, 10**6)
-"""Columns that say the same must agree to that."""
 _ONE = arb(1)
 Values = Mapping[str, Sequence[Fraction]]
 """The numbers of one sample by the name of the quantity."""

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+from heavytop.claims.algebra.reader import NUMBER, Descent
 from heavytop.claims.audit.values import SIZES
 from heavytop.suite.claim_library import Equation, Library, Published
 
@@ -19,44 +20,13 @@ from heavytop.suite.claim_library import Equation, Library, Published
 # Browsers show MathML by themselves: a page needs no script and fetches nothing.
 
 
-_TOKEN = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*'*|\*\*|[-+*/^(),])", re.ASCII)
 _NAME = re.compile(r"([A-Za-z]+?)_?(\d*)('*)")
-_GREEK = {
-    "alpha": "α",
-    "beta": "β",
-    "gamma": "γ",
-    "delta": "δ",
-    "epsilon": "ε",
-    "zeta": "ζ",
-    "eta": "η",
-    "theta": "θ",
-    "iota": "ι",
-    "kappa": "κ",
-    "lambda": "λ",
-    "mu": "μ",
-    "nu": "ν",
-    "xi": "ξ",
-    "pi": "π",
-    "rho": "ρ",
-    "sigma": "σ",
-    "tau": "τ",
-    "phi": "φ",
-    "chi": "χ",
-    "psi": "ψ",
-    "omega": "ω",
-    "Gamma": "Γ",
-    "Delta": "Δ",
-    "Theta": "Θ",
-    "Lambda": "Λ",
-    "Xi": "Ξ",
-    "Pi": "Π",
-    "Sigma": "Σ",
-    "Phi": "Φ",
-    "Psi": "Ψ",
-    "Omega": "Ω",
-}
+_LETTERS = (
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau phi chi psi omega "
+    "Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
+)
+_GREEK = dict(zip(_LETTERS.split(), "αβγδεζηθικλμνξπρστφχψωΓΔΘΛΞΠΣΦΨΩ", strict=True))
 _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
-_DEEPEST = 80
 _TIMES, _SPACE = "<mo>&#x2062;</mo>", '<mspace width="0.17em"/>'
 
 
@@ -94,43 +64,26 @@ def name(text: str) -> str:
     return f"<msub>{base}<mrow>{'<mo>,</mo>'.join(parts)}</mrow></msub>" if parts else base
 
 
-class _Writer:
-    """Recursive descent over the grammar of :mod:`heavytop.claims.algebra.reader`; each method returns MathML."""
+class _Writer(Descent):
+    """Each method returns MathML; names may have primes, and any name may be that of a function."""
 
-    def __init__(self, text: str) -> None:
-        self._tokens = _tokens(text)
-        self._place = 0
-        self._depth = 0
+    token = re.compile(rf"\s*(?:{NUMBER}|[A-Za-z]\w*'*|\*\*|[-+*/^(),])", re.ASCII)
+    deepest = 80
 
     def whole(self) -> str:
         """All of the text."""
         found = self._sum()
-        if self._next():
-            raise NoFormulaError(self._next())
+        self.end()
         return found
 
-    def _next(self) -> str:
-        return self._tokens[self._place] if self._place < len(self._tokens) else ""
-
-    def _take(self, *expected: str) -> str:
-        token = self._next()
-        if token and token in expected:
-            self._place += 1
-            return token
-        return ""
-
-    def _require(self, token: str) -> None:
-        if not self._take(token):
-            raise NoFormulaError(f"{token} expected")
+    def _error(self, what: str) -> NoFormulaError:
+        return NoFormulaError(what)
 
     def _sum(self) -> str:
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise NoFormulaError("nested too deeply")
-        found = self._term()
-        while sign := self._take("+", "-"):
-            found += ("<mo>+</mo>" if sign == "+" else "<mo>−</mo>") + self._term()
-        self._depth -= 1
+        with self._deeper("parentheses"):
+            found = self._term()
+            while sign := self._take("+", "-"):
+                found += ("<mo>+</mo>" if sign == "+" else "<mo>−</mo>") + self._term()
         return found
 
     def _term(self) -> str:
@@ -160,16 +113,13 @@ class _Writer:
         base, compound = self._atom()
         if not self._take("^", "**"):
             return base, compound
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise NoFormulaError("nested too deeply")
-        above, _ = self._signed_power()
-        self._depth -= 1
+        with self._deeper("powers"):
+            above, _ = self._signed_power()
         return f"<msup><mrow>{_fenced(base) if compound else base}</mrow><mrow>{above}</mrow></msup>", False
 
     def _atom(self) -> tuple[str, bool]:
         token = self._next()
-        self._place += 1
+        self._position += 1
         if token == "(":
             inside = self._sum()
             self._require(")")
@@ -181,26 +131,10 @@ class _Writer:
         return (self._function(token) if self._next() == "(" else name(token)), False
 
     def _function(self, token: str) -> str:
-        self._require("(")
-        arguments = [self._sum()]
-        while self._take(","):
-            arguments.append(self._sum())
-        self._require(")")
-        inside = "<mo>,</mo>".join(arguments)
+        inside = "<mo>,</mo>".join(self._arguments(self._sum))
         if token == "sqrt":
             return f"<msqrt>{inside}</msqrt>"
         return f"<mi>{_FUNCTIONS.get(token, token)}</mi><mo>&#x2061;</mo>{_fenced(inside)}"
-
-
-def _tokens(text: str) -> list[str]:
-    tokens, place, text = [], 0, text.rstrip()
-    while place < len(text):
-        match = _TOKEN.match(text, place)
-        if match is None:
-            raise NoFormulaError(text[place : place + 20])
-        tokens.append(match[1])
-        place = match.end()
-    return tokens
 
 
 def _number(token: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy
 
 from heavytop.claims.library.ershkov import Branch
-from heavytop.document.svg import document
+from heavytop.document.svg import document, new_figure
 from heavytop.measure.claim_error import Compared, Curves, Drawings, PaperCurve, Portrait
 
 # Okabe and Ito's colours, distinguished by any eye; line styles say the same again
@@ -69,15 +69,6 @@ def _quiet_style() -> Iterator[None]:
         yield
 
 
-def _new(width: float, height: float) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _save(figure: Any, stem: Path) -> list[Path]:
     svg, png = stem.with_suffix(".svg"), stem.with_suffix(".png")
     svg.write_text(document(figure), "utf-8")
@@ -87,7 +78,7 @@ def _save(figure: Any, stem: Path) -> list[Path]:
 
 def _paper_figure(paper: PaperCurve) -> Any:
     """One of Figs 2-8: the printed formula, its parameters, and a warning where they contradict each other."""
-    figure = _new(8, 5)
+    figure = new_figure(8, 5)
     axes = figure.add_subplot()
     spec = paper.figure
     axes.plot(paper.times, paper.values, color=BLUE)
@@ -124,7 +115,7 @@ def _comparison(compared: Compared) -> Any:
         ("gyrostat: what the formulas solve", compared.gyrostat, ORANGE, "--", 2.4),
         ("claim as printed", compared.claim, VERMILION, ":", 2.4),
     )
-    figure = _new(10, 6.2)
+    figure = new_figure(10, 6.2)
     grid = figure.subplots(2, 3, sharex=True)
     names = ("φ (rad)", "θ (rad)", "ψ (rad)", "Ω1", "Ω2", "Ω3")
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=True)):
@@ -152,7 +143,7 @@ def _column(curves: Curves, index: int) -> Any:
 
 def _portrait(portrait: Portrait) -> Any:
     """The momentum sphere of the gyrostat with its homoclinic orbit, and the true homoclinic orbit beside it."""
-    figure = _new(10, 5.6)
+    figure = new_figure(10, 5.6)
     left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
     for segment in portrait.levels:
         left.plot(*segment, color="#999999", lw=0.7)

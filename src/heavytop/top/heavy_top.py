@@ -8,7 +8,7 @@ from decimal import Decimal
 from fractions import Fraction
 from math import isqrt
 from operator import lt
-from typing import Any
+from typing import Any, cast
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import (
@@ -345,8 +345,8 @@ class DoubleTimes(RoundedTimes):
 
 def check_times(times: Iterable[Any]) -> CheckedTimes | DoubleTimes:
     """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
-    if isinstance(times, CheckedTimes | DoubleTimes):
-        return times
+    if type(times) in (CheckedTimes, DoubleTimes):  # isinstance of a Sequence takes as long as a step of heyoka
+        return cast(CheckedTimes | DoubleTimes, times)
     doubles = _as_doubles(times)
     if doubles is not None:
         return DoubleTimes(doubles)
@@ -369,7 +369,8 @@ def _as_doubles(times: Any) -> Any:
     if not 0 < len(found) <= MOST_MEMBERS:
         return None
     sizes = found if found[-1] > 0 else -found
-    far = (sizes[0] > _SMALL or sizes[0] == 0) and sizes[-1] < _LARGE
+    first, last = float(sizes[0]), float(sizes[-1])
+    far = (first > _SMALL or first == 0) and last < _LARGE
     return found if far and (len(found) == 1 or bool((sizes[1:] > sizes[:-1]).all())) else None
 
 

@@ -265,11 +265,16 @@ def in_space(document: Mapping[str, Any]) -> bool:
     return frame == "space"
 
 
-def _numbers(values: Any, what: str, count: int | None) -> list[Fraction]:
-    if not isinstance(values, list) or (count is not None and len(values) != count):
-        has = f"has {len(values)} numbers" if isinstance(values, list) else "is not a list"
-        raise InputError(f"{what} {has}.", f"Give {count} numbers." if count else "Give numbers.")
-    return [written_numbers.finite(value, f"a number of {what}") for value in values]
+def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
+    """A list of so many members; raises InputError for anything else."""
+    if not isinstance(value, list) or (count is not None and len(value) != count):
+        has = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
+        raise InputError(f"{what} {has}.", f"Give {count} numbers." if count else "Give a list.")
+    return value
+
+
+def _numbers(values: Any, what: str, count: int) -> list[Fraction]:
+    return [written_numbers.finite(value, f"a number of {what}") for value in listed(values, what, count)]
 
 
 def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
@@ -330,7 +335,7 @@ def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     space = in_space(document)
     states = document.get("states")
     if states is not None:
-        rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(_rows(states, "states"))]
+        rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(listed(states, "states"))]
         given["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
         given["gamma"] = "states", [row[3:] for row in rows]
     for key, name in _ARRAYS.items():
@@ -370,12 +375,6 @@ def _is_table(value: Any, name: str) -> bool:
     if not isinstance(value, list) or not value or not isinstance(value[0], list):
         return False
     return name != "matrix" or len(value[0]) == WIDTHS["matrix"] or (bool(value[0]) and isinstance(value[0][0], list))
-
-
-def _rows(value: Any, what: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise InputError(f"{what} is not a list.", "Give a list with a row for each time.")
-    return value
 
 
 def _flat(row: Any, width: int, what: str) -> list[Any]:

@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
@@ -266,7 +267,8 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         document, notes = (_json(text), []) if is_json else _table(text)
         name = "given" if piped else path.stem
         given = _observed if observed_columns.is_observed(document) else _given
-        return given(document, name, hashlib.sha256(content).hexdigest(), case, notes, normalize)
+        found = given(document, name, case, normalize)
+        return replace(found, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -308,9 +310,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     return table.keys | columns, table.notes
 
 
-def _given(
-    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> GivenTrajectory:
+def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
         raise too_many(len(document["times"]))
     top, at_start = _top(document, case), _row_of_start(document)
@@ -331,22 +331,11 @@ def _given(
     start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
-    return GivenTrajectory(
-        top=top,
-        start=start,
-        system=which,
-        precision=precision,
-        times=times,
-        states=states,
-        sha256=sha256,
-        notes=tuple(notes),
-        **_about(document, stem, case, None in states),
-    )
+    about = _about(document, stem, case, None in states)
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
 
 
-def _observed(
-    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
-) -> GivenTrajectory:
+def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
     times = _times(document)
     said = observed_columns.convention(document, document.get("header"))
@@ -360,27 +349,19 @@ def _observed(
     raw = _raw_start(document, table, not times[0], said, case)
     precision = _precision(document, table.texts)
     found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
-    require_physical(found.posed.top, found.posed.start)
-    return GivenTrajectory(
-        top=found.posed.top,
-        start=found.posed.start,
-        system=which,
-        precision=precision,
-        times=times,
-        states=rows,
-        sha256=sha256,
-        notes=tuple(notes),
-        observed=found,
-        **_about(document, stem, case, None in rows),
-    )
+    top, start = found.posed.top, found.posed.start
+    require_physical(top, start)
+    about = _about(document, stem, case, None in rows) | {"observed": found}
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
 
 
 def _times(document: dict[str, Any]) -> list[Fraction]:
     """The times, exact and in order; raises InputError where there is none but 0."""
-    listed = _list(document, "times") if "lines" not in document else observed_columns.times(document)
-    times = list(
-        check_times([each if isinstance(each, Fraction) else written_numbers.finite(each, "a time") for each in listed])
-    )
+    if "lines" in document:
+        given = observed_columns.times(document)
+    else:
+        given = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+    times = list(check_times(given))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     return times
@@ -476,10 +457,7 @@ def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[
     value = document.get(key)
     if value is None:
         raise InputError(f"The key {key} is missing.", REMEDY)
-    if not isinstance(value, list) or (count is not None and len(value) != count):
-        what = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
-        raise InputError(f"{key} {what}.", f"Give {count} numbers." if count else "Give a list.")
-    return value
+    return observed_columns.listed(value, key, count)
 
 
 def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:

@@ -30,7 +30,7 @@ from heavytop.precision import (
     round_to,
     shown,
 )
-from heavytop.top.attitude import Angle, Attitude, perpendicular
+from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -209,14 +209,8 @@ def of_quaternion(q: Sequence[Fraction]) -> Rows:
 
 def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     """w, x, y, z of the direction of a rotation matrix, of no unit length; by the largest of the four."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    candidates = (
-        [1 + a + e + i, h - f, c - g, d - b],
-        [h - f, 1 + a - e - i, b + d, c + g],
-        [c - g, b + d, 1 - a + e - i, f + h],
-        [d - b, c + g, f + h, 1 - a - e + i],
-    )
-    return list(max(enumerate(candidates), key=lambda pair: pair[1][pair[0]])[1])
+    first, second, third = map(_triple, rows)
+    return list(max(enumerate(quaternion_products((first, second, third))), key=lambda pair: pair[1][pair[0]])[1])
 
 
 def require_direction(values: Sequence[Fraction], what: str) -> None:
@@ -320,7 +314,7 @@ class GivenTrajectory:
     outcome: Outcome
     steps: int
     flags: dict[str, str]
-    sha256: str
+    sha256: str = ""
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
     observed: Observed | None = None
@@ -501,13 +495,8 @@ def posed(
     rows = rotation(start, said, precision, normalize)
     omega = body_omega(start, said, rows)
     in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
-    w, gamma, xi = (_vector(v) for v in in_principal)
+    w, gamma, xi = (_triple(v) for v in in_principal)
     return body, start, Posed(top, State(w, gamma), xi, axes, body.centre)
-
-
-def _vector(values: Sequence[Fraction]) -> Vector:
-    a, b, c = values
-    return a, b, c
 
 
 def observed(
@@ -610,7 +599,7 @@ def _in_memory(
 ) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, "", observed=found)
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=found)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:

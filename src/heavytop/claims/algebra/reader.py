@@ -11,13 +11,14 @@ is built, so that no formula can take more than its share of time and memory.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 from math import comb
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import sympy
 
@@ -36,14 +37,12 @@ FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (function, 3) for name, function in WEIERSTRASS.items()},
 }
 _MAX_LENGTH = 10_000
-_MAX_DEPTH = 60
 _MAX_NODES = 2_000
 _MAX_BITS = 4_096
 _MAX_EXPONENT = 64
 _MAX_DEGREE = 1_024
 _MAX_TERMS = 10**15
-_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 
 class ExpressionBounds(NamedTuple):
@@ -95,36 +94,34 @@ def _kept(name: str, formula: Formula) -> Formula:
 def _parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
     if len(text) > _MAX_LENGTH:
         raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
-    parser = _Parser(_tokens(text, where), names, where)
+    parser = _Parser(text, names, where)
     result = parser.sum()
     parser.end()
     return result
 
 
-def _tokens(text: str, where: str) -> list[str]:
-    tokens, position = [], 0
-    text = text.rstrip()
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        if match is None:
-            raise InputError(
-                f"{where}: {text[position : position + 20].strip()!r} is not part of a formula.",
-                "Use numbers, names, + - * / ^ ( ) and the functions " + ", ".join(FUNCTIONS) + ".",
-            )
-        tokens.append(match[0].strip())
-        position = match.end()
-    return tokens
+Part = TypeVar("Part")
 
 
-class _Parser:
-    """Recursive descent over the tokens; the depth is counted."""
+class Descent:
+    """What recursive descents over the grammar share: the tokens of a text, taken one by one, and a depth.
 
-    def __init__(self, tokens: list[str], names: Mapping[str, Formula], where: str) -> None:
-        self._tokens = tokens
-        self._names = names
-        self._where = where
-        self._position = 0
-        self._depth = 0
+    token: what a token is, white space before it.  deepest: how deep parentheses and powers may stand in one another.
+    """
+
+    token = re.compile(rf"\s*(?:{NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
+    deepest = 60
+
+    def __init__(self, text: str) -> None:
+        self._tokens: list[str] = []
+        self._position = self._depth = 0
+        place, text = 0, text.rstrip()
+        while place < len(text):
+            match = self.token.match(text, place)
+            if match is None:
+                raise self._no_token(text[place : place + 20])
+            self._tokens.append(match[0].strip())
+            place = match.end()
 
     def _next(self) -> str:
         return self._tokens[self._position] if self._position < len(self._tokens) else ""
@@ -141,28 +138,63 @@ class _Parser:
             there = self._next()[:20]
             raise self._error(f"{token!r} expected {f'before {there!r}' if there else 'at the end'}")
 
-    def _error(self, what: str) -> InputError:
-        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
+    @contextmanager
+    def _deeper(self, what: str) -> Iterator[None]:
+        self._depth += 1
+        if self._depth > self.deepest:
+            raise self._error(f"{what} nested deeper than {self.deepest}")
+        yield
+        self._depth -= 1
+
+    def _arguments(self, one: Callable[[], Part]) -> list[Part]:
+        """What stands in parentheses, between commas."""
+        self._require("(")
+        found = [one()]
+        while self._take(","):
+            found.append(one())
+        self._require(")")
+        return found
 
     def end(self) -> None:
-        """Raises InputError if anything is left."""
+        """Raises an error if anything is left."""
         if self._next():
             raise self._error(f"{self._next()[:20]!r} was not expected")
 
+    def _no_token(self, text: str) -> Exception:
+        return self._error(f"{text.strip()!r} is not part of a formula")
+
+    def _error(self, what: str) -> Exception:
+        raise NotImplementedError
+
+
+class _Parser(Descent):
+    """The formula that a text says in names; ``where`` says in error texts which one it is."""
+
+    def __init__(self, text: str, names: Mapping[str, Formula], where: str) -> None:
+        self._names = names
+        self._where = where
+        super().__init__(text)
+
+    def _no_token(self, text: str) -> InputError:
+        return InputError(
+            f"{self._where}: {text.strip()!r} is not part of a formula.",
+            "Use numbers, names, + - * / ^ ( ) and the functions " + ", ".join(FUNCTIONS) + ".",
+        )
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
+
     def sum(self) -> Formula:
         """The expression from here on."""
-        self._depth += 1
-        if self._depth > _MAX_DEPTH:
-            raise self._error(f"parentheses nested deeper than {_MAX_DEPTH}")
-        total = self._term()
-        while sign := self._take("+", "-"):
-            part = self._term()
-            total = self._checked(
-                total.expression + part.expression if sign == "+" else total.expression - part.expression,
-                _added(total.size, part.size),
-                total.needs | part.needs,
-            )
-        self._depth -= 1
+        with self._deeper("parentheses"):
+            total = self._term()
+            while sign := self._take("+", "-"):
+                part = self._term()
+                total = self._checked(
+                    total.expression + part.expression if sign == "+" else total.expression - part.expression,
+                    _added(total.size, part.size),
+                    total.needs | part.needs,
+                )
         return total
 
     def _term(self) -> Formula:
@@ -190,12 +222,9 @@ class _Parser:
         base = self._atom()
         if not self._take("^", "**"):
             return base
-        self._depth += 1
-        if self._depth > _MAX_DEPTH:
-            raise self._error(f"powers nested deeper than {_MAX_DEPTH}")
-        power = self._factor()
+        with self._deeper("powers"):
+            power = self._factor()
         exponent, needs = power.expression, base.needs | power.needs
-        self._depth -= 1
         if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
             raise self._error(
                 f"the exponent is no integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
@@ -244,11 +273,7 @@ class _Parser:
 
     def _function(self, token: str) -> Formula:
         function, count = FUNCTIONS[token]
-        self._require("(")
-        arguments = [self.sum()]
-        while self._take(","):
-            arguments.append(self.sum())
-        self._require(")")
+        arguments = self._arguments(self.sum)
         if len(arguments) != count:
             raise self._error(f"{token} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
         size = arguments[0].size

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cache
 from math import comb, exp, factorial, log
 from threading import Lock, RLock
 from time import perf_counter
@@ -212,6 +213,7 @@ _compiling: dict[tuple[Any, ...], RLock] = {}
 """One lock a key: what one thread compiles, another that needs the same waits for."""
 
 
+@cache
 def not_finite() -> Any:
     """The outcome of a step to a state that is not finite."""
     import heyoka
