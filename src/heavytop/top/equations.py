@@ -279,12 +279,10 @@ class Integral:
 
     name: as it appears in reports.
     value: the function, over any ring.
-    condition: where it holds, in words.
     """
 
     name: str
     value: Callable[[Parameters, Any], Any]
-    condition: str
 
 
 def momentum(p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
@@ -431,71 +429,66 @@ def holding(top: HeavyTop, start: State, system: System | None = None) -> tuple[
     system: without it the heavy gyrostat of a top with a rotor, else the heavy top.
     Invariant relations (Goryachev-Chaplygin, Hess) are offered only for starts on them.
     """
-    square = Integral("gamma_squared", gamma_squared, "every motion")
+    square = Integral("gamma_squared", gamma_squared)
     system = system or system_of(None, top)
     if system is GYROSTAT:
-        return (square, Integral("area", area, "every motion"), *_of_gyrostat(top))
+        return (square, Integral("area", area), *_of_gyrostat(top))
     with_rotor = system is HEAVY_GYROSTAT
-    about_gamma = Integral("area", area_with_rotor if with_rotor else area, "every motion")
+    about_gamma = Integral("area", area_with_rotor if with_rotor else area)
     more = _of_heavy_gyrostat if with_rotor else _of_heavy_top
     p = system.parameters(top, start)
-    return (square, about_gamma, Integral("energy", energy, "every motion"), *more(p, start.flat))
+    return (square, about_gamma, Integral("energy", energy), *more(p, start.flat))
 
 
 def _of_gyrostat(top: HeavyTop) -> Iterator[Integral]:
-    yield Integral("momentum_squared", momentum_squared, "every motion of the gyrostat")
-    yield Integral("gyrostat_energy", gyrostat_energy, "every motion of the gyrostat")
-    if top.inertia[0] == top.inertia[2]:
-        yield Integral("spin2", partial(spin, axes=(2, 0, 1)), "I1 = I3: the rotor lies on the axis of symmetry")
+    yield Integral("momentum_squared", momentum_squared)
+    yield Integral("gyrostat_energy", gyrostat_energy)
+    if top.inertia[0] == top.inertia[2]:  # the rotor lies on the axis of symmetry
+        yield Integral("spin2", partial(spin, axes=(2, 0, 1)))
 
 
 def _of_heavy_top(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
     n = p.moment
     if not any(n):
-        yield Integral("momentum_squared", momentum_squared, "Euler: P r = 0")
+        yield Integral("momentum_squared", momentum_squared)
     if p.inertia[0] == p.inertia[1] == p.inertia[2] and any(n):
-        yield Integral("moment_along_centre", moment_along_centre, "I1 = I2 = I3")
+        yield Integral("moment_along_centre", moment_along_centre)
     on_zero_area = area(p, y) == 0
     for axes in permutations(range(3)):
         i, j, k = axes
         i1, i2, i3 = (p.inertia[axis] for axis in axes)
         if i < j and i1 == i2:
             if n[i] == n[j] == 0:
-                yield Integral(f"spin{k + 1}", partial(spin, axes=axes), f"Lagrange about axis {k + 1}")
+                yield Integral(f"spin{k + 1}", partial(spin, axes=axes))
             if i1 == 2 * i3 and n[k] == 0:
-                yield Integral("kovalevskaya", partial(kovalevskaya, axes=axes), f"Kovalevskaya about axis {k + 1}")
+                yield Integral("kovalevskaya", partial(kovalevskaya, axes=axes))
         if i < j and i1 == i2 == 4 * i3 and n[k] == 0 and any(n) and on_zero_area:
-            yield Integral(
-                "goryachev_chaplygin",
-                partial(goryachev_chaplygin, axes=axes),
-                f"Goryachev-Chaplygin about axis {k + 1}, on M·gamma = 0",
-            )
+            yield Integral("goryachev_chaplygin", partial(goryachev_chaplygin, axes=axes))
         if i < k and n[j] == 0 and n[i] != 0 and n[k] != 0 and i1 * (i2 - i3) * n[i] ** 2 == i3 * (i1 - i2) * n[k] ** 2:
             relation = partial(hess, axes=axes)
             if relation(p, y) == 0:
-                yield Integral("hess", relation, "Hess, on its invariant relation")
+                yield Integral("hess", relation)
 
 
 def _of_heavy_gyrostat(p: Parameters, y: tuple[Fraction, ...]) -> Iterator[Integral]:
     n, rotor = p.moment, p.rotor
     if not any(n):
-        yield Integral("momentum_squared", momentum_with_rotor_squared, "Zhukovsky-Volterra: P r = 0")
+        yield Integral("momentum_squared", momentum_with_rotor_squared)
     if p.inertia[0] == p.inertia[1] == p.inertia[2] and any(n) and not any(cross(rotor, n)):
-        yield Integral("moment_along_centre", moment_along_centre, "I1 = I2 = I3, the rotor along r")
+        yield Integral("moment_along_centre", moment_along_centre)
     for axes in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         i, j, k = axes
         if p.inertia[i] != p.inertia[j] or rotor[i] != 0 or rotor[j] != 0:
             continue
         if n[i] == n[j] == 0:
-            yield Integral(f"spin{k + 1}", partial(spin, axes=axes), f"Lagrange's gyrostat about axis {k + 1}")
+            yield Integral(f"spin{k + 1}", partial(spin, axes=axes))
         if n[k] != 0 or not any(n):
             continue
         if p.inertia[i] == 2 * p.inertia[k]:
             relation = partial(kovalevskaya_yehia, axes=axes)
-            yield Integral("kovalevskaya_yehia", relation, f"Kovalevskaya-Yehia about axis {k + 1}")
+            yield Integral("kovalevskaya_yehia", relation)
         if p.inertia[i] == 4 * p.inertia[k] and area_with_rotor(p, y) == 0:
-            condition = f"Sretensky about axis {k + 1}, on M·gamma = 0"
-            yield Integral("sretensky", partial(sretensky, axes=axes), condition)
+            yield Integral("sretensky", partial(sretensky, axes=axes))
 
 
 # How fast a motion changes, from its parameters and start, in exact rationals.

@@ -166,27 +166,45 @@ def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: P
     """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
     import numpy
 
-    totals = abs(highs + lows)
-    odd = ((totals <= 1 / _LARGE) & (totals > 0)) | ~(totals < _LARGE)
+    odd = _outside(highs + lows, 1 / _LARGE, _LARGE)
     if precision.family in ("double", "extended"):
         # a zero has no sign
         found = numpy.add(highs + 0.0, lows, dtype="longdouble" if precision.family == "extended" else float)
-        return found if (sizes == 1).all() else found * sizes, odd.any(axis=1)
+        return found if (sizes == 1).all() else found * sizes, odd
     lows = lows * sizes
-    odd |= (lows != 0) & ~(abs(lows) > _LEAST_LOW)
-    return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd.any(axis=1)
+    odd |= _outside(lows, _LEAST_LOW, math.inf)
+    return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd
 
 
-def _added(start: Array, arrays: Sequence[Array]) -> Array:
-    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
+def _outside(values: Doubles, least: float, most: float) -> Any:
+    """The rows in which some number is neither 0 nor of a size between the two."""
+    import numpy
+
+    sizes = abs(values)
+    if sizes.min(initial=most) > least and sizes.max(initial=0) < most:
+        return numpy.zeros(len(sizes), bool)
+    return (((sizes <= least) & (sizes > 0)) | ~(sizes < most)).any(axis=1)
+
+
+def _added(start: Array, arrays: Sequence[Doubles]) -> Array:
+    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum, and
+    columns of zeros are passed over.
+    """
+    import numpy
+
     found = start + arrays[0]
     for each in arrays[1:]:
-        found += each
+        columns = numpy.flatnonzero(each.any(axis=0))
+        if len(columns) == each.shape[1]:
+            found += each
+        else:
+            for column in columns:
+                found[:, column] += each[:, column]
     return found
 
 
-def _reals(words: list[Doubles], grid: Grid, bits: int) -> Array:
-    """The sums of words, rounded once.
+def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array:
+    """The sums of words times the sizes, powers of two, rounded once.
 
     Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
     """
@@ -196,13 +214,20 @@ def _reals(words: list[Doubles], grid: Grid, bits: int) -> Array:
     zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
     # a double has 53 bits: of a larger one none is lost behind what the others begin with
     least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
+    scale = numpy.array([heyoka.real(float(size)) for size in sizes])
     if first > 0 and all(((abs(word) >= least) | (word == 0)).all() for word in words[first:]):
+        if early := least * sizes.min() > _LEAST_LOW:
+            words = [word * sizes for word in words]
         found = _added(zero, words[:first])
         found += _added(zero, words[first:])
-        return found
-    total = _added(heyoka.real(0, _EVERY_BIT), words)
-    rounded = [heyoka.real(value, bits) for value in total.ravel()]
-    return numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
+        if early:
+            return found
+    else:
+        total = _added(heyoka.real(0, _EVERY_BIT), words)
+        rounded = [heyoka.real(value, bits) for value in total.ravel()]
+        found = numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
+    found *= scale
+    return found
 
 
 def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
@@ -214,21 +239,19 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
 
     each = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
-        scale = numpy.array([heyoka.real(float(size)) for size in sizes])
-        found = _reals(each, grid, precision.bits)
-        found *= scale
-        return found, numpy.zeros(len(words), bool)
+        return _reals(each, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
     # two words fill a quad, and what the others add to is added to them at once
-    scaled = (word * sizes for k, word in enumerate(each) if k < 3 or word.any())
-    first, second, rest, *smaller = (word.astype(heyoka.real128) for word in scaled)
-    odd = numpy.zeros(words.shape[::2], bool)
+    first, second, third, *smaller = (word * sizes for word in each)
+    rest, odd = third.astype(heyoka.real128), numpy.zeros(len(words), bool)
     for word in smaller:
-        total = rest + word
-        odd |= (total - rest != word) | (total - word != rest)
-        rest = total
-    first += second
-    first += rest
-    return first, odd.any(axis=1)
+        for column in numpy.flatnonzero(word.any(axis=0)):
+            own, added = rest[:, column], word[:, column].astype(heyoka.real128)
+            total = own + added
+            odd |= (total - own != added) | (total - added != own)
+            rest[:, column] = total
+    found = first.astype(heyoka.real128) + second
+    found += rest
+    return found, odd
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:
@@ -299,9 +322,10 @@ class _Pace:
         import numpy
 
         assert isinstance(self.run, Floating)
-        times, rate = numpy.array(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
+        times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
-        status, words = self.run.sampled(highs * rate, (times - highs).astype(float) * rate)
+        lows = numpy.zeros(len(times)) if (times == highs).all() else (times - highs).astype(float)
+        status, words = self.run.sampled(highs * rate, lows * rate)
         places = list(PLACES[: len(self.scaled.sizes)])
         pairs = words.take(places, 1), words.take([place + 8 for place in places], 1)
         states, odd = _sums_of_columns(*pairs, sizes, precision)
@@ -312,7 +336,7 @@ class _Pace:
         import numpy
 
         assert isinstance(self.run, Fixed)
-        given, rate = numpy.array(targets), self.scaled.rate
+        given, rate = numpy.asarray(targets), self.scaled.rate
         times: Doubles = given.astype(float)
         if (given == times).all():  # the rate is a power of two
             status, words, others = self.run.sampled(abs(times) * float(rate))

@@ -394,6 +394,17 @@ class Code:
         values: Sequence[Operand],
     ) -> list[Operand]:
         """``values`` after ``values = body(i, values)`` for i from ``start`` to before ``stop``."""
+        return self.loop_while(start, stop, None, body, values)[1]
+
+    def loop_while(
+        self,
+        start: Index,
+        stop: Index,
+        holds: Callable[[list[Operand]], Operand] | None,
+        body: Callable[[Operand, list[Operand]], Sequence[Operand] | None],
+        values: Sequence[Operand],
+    ) -> tuple[Operand, list[Operand]]:
+        """The same up to the first i at which ``holds(values)`` does not, and that i."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
         b.branch(head)
@@ -401,13 +412,14 @@ class Code:
         index, carried = self.phi(INT), [self.phi(value.type) for value in values]
         self.add_incoming([index, *carried], [start, *values], before)
         inside, after = b.append_basic_block("body"), b.append_basic_block("after")
-        b.cbranch(index < stop, inside, after)
+        going = index < stop
+        b.cbranch(going & holds(carried) if holds else going, inside, after)
         b.position_at_end(inside)
         self.add_incoming(carried, body(index, carried) or [])
         self.add_incoming([index], [index + 1])
         b.branch(head)
         b.position_at_end(after)
-        return carried
+        return index, carried
 
     def either(
         self, condition: Operand, one: Callable[[], list[Operand]], other: Callable[[], list[Operand]]

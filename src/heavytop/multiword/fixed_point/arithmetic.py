@@ -282,8 +282,10 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
     return made
 
 
-def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand]) -> list[Operand]:
+def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand], zeros: int = 0) -> list[Operand]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
+
+    zeros: so many leading words of b are 0, and are passed over.
 
     a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
     the others at most 2^(b + 2).  Over 2^b units, the sum for level k is at most 2^4 for k = 0 and else
@@ -293,7 +295,7 @@ def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand]) 
     found, lows = [], [list[Operand]() for _ in range(grid.words)]
     for k in range(last):
         centre = total = code.constant(grid.centre(k))
-        for i in range(k + 1):
+        for i in range(k + 1 - zeros):
             after = code.fma(a[i], b[k - i], total)
             lows[k + 1].append(code.fma(a[i], b[k - i], -(after - total)))
             total = after
@@ -301,9 +303,10 @@ def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand]) 
     total = code.zero
     # those of the level below the last first: where a leading word is 0 they are what is left
     for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
-        total = code.fma(a[i], b[j], total)
+        if j >= zeros:
+            total = code.fma(a[i], b[j], total)
     found.append(total)
-    return [found[0], *(found[k] + in_pairs(lows[k]) for k in range(1, last + 1))]
+    return [found[0], *(found[k] + in_pairs(lows[k]) if lows[k] else found[k] for k in range(1, last + 1))]
 
 
 def passed_on(code: Code, grid: Grid, left: Operand, word: Operand) -> Operand:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial, reduce
 from typing import Any
 
 from llvmlite import ir
@@ -281,6 +282,8 @@ class SeriesCode:
 
 _SUM_BITS = 50
 _WORDS_AT_ONCE = 12
+_PARTS = 5
+"""Loops over the orders, each for sums with fewer leading words that are 0."""
 
 
 def most_of(grid: Grid) -> float:
@@ -316,20 +319,29 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
         starts = [code.address(at, place * words) for place in places]
         x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in starts]
 
-        def term(k: Operand, values: list[Operand]) -> list[Operand]:
+        def term(zeros: int, k: Operand, values: list[Operand]) -> list[Operand]:
             rows, found = [kept.stored(order - k, v) for v in range(vectors)], []
             for i in range(count):
                 sums, largest = [], values[width * (i + 1) - 1]
                 for v, row in enumerate(rows):
                     place = width * i + words * v
-                    product = bounded_product(code, grid, x[i], values[place : place + words])
+                    product = bounded_product(code, grid, x[i], values[place : place + words], zeros)
                     total = carried(code, grid, [one + other for one, other in zip(product, row, strict=True)])
                     largest = code.larger(code.absolute(total[0]), largest)
                     sums += total
                 found += [*sums, largest]
             return found
 
-        values = code.loop(0, order + 1, term, [code.zero] * (width * count))
+        def vanish(zeros: int, values: list[Operand]) -> Operand:
+            begins = [width * i + words * v for i in range(count) for v in range(vectors)]
+            leading = [code.absolute(value) for begin in begins for value in values[begin : begin + zeros]]
+            return ~code.any_of(reduce(code.larger, leading) > 0)
+
+        # as long as leading words of the sums are 0, products with them are passed over: high orders are small
+        k, values = code.integer(0), [code.zero] * (width * count)
+        for zeros in reversed(range(0, words, -(-words // _PARTS))):
+            holds = partial(vanish, zeros) if zeros else None
+            k, values = code.loop_while(k, order + 1, holds, partial(term, zeros), values)
         for i, place in enumerate(places):
             row = code.address(result, place * (8 * width))
             for index, value in enumerate(values[width * i : width * (i + 1)]):
