@@ -114,7 +114,9 @@ def _in_other_units(top: ht.HeavyTop, start: ht.State, rate: Fraction, turn: int
 
 def _motion(top: ht.HeavyTop, start: ht.State, case: Case, rate: Fraction, random: Random) -> dict[str, Any]:
     """Whether a difference or a law fails, or the derivatives are refused; the widest radius; seconds."""
-    at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 100) / rate
+    # up to 4, or a fifth of what a named body is used for
+    latest = min(Fraction(4), Fraction(case.horizon or 20, 5))
+    at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 400) * latest / rate
     try:
         began = time.process_time()
         known(top, start, case.system).state(at, BITS)
