@@ -6,6 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+import heavytop as ht
 from heavytop.comparison.noise import Policy, Rule, Timings
 from heavytop.comparison.verdicts import Verdict, judge_seconds
 from heavytop.document.document import short
@@ -310,6 +311,11 @@ def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
     store.write(report(row(), row()), tmp_path)
     with pytest.raises(InputError, match="twice"):
         store.read(tmp_path)
+    twice = report(with_metric(error("1E-12")), with_metric(error("1E-3")))
+    with pytest.raises(InputError, match=r"candidate holds the row .* twice"):
+        ht.compare(report(row()), twice)
+    with pytest.raises(InputError, match=r"holds the row .* twice"):
+        ht.history([report(row()), twice])
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from heavytop.render import history as over
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
 from heavytop.store import store
+from heavytop.store.checks import check_keys
 from heavytop.store.parquet import COLUMNS, lines
 
 if TYPE_CHECKING:
@@ -325,6 +326,10 @@ def _report(given: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
     """A report, or that of a path, whose rows are read as they are gone through; then ``read`` is called."""
     if not isinstance(given, records.Report | str | os.PathLike):
         raise InputError(f"{what} = {quoted(given)} is no report.", "Give a Report, or the path of one.")
-    found = given if isinstance(given, records.Report) else store.read_brief(arguments.path(given, what), KINDS)
+    if isinstance(given, records.Report):
+        check_keys(what, given.rows)
+        found: store.AnyReport = given
+    else:
+        found = store.read_brief(arguments.path(given, what), KINDS)
     read()
     return found

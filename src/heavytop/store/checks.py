@@ -243,7 +243,7 @@ _CLOSE = 1e-5
 """How far a log10 of six decimals may be from that of its value."""
 
 
-def check_keys(file: Path, rows: Iterable[Row]) -> None:
+def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
     """Raises InputError where a row is there twice."""
     seen = set()
     for row in rows:
