@@ -3,7 +3,8 @@
     python benchmarks/derivatives.py [--count 100] [--case NAME] [--records FILE [--seconds 240]]
     python benchmarks/derivatives.py --cost
 
-For each built-in case, COUNT random starts of its top (of a special motion: other roundings), each at a random time:
+For each built-in case and named body, COUNT random starts of its top, each at a random time (of a special motion COUNT
+times, in other units of mass and time and with other names of its axes):
 one random column of ∂y/∂y0 and one of ∂y/∂(I, n) against a central difference of references, every law of the flow, and
 the seconds of this process against those of the enclosure without derivatives.  A line a case.  With --records a line
 of JSON a motion goes to FILE, those that stand there are not measured again, and no motion begins after --seconds.
@@ -17,6 +18,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -25,11 +27,11 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import heavytop as ht
-from heavytop.cases import CASES, Case
+from heavytop.cases import CASES, Case, named_bodies
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import working_precision
-from heavytop.measure.rounding_noise import FACTORS
 from heavytop.suite.case_text import ensemble_of, one_motion
+from heavytop.top.equations import GYROSTAT
 from support.derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
 
 
@@ -48,7 +50,7 @@ def main() -> int:
     lines = given.records.read_text().splitlines() if given.records and given.records.exists() else []
     known = {(record["case"], record["motion"]): record for record in map(json.loads, lines)}
     end = time.monotonic() + given.seconds
-    cases = [case for name, case in CASES.items() if given.case in (None, name)]
+    cases = [case for name, case in (CASES | named_bodies()).items() if given.case in (None, name)]
     wrong = [_case(case, given.count, known, given.records, end) for case in cases]
     return int(any(wrong))
 
@@ -72,11 +74,15 @@ def _case(
     case: Case, count: int, known: dict[tuple[str, int], dict[str, Any]], records: Path | None, end: float
 ) -> bool:
     """Measure what is not known yet, and print a line; whether anything is wrong."""
-    members = ensemble_of(case, min(count, FACTORS) if one_motion(case, 0) else count, 28)
+    members, special = ensemble_of(case, count, 28), one_motion(case, 0)
     for number, (top, start) in enumerate(members):
         if (case.name, number) in known or time.monotonic() > end:
             continue
-        record = {"case": case.name, "motion": number, **_motion(top, start, case, Random(f"{case.name} {number}"))}
+        random = Random(f"{case.name} {number}")
+        rate = Fraction(random.randint(1, 99), random.randint(1, 99)) if special else Fraction(1)
+        # a gyrostat of (2.1) has its centre of mass on axis 2
+        top, start = _in_other_units(top, start, rate, number % 3 if special and case.system is not GYROSTAT else 0)
+        record = {"case": case.name, "motion": number, **_motion(top, start, case, rate, random)}
         known[case.name, number] = record
         if records:
             with records.open("a") as file:
@@ -95,9 +101,22 @@ def _case(
     return bool(wrong)
 
 
-def _motion(top: ht.HeavyTop, start: ht.State, case: Case, random: Random) -> dict[str, Any]:
+def _in_other_units(top: ht.HeavyTop, start: ht.State, rate: Fraction, turn: int) -> tuple[ht.HeavyTop, ht.State]:
+    """The motion ``rate`` times as fast, with axis 1 + turn called 1, and so on."""
+
+    def renamed(values: Sequence[Fraction], factor: Fraction = Fraction(1)) -> list[Fraction]:
+        return [factor * value for value in (*values[turn:], *values[:turn])]
+
+    rotor = None if top.rotor is None else renamed(top.rotor, rate)
+    faster = ht.HeavyTop(renamed(top.inertia), rate**2 * top.weight, renamed(top.centre), rotor)
+    return faster, ht.State(renamed(start.omega, rate), renamed(start.gamma))
+
+
+def _motion(top: ht.HeavyTop, start: ht.State, case: Case, rate: Fraction, random: Random) -> dict[str, Any]:
     """Whether a difference or a law fails, or the derivatives are refused; the widest radius; seconds."""
-    at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 100)
+    # up to 4, or a fifth of what a named body is used for
+    latest = min(Fraction(4), Fraction(case.horizon or 20, 5))
+    at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 400) * latest / rate
     try:
         began = time.process_time()
         known(top, start, case.system).state(at, BITS)

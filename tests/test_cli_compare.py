@@ -74,6 +74,27 @@ def test_all_files_are_written_or_none(reports, monkeypatch, capsys, refused: st
     assert captured.out == ""
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "compare old worse --html worse/report.json",
+        "compare old worse/report.json --junit old/../worse/report.json",
+        "compare old worse --policy rules.toml --markdown rules.toml",
+        "history old worse --html old/report.json",
+        "show old --html old/report.json",
+        "show old/report.json --markdown old/../old/report.json",
+        "export old --to csv --out old/report.json",
+        "score rules.toml --html rules.toml",
+    ],
+)
+def test_what_is_read_is_not_written_over(reports, monkeypatch, capsys, line: str) -> None:
+    (reports / "rules.toml").write_text("floor = 4\n")
+    before = {path: path.read_bytes() for path in reports.rglob("*") if path.is_file()}
+    assert heavytop(monkeypatch, *line.split()) == 2
+    assert {path: path.read_bytes() for path in reports.rglob("*") if path.is_file()} == before
+    assert f"{line.split()[-1]} is named twice" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("nth", [1, 2])
 def test_a_full_disk_leaves_no_file_behind(reports, monkeypatch, capsys, nth: int) -> None:
     synced = []

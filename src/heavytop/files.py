@@ -62,12 +62,8 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
 def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
     """Write several files, all of them or none.
 
-    Raises InputError where one cannot be written, or is named twice.
+    Raises InputError where one cannot be written.
     """
-    names = [path.resolve() for path, _ in contents]
-    for number, (path, _) in enumerate(contents):
-        if names[number] in names[:number]:
-            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
     with ExitStack() as stack:
         for path, content in contents:
             file = stack.enter_context(whole(path))

@@ -225,6 +225,7 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """What makes a row the same row in another report.
 
+    precision: written always: a default is left out where it is the same object, and not where a worker sent it.
     direction: of time, where rows differ in it.  horizon: the last time, as text.
     """
 
@@ -232,7 +233,7 @@ class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     case: str
     system: str
     subject: Subject
-    precision: str = EXACT
+    precision: str = msgspec.field(default_factory=lambda: EXACT)
     direction: Direction = ""
     horizon: str = "0"
 

@@ -188,3 +188,18 @@ def test_tops_one_after_the_other_do_not_mix() -> None:
                 for form in ("double", "extended"):
                     states = [str(v) for v in ht.propagate(top, start, [1], form).states.ravel()]
                     assert fresh.setdefault((i, j, form), states) == states, turn
+
+
+def test_an_option_that_changes_between_two_calls_is_looked_at_in_each() -> None:
+    """An array without dimensions is one object, whatever it holds."""
+    xi, tolerance, limit = numpy.array([0.0, 1.0, 0.0]), numpy.array(1e-15), numpy.array(1)
+    for integrator in ("heyoka", "multiword"):
+        found = []
+        for changed in (0, 1):
+            xi[1], tolerance[()], limit[()] = (1, -1)[changed], (1e-15, 1e-8)[changed], (1, 1000)[changed]
+            runs = [
+                ht.propagate(TOP, START, [1, 9], integrator=integrator, **option)
+                for option in ({"xi": xi}, {"tolerance": tolerance}, {"step_limit": limit})
+            ]
+            found.append([(run.steps, run.states.tolist()) for run in runs])
+        assert all(before != after for before, after in zip(*found, strict=True)), integrator

@@ -190,8 +190,8 @@ def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
 @pytest.mark.parametrize("digits", [None, 20])
 def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
     free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
-    for power in range(1, 10):
-        for function, first in ((f"gamma1**{power}", math.pi / 2), (f"gamma2**{power}/gamma1**2", math.pi)):
+    for power in (1, 2, 3, 8, 9):
+        for function, first in ((f"gamma1**{power}", math.pi / 2), (f"gamma2^{power}/gamma1**2", math.pi)):
             found = ht.events(free, start, 6, function, digits=digits)
             times = found.times if digits is None else found.times_numpy()
             expected = np.arange(first, 6, math.pi) if power % 2 else []

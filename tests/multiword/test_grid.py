@@ -19,10 +19,10 @@ from heavytop.multiword.codegen.machine_code import (
     once,
     pointer,
 )
-from heavytop.multiword.fixed_point import arithmetic, fixed_point_run
+from heavytop.multiword.fixed_point import arithmetic, fixed_point_run, steps
 from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, digits, exact, grid_for, grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
-from heavytop.multiword.fixed_point.steps import build
+from heavytop.multiword.fixed_point.steps import build, sample_row
 from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support.words_helpers import LEVELS, problem
@@ -211,6 +211,31 @@ def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
         last = Fraction(run.grid.unit(1)) / 2**50
         for value, exact_sum in zip(run.state[:3], total[:3], strict=True):
             assert abs(value - exact_sum) <= last
+
+
+@pytest.mark.parametrize("words", [3, 6])
+def test_a_sample_is_the_sum_of_the_coefficients_and_zeros_that_are_passed_over_change_no_bit(
+    words: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, random = Fixed(problem(), grid_of(words), True), Random(words)
+    for _ in range(3):
+        assert run.advance(Fraction(10**6), 1) is Status.FINE
+    began, length = run._began, run.time - run._began
+    coefficients = [run.coefficients(n) for n in range(run.order + 1)]
+    at, rows = doubles(words * 40), [doubles(sample_row(run.grid, 1) * 40) for _ in range(2)]
+    for place in range(40):
+        x = Fraction(random.randint(0, 2**12), 2**12) / 2 ** random.randint(0, 9)
+        at[words * place : words * (place + 1)] = digits(x, run.grid)
+        if place > 4:
+            continue
+        for value, column in zip(run.sample(began + x * length), zip(*coefficients, strict=True), strict=True):
+            total = sum(c * x**n for n, c in enumerate(column))
+            assert abs(value - total) * 2**run.grid.total < run.order + words
+    for parts, row in zip((steps._PARTS, 1), rows, strict=True):
+        monkeypatch.setattr(steps, "_PARTS", parts)
+        machine = build(run.grid, HEAVY_TOP, False)
+        machine.functions["samples"](pointer(run.rows), run.order, pointer(at), 0, 40, pointer(row))
+    assert rows[0].tobytes() == rows[1].tobytes()
 
 
 @pytest.mark.parametrize("words", [3, 4, 6])

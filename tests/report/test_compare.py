@@ -269,6 +269,18 @@ def test_an_edited_report_is_refused(tmp_path: Path, old: bytes, new: bytes, mes
         store.read(edited(tmp_path, old, new))
 
 
+@pytest.mark.parametrize("text", ["1_0", "\u0967", "much", "inf", "nan"])
+@pytest.mark.parametrize("place", ["bound", "times"])
+def test_a_number_that_is_none_is_refused_wherever_it_stands(tmp_path: Path, place: str, text: str) -> None:
+    """Also beside a value that is plainly a number, and what Python's own float reads."""
+    metric = error("1E-12")
+    series = {"drift_energy": Series([text if place == "times" else "1", "100"], ["1E-13", "1E-12"])}
+    edit = replace(metric, bound=text) if place == "bound" else metric
+    store.write(report(row(metrics={"drift_energy_max": edit}, series=series)), tmp_path)
+    with pytest.raises(InputError, match=f"drift_energy.*{text}.*not a finite number"):
+        store.read(tmp_path)
+
+
 def test_any_edit_is_refused_while_the_checksum_lies_beside_the_report(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="was changed since it was written"):
         store.read(edited(tmp_path, b'"steps":10', b'"steps":11', keep_digest=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -11,7 +12,7 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.records import Law, Metric, Quantity, Row, Series, by_name
+from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from support.small_reports import row
 
 METRICS = [
@@ -31,6 +32,13 @@ def test_no_field_of_a_record_can_be_set(record: object) -> None:
     for name in record.__struct_fields__:
         with pytest.raises(AttributeError):
             setattr(record, name, getattr(record, name))
+
+
+@pytest.mark.parametrize("precision", [{}, {"precision": "double"}])
+def test_a_key_that_a_worker_sent_is_written_alike(precision: dict[str, str]) -> None:
+    """The same bytes from one process and from several."""
+    key = RowKey("audit", "c", "heavy_top", Subject("claimed", "x"), **precision)
+    assert msgspec.json.encode(pickle.loads(pickle.dumps(key))) == msgspec.json.encode(key)
 
 
 @pytest.mark.parametrize(("a", "b"), list(product(METRICS, METRICS)))

@@ -91,6 +91,12 @@ def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Pat
         (table(order=(0, 4, 5, 6, 1, 2, 3)), "Ω1 of the row t = 0 = 0.285714, but in the case lagrange it is 1/5"),
         ("# wieght: 3\n" + table(), "Unknown key 'wieght'"),
         (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 stands twice"),
+        (table("t,w0,w1,w3,g1,g2,g3"), "There are omega0 and omega3"),
+        (table("t,phi [deg],theta [rad],psi [deg],g1,g2,g3"), "in degrees and in radians"),
+        (
+            "# angles: degrees\n" + table("t,phi_rad,theta_rad,psi_rad,g1,g2,g3"),
+            "header says radians and angles = degrees",
+        ),
         (table("t,a,b,c,d,e,f"), "The first line is not t,omega1.*: omega1, omega2"),
         (table(None, order=range(3)), "there is no header, and Row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
@@ -105,6 +111,14 @@ def test_a_table_that_cannot_be_meant_is_refused(text: str | bytes, message: str
         scored(tmp_path, text)
     assert caught.value.remedy
     assert len(caught.value.cause) < 400
+
+
+@pytest.mark.parametrize("text", ["1.#INF", "-1.#IND", "1.#QNAN0", "nan"])
+def test_a_state_without_a_number_is_no_remark(text: str, tmp_path: Path) -> None:
+    lines = table().splitlines()
+    cells = lines[-1].split(",")
+    given = scored(tmp_path, "\n".join([*lines[:-1], ",".join([*cells[:3], text, *cells[4:]]) + " # a remark"]))
+    assert [state is None for state in given.states] == [False] * (len(given.states) - 1) + [True]
 
 
 def test_rounded_data_of_a_case_are_still_that_case(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def propagate(
         tolerance,
         high_accuracy,
         compact_mode,
-        step_limit,
+        arguments.steps(step_limit),
         observer,
     )
     return run(times)

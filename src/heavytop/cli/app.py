@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -122,6 +122,18 @@ def require_new(folder: Path) -> None:
     """Raises InputError for a folder that holds anything already."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} already holds other content.", "Give a new folder with --out.")
+
+
+def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
+    """Raises InputError where a file to be written is named twice, or is one that is read, or a report in a folder."""
+    written = [path for path in files if path is not None]
+    sources = [place for path in read if path and written for place in (path, path / "report.json")]
+    taken = {absolute(place).resolve() for place in sources if place.is_file()}
+    for path in written:
+        place = absolute(path).resolve()
+        if place in taken:
+            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
+        taken.add(place)
 
 
 def absolute(path: Path) -> Path:

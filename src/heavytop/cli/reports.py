@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, absolute, cases, command, plans, print_json, require_new, show_on_terminal, writing
+from heavytop.cli.app import (
+    Json,
+    absolute,
+    cases,
+    command,
+    plans,
+    print_json,
+    require_apart,
+    require_new,
+    show_on_terminal,
+    writing,
+)
 from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
 from heavytop.render import FORMATS
@@ -44,6 +55,7 @@ def compare(
     """
     from heavytop.api.reports import compared
 
+    require_apart((html, markdown, junit), baseline, candidate, policy)
     with counted("comparing", 2, "reports read", _REPORT_SECONDS) as advance:
         found = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
     files: list[tuple[Path, str]] = []
@@ -76,6 +88,7 @@ def history(
     from heavytop.api.reports import read_history
     from heavytop.render.history import history_text
 
+    require_apart((html,), *reports, policy)
     with counted("reading", len(reports), "reports", _REPORT_SECONDS) as advance:
         found = read_history(reports, metric, case, policy, advance)
     if html is not None:
@@ -114,9 +127,7 @@ def show(
     if parquet is not None:
         tables.check_name(parquet)
     files = [path for path in (parquet, html, markdown) if path is not None]
-    for place, path in enumerate(files):
-        if path.resolve() in [other.resolve() for other in files[:place]]:
-            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
+    require_apart(files, report)
     if not files:
         _print(report, full, json)
         return 0
@@ -171,6 +182,7 @@ def export(
     """
     from heavytop.api.reports import read_report
 
+    require_apart((out,), report)
     text = read_report(report).export(to)
     if out is None:
         print(text, end="")
@@ -300,6 +312,7 @@ def score(
     if out is not None:
         out = absolute(out)
         require_new(out)
+    require_apart((html,), trajectory)
     page = None if html is None else absolute(html)
     given, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
     for warning in given.warnings():

@@ -119,7 +119,7 @@ class Ratio:
         if count.denominator != 1:
             raise NotRational(f"the power {count}")
         if abs(count) > _HIGHEST:
-            raise InputError(f"The function has a power {quoted(power)}.", f"Powers go up to {_HIGHEST}.")
+            raise InputError(f"The function has a power {quoted(int(count))}.", f"Powers go up to {_HIGHEST}.")
         base = self if count >= 0 else Ratio.of(1) / self
         found = Ratio.of(1)
         for _ in range(abs(int(count))):
@@ -246,7 +246,7 @@ def _parsed(text: str) -> Ratio:
     """The rational function of a text, in which one ``=`` may stand."""
     if len(text) > _LONGEST:
         raise InputError(f"A function of {len(text)} characters is too long.", f"At most {_LONGEST} are read.")
-    sides = text.split("=")
+    sides = text.replace("^", "**").split("=")
     if len(sides) > 2 or not all(side.strip() for side in sides):
         raise InputError(f"{quoted(text)} is not a function.", _REMEDY)
     try:

@@ -285,29 +285,27 @@ def _check_series(file: Path, rows: Iterable[Row]) -> None:
         for name, series in row.series.items():
             if len(series.times) != len(series.values):
                 raise InputError(f"{_where(file, row)}, {printable(name)[:60]}: not one value for each time.", REMEDY)
-            for text in (*series.times, *series.values):
-                if text not in WORDS["value"] and not _plain(text):
+            if not all(map(isfinite, _floats([*series.times, *series.values]))):
+                for text in (*series.times, *(value for value in series.values if value not in WORDS["value"])):
                     _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
 
 
-def _plain(text: str) -> bool:
-    """Whether it is plainly a finite number, told without the cost of an exact one."""
+def _floats(texts: Sequence[str]) -> list[float]:
+    """Numbers, told without the cost of exact ones; nan alone where a text is none, or one in Python's way only."""
+    joined = "".join(texts)
     try:
-        return isfinite(float(text))
+        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
     except ValueError:
-        return False
+        return [math.nan]
 
 
 def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     """The ids of the metrics that are not plainly a number with its logarithm; told in a few strokes."""
-    try:
-        values = numpy.array(list(map(float, [metric.value for metric in metrics])))
-    except ValueError:
-        return set(map(id, metrics))
-    given = numpy.array([metric.log10 for metric in metrics], dtype=float)
+    values = numpy.array(_floats([metric.value for metric in metrics]))
+    given = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
     with numpy.errstate(all="ignore"):
         # the logarithm of a negative number is none
-        plain = abs(numpy.log10(values) - given) < _CLOSE / 2
+        plain = numpy.abs(numpy.log10(values) - given) < _CLOSE / 2
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 

@@ -16,7 +16,7 @@ from heavytop.precision import Vector, exact, vector
 from heavytop.trajectories.observed import RawStart
 
 REMEDY = "`heavytop docs score` lists the columns that are understood."
-_DEGREES = re.compile(r"[\[(/]?\s*(deg|degrees?|°)\s*[\])]?$", re.IGNORECASE)
+_UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
 _POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
 _MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
 _SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
@@ -40,12 +40,12 @@ class Header:
     """What the columns of a table are.
 
     time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
-    their names, in the order in which they stand.  degrees: whether the header says so of angles.  others: not read.
+    their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
     """
 
     time: int | None
     places: Mapping[str, Mapping[str, int]]
-    degrees: bool
+    angles: str
     others: tuple[str, ...]
 
     def of_state(self) -> dict[str, int]:
@@ -53,9 +53,11 @@ class Header:
         found = {} if self.time is None else {"t": self.time}
         for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
             components = self.places.get(quantity, {})
+            if {"0", "3"} <= set(components):
+                raise InputError(f"There are {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2.")
             for component, place in components.items():
                 axis = _AXES.get(component) or str(int(component) + ("0" in components))
-                if axis <= "3" and found.setdefault(f"{name}{axis}", place) != place:
+                if found.setdefault(f"{name}{axis}", place) != place:
                     raise InputError(f"The column {name}{axis} stands twice.", "Give each column once.")
         return found
 
@@ -63,7 +65,7 @@ class Header:
 def header(names: Sequence[str]) -> Header:
     """The meaning of every column; raises InputError for one that stands twice."""
     found: dict[str, dict[str, int]] = {}
-    time, degrees, others = None, False, []
+    time, units, others = None, set(), []
     for place, name in enumerate(names):
         plain = _plain(name)
         if plain in ("t", "time"):
@@ -81,13 +83,16 @@ def header(names: Sequence[str]) -> Header:
             said = f"{quantity}{_AXES.get(component, component)}" if plainly else quoted(name)
             raise InputError(f"The column {said} stands twice.", "Give each column once.")
         found[quantity][component] = place
-        degrees = degrees or (quantity == "euler" and bool(_DEGREES.search(name.strip())))
-    return Header(time, found, degrees, tuple(others))
+        if quantity == "euler" and (unit := _UNIT.search(name.strip())):
+            units.add("degrees" if unit[1] else "radians")
+    if len(units) > 1:
+        raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
+    return Header(time, found, "".join(units), tuple(others))
 
 
 def _plain(name: str) -> str:
     text = unicodedata.normalize("NFKC", re.sub(r"\s*[\[(/].*$", "", name)).lower()
-    text = re.sub(r"_deg(rees)?$", "", text.strip())
+    text = re.sub(r"_(deg(rees)?|rad(ians)?)$", "", text.strip())
     return re.sub(r"[\s_{}\\.^-]", "", text)
 
 
@@ -235,10 +240,10 @@ def convention(document: Mapping[str, Any], header: Header | None = None) -> Con
     for key in ("sequence", "angles", "up"):
         if (word := _word(document, key)) is not None:
             said[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
-    if header is not None and header.degrees:
-        if said.get("angles", "degrees") != "degrees":
-            raise InputError("The header says degrees and angles = radians.", "Say the unit of angles once.")
-        said["angles"] = "degrees"
+    if header is not None and header.angles and said.setdefault("angles", header.angles) != header.angles:
+        raise InputError(
+            f"The header says {header.angles} and angles = {said['angles']}.", "Say the unit of angles once."
+        )
     for key in ("pivot", "point"):
         if document.get(key) is not None:
             said[key] = vector(_numbers(document[key], key, 3), key)

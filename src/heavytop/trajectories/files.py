@@ -47,6 +47,8 @@ VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
+_REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
+"""What stands behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
 _ALL_COLUMNS = "Give every row all of its columns."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
@@ -155,7 +157,7 @@ def _separator(line: str) -> str | None:
 def _cells(line: str, separator: str | None) -> list[str]:
     if separator is None and any(mark in line for mark in ";,\t"):
         separator = _separator(line)
-    line = line.partition("#")[0].rstrip()
+    line = _REMARK.sub("", line).rstrip()
     cells = line.split(separator)
     # a separator behind the last column is no column
     if separator and len(cells) > 1 and not cells[-1].strip():

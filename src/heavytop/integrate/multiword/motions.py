@@ -187,19 +187,10 @@ def _outside(values: Doubles, least: float, most: float) -> Any:
 
 
 def _added(start: Array, arrays: Sequence[Doubles]) -> Array:
-    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum, and
-    columns of zeros are passed over.
-    """
-    import numpy
-
+    """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
     found = start + arrays[0]
     for each in arrays[1:]:
-        columns = numpy.flatnonzero(each.any(axis=0))
-        if len(columns) == each.shape[1]:
-            found += each
-        else:
-            for column in columns:
-                found[:, column] += each[:, column]
+        found += each
     return found
 
 
@@ -219,7 +210,10 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
         if early := least * sizes.min() > _LEAST_LOW:
             words = [word * sizes for word in words]
         found = _added(zero, words[:first])
-        found += _added(zero, words[first:])
+        for column in range(len(sizes)):
+            rest = [word[:, column] for word in words[first:] if word[:, column].any()]
+            if rest:
+                found[:, column] += rest[0] if len(rest) == 1 else _added(zero, rest)
         if early:
             return found
     else:
