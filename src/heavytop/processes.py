@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Python's own: a file such as random.py in the working directory is not taken for a module."""
-_LAST_SECONDS = 1.0
+_LAST_SECONDS = 5.0
 """That a process has to end once it has closed its pipe."""
 _starting = Lock()
 
