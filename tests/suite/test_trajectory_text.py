@@ -11,6 +11,7 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
+from heavytop.trajectories.columns import header
 from heavytop.trajectories.files import TextTable, read, unread
 from heavytop.written_numbers import format_of, number
 
@@ -40,6 +41,8 @@ def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
         table().encode("utf-16"),
         table().replace("\n", "\r\n"),
         table("time [s];w_x;w_y;w_z;g_x;g_y;g_z", ";"),
+        table("t(1);omega[1] [1/s];omega[2];omega[3];gamma(1);gamma(2);gamma(3)", ";"),
+        table("t;Ω[0];Ω[1];Ω[2];γ1 [1];γ2 [1];γ3 [1]", ";"),
         table("T;OMEGA_1;OMEGA_2;OMEGA_3;GAMMA_1;GAMMA_2;GAMMA_3", ";").replace(".", ","),
         table("t\tp\tq\tr\tγ₁\tγ₂\tγ₃", "\t"),
         table('"t" "\\Omega_{1}" "\\Omega_{2}" "\\Omega_{3}" "\\gamma_{1}" "\\gamma_{2}" "\\gamma_{3}"', " "),
@@ -51,7 +54,7 @@ def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
         table(HEADER + ",energy", order=(*range(7), 1)),
         table("// t, omega (rad/s)\n" + HEADER) + "\n\n",
     ],
-    ids=range(13),
+    ids=range(15),
 )
 def test_a_table_of_another_program_is_read_as_it_was_meant(text: str | bytes, tmp_path: Path) -> None:
     given = scored(tmp_path, text)
@@ -79,6 +82,23 @@ def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Pat
     assert "--case" in caught.value.remedy
     with pytest.raises(InputError, match="The only time is 0"):
         scored(tmp_path, table(rows=[[0.0, *STATES[0]]]))
+
+
+@pytest.mark.parametrize(
+    ("names", "quantity", "components"),
+    [
+        ("R[1][1] R[1][2]", "matrix", ["11", "12"]),
+        ("R(0,0) matrix[0][1]", "matrix", ["00", "01"]),
+        ("q[0] q[1] q[2] q[3]", "quaternion", ["0", "1", "2", "3"]),
+        ("q(w) quat(x)", "quaternion", ["w", "x"]),
+        ("p[rad/s] q[1/s] r", "omega", ["1", "2", "3"]),  # no index, nor in the next
+        ("phi[1] theta[rad] psi[rad]", "euler", ["1", "2", "3"]),
+        ("x[1] y[m] z", "position", ["x", "y", "z"]),
+    ],
+)
+def test_what_stands_in_brackets_is_an_index_or_a_unit(names: str, quantity: str, components: list[str]) -> None:
+    found = header(names.split())
+    assert (found.others, {name: list(places) for name, places in found.places.items()}) == ((), {quantity: components})
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from heavytop.trajectories.observed import RawStart
 
 REMEDY = "`heavytop docs score` lists the columns that are understood."
 _UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
+_INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)?[\])])+)(?:\s.*)?", re.IGNORECASE)
 _POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
 _MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
 _SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
@@ -33,6 +34,7 @@ _EULER = {
 _TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
 _AXES = {"x": "1", "y": "2", "z": "3"}
 _CLASSIC = {"p": "1", "q": "2", "r": "3"}
+_TIME = ("t", "time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +69,8 @@ def header(names: Sequence[str]) -> Header:
     found: dict[str, dict[str, int]] = {}
     time, units, others = None, set(), []
     for place, name in enumerate(names):
-        plain = _plain(name)
-        if plain in ("t", "time"):
+        plain = _plain(_with_index(name.strip()))
+        if plain in _TIME:
             if time is not None:
                 raise InputError("The column t stands twice.", "Give each column once.")
             time = place
@@ -88,6 +90,15 @@ def header(names: Sequence[str]) -> Header:
     if len(units) > 1:
         raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
     return Header(time, found, "".join(units), tuple(others))
+
+
+def _with_index(name: str) -> str:
+    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``: what is in brackets is no unit but a component."""
+    match = _INDEXED.fullmatch(name)
+    base = _plain(match[1]) if match else ""
+    if match is None or base in _TIME or (base not in _CLASSIC and _meaning(base) is not None):
+        return name
+    return match[1] + re.sub(r"[^\w]", "", match[2])
 
 
 def _plain(name: str) -> str:
