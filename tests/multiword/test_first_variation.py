@@ -33,7 +33,7 @@ def some(random: Random, system) -> Validated:
 def used(known: Validated, words: int, extreme: bool, random: Random) -> tuple[float, float]:
     """How much of the bounds of Φ and of σ is used."""
     grid, motion = grid_of(words, whole=True), known.motion(random.choice((1, -1)))
-    tangent = derivatives._tangent(known, motion, grid.total, True, True)
+    tangent = derivatives._tangent(known, motion, grid.total, True, tuple(range(6)))
     centre = extreme_centre(random, grid, 6) if extreme else rounded(motion, grid)
     for halvings in range(2, 12):
         own = tangent.certified.series(centre, halvings)

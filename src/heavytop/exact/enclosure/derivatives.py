@@ -14,6 +14,11 @@ carry the errors of the motion, {Q x: |x_i| ≤ r_i}: with Q'^-1 Φ Q within η 
 
 so a column of errors is carried by Lohner's method as one more set of errors of the motion.  The working precision is
 chosen so that the digits come out: it is raised by what was lacking, up to six times.
+
+One or two columns of S follow from the others.  A body of c times the mass moves as before, unless it has a rotor of
+given momentum; and γ and n enter by their products, so that from (Ω0, c γ0) with n/c the motion is (Ω, c γ):
+
+    Σ I_j ∂y/∂I_j + Σ n_j ∂y/∂n_j = 0,     Σ n_j ∂y/∂n_j = Σ γ0_j ∂y/∂γ0_j − (0, γ).                            (c)
 """
 
 from __future__ import annotations
@@ -22,6 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import exp, inf, lcm
+from operator import mul
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -126,6 +132,7 @@ class Tangent:
     """What derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
 
     certified, columns: Taylor coefficients of the motion, and of its derivatives, in words; None in integers.
+    data: those of :data:`DATA` in ``places``, whose columns are computed.
     """
 
     field: Quadratic
@@ -134,6 +141,7 @@ class Tangent:
     certified: CertifiedSeries | None
     columns: CertifiedColumns | None
     data: tuple[Datum, ...] = ()
+    places: tuple[int, ...] = ()
 
     @property
     def width(self) -> int:
@@ -378,14 +386,16 @@ def slope(system: System, p: Parameters, datum: int, unit: mpq) -> Callable[[Seq
 
 METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
-Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int]
-"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, and the exponent."""
+Centre: TypeAlias = tuple[list[list[mpz]], Matrix, int, tuple[Step, Fraction, Matrix]]
+"""(J, S) in ulps, bounds of its errors in ulps 2^exponent, the exponent; the step, the place in it, its radii there."""
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
 _OF_DATA = 8
 """Bits that S has fewer than J: a second run costs more than they do."""
+_OF_LAWS = 4
+"""Bits that a column of S may lose where it follows from the others."""
 _FEW = 4
 _SMALLER = 4
 _SHORTENED = 4
@@ -449,16 +459,18 @@ def _one_way(
     motion = known.motion(direction)
     time = direction * spans[-1]
     forecast, steps = known.forecast(time, bits)
-    loss, wanted = forecast, bits + _GUARD + _OF_DATA * data + int(min(forecast, _FEW * bits) / 4)
+    places = _independent(known, motion) if data else ()
+    spare = (_OF_DATA + _OF_LAWS * (len(places) < len(DATA))) * data
+    loss, wanted = forecast, bits + _GUARD + spare + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
-        columns = 7 + 6 * data
+        columns = 7 + len(places)
         planned = motion.precision(wanted + loss, steps * columns)
         if not steps * columns * seconds_a_step(*planned) < known.effort:
             break
-        tangent = _tangent(known, motion, *planned, data)
+        tangent = _tangent(known, motion, *planned, places)
         found, lacking = {}, 0
         for span, values in _run(tangent, motion, spans):
-            at = _in_units(motion, tangent, values) if values else None
+            at = _in_units(known, motion, tangent, values) if values else None
             lacking = bits - (
                 min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0
             )
@@ -475,8 +487,22 @@ def _one_way(
     )
 
 
-def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: bool, data: bool) -> Tangent:
-    found = [_datum(known, motion, k) for k in range(len(DATA))] if data else []
+def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
+    """The data whose columns do not follow by (c), each law for the largest of its data."""
+    p, gamma = known.parameters, known.start.gamma
+    moment = max(range(3), key=lambda k: abs(p.moment[k]))
+    inertia = max(range(3), key=lambda k: p.inertia[k])
+    least = max(map(abs, gamma)) * min(p.inertia) * motion.scaled.rate**2 / 2**_OF_LAWS
+    left_out = {3 + moment} if "moment" in known.system.enters and abs(p.moment[moment]) > least else set()
+    if not (isinstance(p.rotor, tuple) and any(p.rotor)):
+        left_out.add(inertia)
+    return tuple(k for k in range(len(DATA)) if k not in left_out)
+
+
+def _tangent(
+    known: Validated, motion: ScaledMotion, precision: int, in_words: bool, places: tuple[int, ...]
+) -> Tangent:
+    found = [_datum(known, motion, k) for k in places]
     data_of = tuple(datum for datum, _ in found)
     together = Together.of(motion.field, [datum.field for datum in data_of])
     lanes = [given for _, given in found if given is not None]
@@ -485,7 +511,7 @@ def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: b
     if grid is not None and not grid.relative and len(lanes) == len(found):
         certified = motion.certified(precision)
         columns = CertifiedColumns(certified, lanes)
-    tangent = Tangent(motion.field, precision, together, certified, columns, data_of)
+    tangent = Tangent(motion.field, precision, together, certified, columns, data_of, places)
     _require_right(tangent, motion)
     return tangent
 
@@ -617,13 +643,14 @@ def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, 
         _product(tangent, own, columns.rows),
         np.asarray((radii + _local(tangent, own, columns)) * _UP),
         columns.exponent,
+        (found, tau, found.radii(tau)),
     )
 
 
 @whole_evaluation
-def _in_units(motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
+def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """As balls, in the units given."""
-    rows, radii, exponent = values
+    rows, radii, exponent, (found, tau, around) = values
     sizes = motion.scaled.sizes
     scales = [*sizes, *(datum.unit for datum in tangent.data)]
     limits = [[float(r) for r in row] for row in radii]
@@ -637,5 +664,23 @@ def _in_units(motion: ScaledMotion, tangent: Tangent, values: Centre) -> Enclose
             ]
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]
-    start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
-    return EnclosedDerivatives(start, data if tangent.data else None)
+        start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
+        if len(tangent.places) in (0, len(DATA)):
+            return EnclosedDerivatives(start, data if tangent.data else None)
+        state = [value * ball(size) for value, size in zip(found.around(tau, around), sizes, strict=True)]
+        return EnclosedDerivatives(start, _completed(known, tangent.places, state, start, data))
+
+
+def _completed(known: Validated, places: Sequence[int], state: list[arb], start: Balls, data: Balls) -> Balls:
+    """S from its columns of ``places``, by (c)."""
+    size = [ball(value) for value in (*known.parameters.inertia, *known.parameters.moment)]
+    gamma = [ball(value) for value in known.start.gamma]
+    found = []
+    for i, (of_start, of_data) in enumerate(zip(start, data, strict=True)):
+        row = dict(zip(places, of_data, strict=True))
+        for k in (k for k in (3, 4, 5, 0, 1, 2) if k not in places):
+            others = [j for j in range(3 if k > 2 else 0, len(DATA)) if j != k]
+            total = sum(map(mul, gamma, of_start[3:]), -state[i] if i > 2 else arb(0)) if k > 2 else arb(0)
+            row[k] = (total - sum((size[j] * row[j] for j in others), arb(0))) / size[k]
+        found.append([row[k] for k in range(len(DATA))])
+    return found
