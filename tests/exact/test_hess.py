@@ -264,8 +264,10 @@ def test_what_the_plan_of_the_linear_system_counts():
         for system in (few, many):
             for disc in plan(system):
                 # no disc holds a zero, κr is within its limit, and κ is right on the circle
-                for zero in (acb(0, 1), ((acb(0, system.width()) - disc.place) / 2).tan()):
-                    assert abs(zero) > disc.radius
+                of_q = 2 * (system.top / (2 * system.reach)).sqrt().asinh()
+                for width in (system.width(), of_q):
+                    assert abs(((acb(0, width) - disc.place) / 2).tan()) > disc.radius
+                assert disc.radius < 1
                 assert disc.radius * float(disc.steepness) <= 33
                 for z in (acb(0, disc.radius), acb(-disc.radius), acb(disc.radius)):
                     for entry in system.entries(disc.place + 2 * z.atan()):

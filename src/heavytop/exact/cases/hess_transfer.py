@@ -203,7 +203,10 @@ def plan(system: System2) -> list[Disc]:
 
 
 def _distance(place: float, width: float) -> float:
-    """How far z = 0 is from the nearest zero of P, Q and w; farther away from 0 it is no less."""
+    """How far z = 0 is from the nearest zero of P, Q and w; farther away from 0 it is no less.
+
+    The zeros of Q are farther than those of P: E < top, for the cubic of the height is −K² at E.
+    """
     sine, half = sin(place / 2), sinh(min(width, _WIDEST) / 2)
     return min(1.0, sqrt((half**2 + sine**2) / (half**2 + cos(place / 2) ** 2)))
 
