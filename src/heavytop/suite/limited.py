@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
@@ -170,18 +170,18 @@ class _Worker:
 def in_processes(
     tasks: Sequence[Task],
     kinds: Kinds,
-    queue: deque[int],
+    costs: Mapping[int, float],
+    waiting: deque[int],
     workers: int,
     saved: Callable[[int], Saved],
     begun: Callable[[Task], None],
     row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
-    """(index of the task, its row) as they finish.
+    """(index of the task, its row) as they finish, of the tasks that wait (:func:`in_order`).
 
     A task whose process died is run again, three times in all; then it is a row that failed, or where the integrator is
     this program's, a HeavyTopError.
     """
-    costs, waiting = in_order(tasks, kinds, queue)
     limits, deaths = RowLimits(row_timeout), Counter[int]()
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
@@ -222,13 +222,13 @@ def in_processes(
             worker.end()
 
 
-def in_order(tasks: Sequence[Task], kinds: Kinds, queue: Iterable[int]) -> tuple[dict[int, float], deque[int]]:
-    """The cost of each task, and the tasks in the order in which they are to begin.
+def in_order(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[dict[int, float], deque[int]]:
+    """The cost of each task that is not done, and these tasks in the order in which they are to begin: long ones first.
 
-    Those of third-party integrators come first, one integrator after the other, and of each the quick ones before the
-    long ones, whose limits rest on them.
+    Those of third-party integrators come before them, one integrator after the other, and of each the quick ones before
+    the long ones, whose limits rest on them.
     """
-    costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
+    costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
     guests = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
 
     def place(index: int) -> tuple[int, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager
 from functools import cache
@@ -73,38 +73,27 @@ def rows(
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
-    queue, third_party = _longest_first(tasks, kinds, done)
+    costs, waiting = in_order(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
-        yield from _on_cluster(tasks, kinds, queue, scheduler, begun, row_timeout)
-    elif third_party or workers > 1:
-        yield from in_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
+        yield from _on_cluster(tasks, kinds, costs, waiting, scheduler, begun, row_timeout)
+    elif waiting and (workers > 1 or tasks[waiting[0]].is_third_party):
+        yield from in_processes(tasks, kinds, costs, waiting, workers, saved, begun, row_timeout)
     else:
-        for index in queue:
+        for index in waiting:
             begun(tasks[index])
             yield index, measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
-
-
-def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[deque[int], bool]:
-    """The tasks that are left, and whether one of them has a third-party integrator."""
-    costs: dict[int, float] = {}
-    third_party = False
-    for index, task in enumerate(tasks):
-        if index not in done:
-            costs[index] = kinds[task.key.kind].cost(task)
-            third_party = third_party or task.is_third_party
-    return deque(sorted(costs, key=lambda index: -costs[index])), third_party
 
 
 def _on_cluster(
     tasks: Sequence[Task],
     kinds: Kinds,
-    queue: deque[int],
+    costs: Mapping[int, float],
+    waiting: deque[int],
     scheduler: str,
     begun: Callable[[Task], None],
     row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
-    costs, queue = in_order(tasks, kinds, queue)
     limits = RowLimits(row_timeout)
     with _client(scheduler) as client:
         from distributed import KilledWorker
@@ -122,7 +111,7 @@ def _on_cluster(
             return _AHEAD * len(client.nthreads())
 
         try:
-            for index, future in _windowed(queue, {}, submit, at_once, lambda i: begun(tasks[i])):
+            for index, future in _windowed(waiting, {}, submit, at_once, lambda i: begun(tasks[i])):
                 try:
                     row, seconds = future.result()
                 except KilledWorker as error:
