@@ -20,6 +20,7 @@ from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.registry import Setup, described, named, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.derivatives import which_derivatives
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
@@ -81,7 +82,7 @@ def propagate(
         attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
             γ by the rule of `heavytop docs outputs`, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
-            nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
+            nine numbers.  None for True where the start has an attitude and the integrator declares that it carries it.
         angles: True for ``angles()`` of the run too, the Euler angles φ, θ, ψ with all turns, followed from t = 0 on
             ``attitude``; not with ``xi``, an ``observer`` or options of heyoka alone.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
@@ -166,8 +167,8 @@ def _prepared(
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, setup.watched(observer))
     wanted = arguments.flag(attitude, "attitude")
     which = named(integrator)
-    if wanted is None:  # integrators of other packages carry Ω and γ alone
-        wanted = state.attitude is not None and described(which).attitude
+    if wanted is None:
+        wanted = state.attitude is not None and ChosenIntegrator.of(which).carries_attitude
     beside = xi is None and wanted
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))

@@ -42,11 +42,12 @@ from heavytop.document.document import (
 from heavytop.document.kind import Kinds, document, headlines, kind_of
 from heavytop.document.svg import quiet_style
 from heavytop.files import replace
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.render.text import drifts, failed, unsupported
 from heavytop.suite.plan import BUILT_IN
 
@@ -301,9 +302,9 @@ def named(rows: Sequence[Row]) -> Callable[[Row], str]:
     return lambda row: f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
 
 
-def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> list[Table]:
-    """A line a motion, a column a format, or an integrator where all are in one format, for a short summary; of two
-    rows in one place the later.  No table without rows.
+def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT) -> list[Table]:
+    """A line a motion, a column a format, or an integrator where all are in one format; of two rows in one place the
+    later.  No table without rows.
     """
     names, one_format = named(rows), len({row.precision for row in rows}) == 1
     lines: dict[str, dict[str, str]] = {}
@@ -320,7 +321,7 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> l
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
     room = min(max(room, 16), 39)
     named_cells = [line for name, found in zip(lines, cells, strict=True) for line in _in_lines(name, found, room)]
-    return [Table(title, ["", *columns], named_cells, shown=In.SHORT)]
+    return [Table(title, ["", *columns], named_cells, shown=shown)]
 
 
 def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
@@ -339,6 +340,21 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
         if digits_kept(row) is not None and (place not in known or _end(row) >= _end(known[place])):
             known[place] = row
     return in_columns("Digits right, to |t|", _digits_until, list(known.values()))
+
+
+def attitude_columns(rows: Sequence[Row]) -> list[Table]:
+    """The largest errors of attitude and position, where a row was asked for them."""
+    asked = [row for row in rows if row.metric(*_ATTITUDE) or NOT_CARRIED.items() <= row.flags.items()]
+    title = "Attitude error (rad), position error"
+    return in_columns(title, _attitude_errors, asked, In.SHORT | In.FULL | In.PAGE)
+
+
+_ATTITUDE, _POSITION = (ATTITUDE_ERROR, "", "max"), (POSITION_ERROR, "", "max")
+
+
+def _attitude_errors(row: Row) -> str:
+    found = [str(Value(metric, 2)) for each in (_ATTITUDE, _POSITION) if (metric := row.metric(*each))]
+    return ", ".join(found) or NOT_CARRIED["attitude"]
 
 
 def _until(row: Row) -> str:
