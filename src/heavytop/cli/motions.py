@@ -16,6 +16,7 @@ import typer
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
 from heavytop.errors import InputError
+from heavytop.files import replace
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -79,7 +80,8 @@ def write_motion(
         if path == _SCREEN:
             screen = content
         else:
-            _write_text(path, content)
+            with writing():
+                replace(path, content.encode())
             say(f"wrote {path}")
     if options.json:
         command, version = made_by()
@@ -88,14 +90,6 @@ def write_motion(
         print(screen, end="")
     elif table is not None:
         show_on_terminal(text(table))
-
-
-def _write_text(path: Path, content: str) -> None:
-    with writing():
-        try:
-            path.write_text(content, encoding="utf-8")
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path} cannot be written: {error}.") from None
 
 
 # The options of `propagate` and `reference` for events.
