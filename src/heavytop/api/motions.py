@@ -13,16 +13,18 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
+from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
+from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
-from heavytop.integrate.registry import Setup, described, named, require_reach
+from heavytop.integrate.registry import Setup, described, named, require_reach, seconds_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.motion import Motion, compute
-from heavytop.measure.reference import Finder, Reference
+from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import (
     DOUBLE,
@@ -281,6 +283,7 @@ def reference(
     system: System | str | None = None,
     attitude: bool | None = None,
     derivatives: str | None = None,
+    effort: Number | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -294,6 +297,7 @@ def reference(
             attitude.
         derivatives: "start" for ∂(Ω, γ)(t)/∂(Ω0, γ0) as well, γ0 as three independent variables; "data" for
             ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r; "all" for both.
+        effort: seconds that an enclosure may take, by a model of its cost and no clock; 900 where None.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
@@ -305,7 +309,7 @@ def reference(
         InputError: for what is no motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
-    return known(top, start, times, digits, system, attitude, derivatives)
+    return known(top, start, times, digits, system, attitude, derivatives, effort=effort)
 
 
 def known(
@@ -317,6 +321,7 @@ def known(
     attitude: bool | None = None,
     derivatives: str | None = None,
     finder: Finder = find,
+    effort: Number | None = None,
 ) -> Reference:
     """:func:`reference`, whose progress may be watched: ``finder`` is :func:`heavytop.exact.catalogue.find`."""
     body, state = arguments.motion(top, start, of_any_size=True)
@@ -325,7 +330,8 @@ def known(
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
-    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which)
+    seconds = EFFORT if effort is None else seconds_of(effort, "effort")
+    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:

@@ -327,6 +327,9 @@ def reference(
     derivatives: Annotated[
         str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,
+    effort: Annotated[
+        str, typer.Option(help="Seconds that an enclosure may take, by its model of the cost.", metavar="SECONDS")
+    ] = "900",
 ) -> int:
     """Print proven states of one motion.
 
@@ -338,7 +341,8 @@ def reference(
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = known(asked.top, asked.start, asked.times, digits, asked.system, told, derivatives, watch.find)
+        given = asked.top, asked.start, asked.times, digits, asked.system
+        found = known(*given, told, derivatives, watch.find, effort)
         found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:
@@ -394,11 +398,11 @@ class _Watch:
         self.times = times
         self.solution: Any = None
 
-    def find(self, top: Any, start: Any, system: Any) -> Any:
+    def find(self, top: Any, start: Any, system: Any, effort: float) -> Any:
         """The known motion, which is watched from now on."""
         from heavytop.exact.catalogue import find
 
-        self.solution = find(top, start, system)
+        self.solution = find(top, start, system, effort)
         return self.solution
 
     def fraction(self) -> float:

@@ -339,14 +339,19 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
         place = row.key.case, row.key.subject.name, row.precision
         if digits_kept(row) is not None and (place not in known or _end(row) >= _end(known[place])):
             known[place] = row
-    return in_columns("Digits right, to |t|", _digits_until, list(known.values()))
+    found = list(known.values())
+    more = "; of the attitude" if any(map(_attitude_asked, found)) else ""
+    return in_columns(f"Digits right, to |t|{more}", _digits_until, found)
 
 
 def attitude_columns(rows: Sequence[Row]) -> list[Table]:
     """The largest errors of attitude and position, where a row was asked for them."""
-    asked = [row for row in rows if row.metric(*_ATTITUDE) or NOT_CARRIED.items() <= row.flags.items()]
-    title = "Attitude error (rad), position error"
-    return in_columns(title, _attitude_errors, asked, In.SHORT | In.FULL | In.PAGE)
+    title = "Largest error of the attitude (rad), of the position"
+    return in_columns(title, _attitude_errors, list(filter(_attitude_asked, rows)), In.FULL | In.PAGE)
+
+
+def _attitude_asked(row: Row) -> bool:
+    return row.metric(*_ATTITUDE) is not None or NOT_CARRIED.items() <= row.flags.items()
 
 
 _ATTITUDE, _POSITION = (ATTITUDE_ERROR, "", "max"), (POSITION_ERROR, "", "max")
@@ -371,7 +376,16 @@ def _digits_until(row: Row) -> str:
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}"
+    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}{_digits_of_attitude(row)}"
+
+
+def _digits_of_attitude(row: Row) -> str:
+    """−log10 of the largest angle in radians, at most the digits of the format, where the row was asked for it."""
+    error = row.metric(*_ATTITUDE)
+    if error is None:
+        return f"; {NOT_CARRIED['attitude']}" if _attitude_asked(row) else ""
+    most = row.bits * math.log10(2)
+    return f"; {digits_text(most if error.log10 is None else min(most, -error.log10))}"
 
 
 def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:
