@@ -160,7 +160,7 @@ loaded = lru_cache(maxsize=64)(load)
 
 
 def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
-    return Integrator(name, f"{_HERE}.peers.{place}", needs=needs, **capabilities)
+    return Integrator(name, f"{_HERE}.peers.{place}", needs=needs, attitude=True, **capabilities)
 
 
 INTEGRATORS = {

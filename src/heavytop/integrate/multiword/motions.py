@@ -9,15 +9,16 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, OutOfReach
 from heavytop.integrate.multiword.engines import choose, compiled
+from heavytop.integrate.registry import expected_steps
 from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, Trajectory, sampled
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
-from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP, Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, exact, number, numbers, require
+from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, decimal_text, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import DoubleTimes, HeavyTop, RoundedTimes, State, check_times
 
@@ -31,6 +32,8 @@ _EVERY_BIT = 1200
 """Bits in which sums of doubles below 2^100 are exact."""
 _SLACK = 8
 """Bits that words are wider than those of their grid, and sums of them than they, at most."""
+_TOO_MANY, _FEW = 1000, 10**6
+"""Times the steps that a motion asks for, and so many more: in quad 10**9 take twenty minutes."""
 _LEAST_LOW = 2.0**-960
 """A low word that is larger has all its bits."""
 OUTCOMES = {
@@ -92,6 +95,8 @@ def follow(
     forwards = bool(targets[-1] >= 0)
     began = perf_counter()
     pace = _Pace(arithmetic.begin(scaled, forwards), scaled, problem.precision, step_limit, between)
+    if step_limit is None and isinstance(pace.run, Fixed):
+        _require_reach(problem, scaled, exact(targets[-1]))
     times: Sequence[Fraction]
     states: Any
     if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
@@ -112,6 +117,21 @@ def follow(
         {"compile": compiling, "run": seconds},
         flags,
     )
+
+
+def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
+    """Raises OutOfReach for a run on a grid of many more steps than the motion asks for, and than anyone waits for.
+
+    A grid bounds |Ω| by the energy over the least moment: of a thin rod by a rate at which it does not move.
+    """
+    fewest = abs(end) * scaled.rate / LONGEST_STEP
+    if not scaled.rest and fewest > _TOO_MANY * (expected_steps(problem, end) + _FEW):
+        raise OutOfReach(
+            f"A run of multiword in {problem.precision.name} to t = {decimal_text(end, 6)} takes "
+            f"{decimal_text(fewest, 2)} steps or more: they are as short as if all the energy were in a spin about the "
+            "axis of the least moment.",
+            "Use double-double or heyoka, whose steps follow the motion, or limit the steps.",
+        )
 
 
 def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
