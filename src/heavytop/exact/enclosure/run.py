@@ -386,6 +386,8 @@ _HOPELESS, _SURELY = 8, 1.25
 """Times the effort, and times what a cost may be, beyond which a pilot is abandoned after its first hundred steps."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
+EFFORT = 900.0
+"""Seconds of the cost model that a request for an enclosure may take."""
 
 
 def seconds_a_step(precision: int, in_words: bool) -> float:
@@ -410,7 +412,7 @@ class Validated:
     system: System = HEAVY_TOP
     rotor: Fraction | None = None
     xi: Vector | None = None
-    effort: float = 900.0
+    effort: float = EFFORT
     method: str = "validated: Taylor enclosure"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
