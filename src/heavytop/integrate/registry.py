@@ -28,10 +28,11 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
 from heavytop.exact.bodies import resolve
+from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import (
     DOUBLE,
     FORMATS,

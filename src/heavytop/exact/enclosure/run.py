@@ -129,10 +129,10 @@ class EnclosureRun:
         passed = bisect_right(self.falls, time, key=lambda fall: fall.time)
         return self.falls[passed - 1][1:] if passed else (self.precision, self.certified)
 
-    def after(self, found: Step) -> Node:
+    def after(self, found: Step, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
         """The node at the end of a step, remembered; in fewer bits where that is time."""
         precision = self.motion.fewer(found.precision, found.node.errors.bits)
-        node = found.end(dropped=found.precision - precision)
+        node = found.end(transfer, found.precision - precision)
         if precision < found.precision and (not self.falls or self.falls[-1].time < node.time):
             self.falls = (*self.falls, Fall(node.time, precision, self.motion.certified_at(precision)))
         self.keep(node)
