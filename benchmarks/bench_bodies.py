@@ -67,10 +67,13 @@ def references(repeats: int) -> None:
 
 
 def samples(repeats: int) -> None:
-    """Seconds of a run to T = 1000: one sample, 20,000, and 20,000 with their quaternions in double."""
+    """Seconds of a run to T = 1000: one sample, 20,000, those whose states are made numbers of the format too, and
+    20,000 with their quaternions in double.
+    """
     many = numpy.linspace(0, END, 20001)[1:]
     print(f"run to T = {END}: seconds")
-    print(f"{'':24}{'1 sample':>12}{'20,000':>12}{'ratio':>8}{'attitude, 1':>14}{'quaternions':>14}{'ratio':>8}")
+    head = f"{'1 sample':>12}{'20,000':>12}{'ratio':>8}{'states':>12}{'ratio':>8}"
+    print(f"{'':24}{head}{'attitude, 1':>14}{'quaternions':>14}{'ratio':>8}")
     for integrator, format in ((name, each) for each in FORMATS for name in ("heyoka", "multiword")):
         if (integrator, format) == ("heyoka", "double-double"):
             continue
@@ -80,9 +83,11 @@ def samples(repeats: int) -> None:
 
         run([1])
         # in turns: a machine that does something else slows both
-        pairs = [(least(1, lambda: run([END])), least(1, lambda: run(many))) for _ in range(repeats)]
-        one, all_of_them = map(min, zip(*pairs, strict=True))
+        calls = (lambda: run([END])), (lambda: run(many)), (lambda: run(many).states)
+        turns = [[least(1, call) for call in calls] for _ in range(repeats)]
+        one, all_of_them, made = map(min, zip(*turns, strict=True))
         line = f"{format:14}{integrator:10}{one:12.4f}{all_of_them:12.4f}{all_of_them / one:8.2f}"
+        line += f"{made:12.4f}{made / one:8.2f}"
         if format == "double":
             run([1], True)
             riding = least(repeats, lambda: run([END], True))

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -199,6 +200,23 @@ def test_what_cannot_be_shown_is_refused_with_a_remedy(command: str, more: list[
     assert message in f"{error.cause} {error.remedy}"
     assert error.exit_code == 2
     assert error.remedy
+
+
+@pytest.mark.parametrize("option", ["--csv", "--latex"])
+@pytest.mark.parametrize("command", ["propagate", "reference"])
+def test_a_full_disk_leaves_the_file_of_before_and_no_part_of_another(
+    command: str, option: str, tmp_path: Path
+) -> None:
+    (tmp_path / "table").write_text("of before")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64, limits[1]))
+    try:
+        error = refused(command, option, str(tmp_path / "table"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert "cannot be written" in error.cause
+    assert [each.name for each in tmp_path.iterdir()] == ["table"]
+    assert (tmp_path / "table").read_text() == "of before"
 
 
 def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> None:

@@ -5,12 +5,7 @@ from heavytop.integrate.peers.double import Solved, double_peer
 
 def _solve(given):
     """From what is given (start and times as arrays, the field, the step) to what was solved."""
-
-    parameters = given.parameters
-
-    def field(y):
-        return given.system.field(parameters, y)
-
+    field = given.field
     y, time, steps, states = given.start.tolist(), 0.0, 0, []
     for end in given.times.tolist():
         count = max(1, round(abs(end - time) / given.setting))
@@ -26,4 +21,4 @@ def _solve(given):
     return Solved(states, time, steps, 4 * steps)
 
 
-rk4 = double_peer("mine:rk4", 4, _solve, "step")
+rk4 = double_peer("mine:rk4", 4, _solve, "step", attitude=True)

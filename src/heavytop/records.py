@@ -309,6 +309,8 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 NOISE, NOT_MEASURED = "noise", "not measured"
 """The flag of a row whose plan says ``noise = false``."""
+NOT_CARRIED = {"attitude": "not carried"}
+"""The flag of a row whose plan asks for the attitude, and whose integrator does not carry it."""
 
 
 class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):

@@ -113,6 +113,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "system": "heavy_top",
             "attitude": False,
             "derivatives": None,
+            "effort": None,
         },
     ),
     "claim_library": (ht.claim_library, {"tag": "delone", "anew": False, "done": None}),

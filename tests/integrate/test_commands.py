@@ -158,7 +158,7 @@ def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
     found = check(program())
     assert {each.verdict for each in found} == {"kept", "note"}
     assert [each.check for each in found if each.verdict == "note"] == ["huge"]
-    assert len(found) == 16
+    assert len(found) == 17
 
 
 @pytest.mark.parametrize("fault", ["", "forks", "becomes a daemon", "chatty errors", "counts none"])

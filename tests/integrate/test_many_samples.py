@@ -1,8 +1,11 @@
 """States at many times in few calls: the bits of one after the other, exact times, and costs that do not grow."""
 
+import copy
 import cProfile
 import pstats
 import random
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -17,6 +20,7 @@ from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.multiword import motions as multiword_motions
 from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Trajectory
+from heavytop.multiword.double_double import double_double_run
 from heavytop.multiword.fixed_point import fixed_point_run, steps
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
@@ -253,3 +257,26 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
     columns, quick, exactly = ([[exact(value) for value in state] for state in states] for states in found)
     assert columns == quick == exactly
     assert len(quick) == len(times)
+
+
+@pytest.mark.parametrize("name", ["double", "double-double"])
+def test_samples_of_one_call_end_anywhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(double_double_run, "_SAMPLES_AT_ONCE", 7)
+    precision, times = parse(name), irregular(50, 2, 7)
+    require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
+
+
+@pytest.mark.parametrize("name", ["double", "extended", "double-double", "quad", "real:70", "real:150"])
+def test_states_are_made_once_whoever_asks_for_them_first(name: str) -> None:
+    def run() -> Trajectory:
+        return propagate_words(CASE.top, CASE.start, regular(80, 2), parse(name))
+
+    first, copied, replaced = run(), copy.copy(run()), replace(run(), integrator="another")
+    assert first.states is first.states
+    with ThreadPoolExecutor(4) as pool:
+        asked = run()
+        together = list(pool.map(lambda _: asked.states, range(4)))
+    for states in (copied.states, replaced.states, *together):
+        assert (states.dtype, states.shape) == (first.states.dtype, (81, 6))
+        assert (states == first.states).all()
+    assert not hasattr(run(), "anything_else")

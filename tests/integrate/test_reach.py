@@ -9,8 +9,11 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.cli import app
+from heavytop.integrate.multiword.engines import choose
+from heavytop.integrate.multiword.motions import _require_reach
 from heavytop.integrate.registry import INTEGRATORS, MOST_STEPS, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP
 from heavytop.top.equations import square_of_rate
 from support.reports import expand, load, rows
 
@@ -143,3 +146,30 @@ def test_a_reference_of_any_size_is_answered_from_python_as_from_the_command_lin
     assert known.states[0][0].value in done.stdout
     with pytest.raises(ht.InputError, match="too large"):
         ht.propagate(top, start, [time])
+
+
+THIN = ht.State(("1/2", "1/3", "1/4"), (0, "3/5", "4/5"))
+
+
+@pytest.mark.parametrize(("precision", "system"), [("quad", "heavy_top"), ("quad", "heavy_gyrostat")])
+def test_a_grid_that_follows_a_rod_in_far_too_short_steps_is_refused(precision: str, system: str) -> None:
+    """Just inside and just beyond: a thousand times the steps that the motion asks for, and 1e9."""
+    refused, taken = (ht.HeavyTop((1, 1, least), 1, (0, 0, "1/2")) for least in ("1e-30", "1e-12"))
+    for time in (1, -1):
+        with pytest.raises(ht.OutOfReach, match=r"takes 3.5E\+13 steps or more: .* the least moment") as caught:
+            ht.propagate(refused, THIN, [time], precision, integrator="multiword", system=system)
+        assert "limit the steps" in caught.value.remedy
+    limited = ht.propagate(refused, THIN, [1], precision, integrator="multiword", system=system, step_limit=10)
+    assert (limited.outcome, limited.steps) == (Outcome.STEP_LIMIT, 10)
+    run = ht.propagate(taken, THIN, ["1/8"], precision, integrator="multiword", system=system)
+    assert run.outcome is Outcome.SUCCESS
+    with pytest.raises(ht.OutOfReach):
+        ht.propagate(taken, THIN, [32000], precision, integrator="multiword", system=system)
+    problem = Problem.of(taken, THIN, ht.QUAD)
+    scaled = choose(problem, None)[1]
+    longest = LONGEST_STEP * 10**9 / scaled.rate
+    _require_reach(problem, scaled, longest)
+    with pytest.raises(ht.OutOfReach):
+        _require_reach(problem, scaled, longest * Fraction(11, 10))
+    floating = ht.propagate(refused, THIN, [1], "double-double", integrator="multiword", system=system)
+    assert floating.outcome is Outcome.SUCCESS

@@ -1,9 +1,11 @@
 """References come from the catalogue, from the rounded data, and are certified before they score anything."""
 
 from fractions import Fraction
+from typing import Any
 
 import pytest
 
+import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import Contradiction
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
@@ -12,6 +14,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import Known, certified, known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.top.heavy_top import HeavyTop, State
+from support.in_process import heavytop
 
 
 def problem(name: str, precision=DOUBLE) -> Problem:
@@ -121,3 +124,28 @@ def test_no_unit_of_time_costs_a_motion_its_reference(power) -> None:
     assert isinstance(known, Known)
     assert known.certificate.kind == "proven at both ends"
     assert known.certificate.agreed_digits >= 37
+
+
+TILTED = ht.Body(1, "9.81", (0, "1/3", 1), ("2", "3", "3", "1/10", "1/20", "1/5"), "pivot")
+MOVED = ht.State((1, 2, 3), attitude=ht.Attitude.euler("ZXZ", "30deg", "1/2", 1))
+
+
+@pytest.mark.parametrize(
+    ("body", "start", "more"),
+    [
+        (CASES["generic"].top, CASES["generic"].start, {}),
+        (CASES["generic"].top, CASES["generic"].start, {"attitude": True}),
+        (CASES["generic"].top, CASES["generic"].start, {"derivatives": "start"}),
+        (TILTED, MOVED, {}),  # irrational axes and angles
+    ],
+)
+def test_an_enclosure_takes_the_effort_that_it_is_given(body: Any, start: State, more: dict[str, Any]) -> None:
+    with pytest.raises(ht.OutOfReach):
+        ht.reference(body, start, [4], 20, effort="1/10000", **more)
+    states = ht.reference(body, start, [4], 20, effort=10, **more).states
+    assert states == ht.reference(body, start, [4], 20, **more).states
+
+
+def test_the_command_line_has_the_same_effort() -> None:
+    command = ("reference", "--case", "generic", "--times", "4", "--digits", "20", "--effort")
+    assert [heavytop(*command, seconds).returncode for seconds in ("0.0001", "10", "0", "-1", "nan")] == [3, 0, 2, 2, 2]

@@ -123,6 +123,26 @@ def lines(**changes: str) -> str:
     return "\n".join([*(f"# {key}: {value}" for key, value in said.items() if value), header, rows]) + "\n"
 
 
+@pytest.mark.parametrize(
+    ("unit", "height", "more"),
+    [
+        ("mm", 1000, {}),
+        ("cm", 100, {}),
+        ("m", 1, {}),
+        ("mm", 1000, {"centre": "0, 0, 1000", "weight": "0.001"}),  # the data are in millimetres too
+        ("mm", 3000, {"pivot": "0, 0, 2"}),
+        ("mm", 500, {"point": "0, 0, 0.5"}),
+    ],
+)
+def test_positions_in_the_unit_of_the_header_are_those_of_the_data(
+    unit: str, height: int, more: dict[str, str], tmp_path: Path
+) -> None:
+    header = ",".join(["t", *(f"{axis} [{unit}]" for axis in "xyz")])
+    found = scored(lines(header=header, rows=f"1,0,0,{height}\n2,0,0,{height}", **more), tmp_path)
+    assert found.diagnoses == []
+    assert found.digits_right > 15
+
+
 def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
     assert scored(lines(), tmp_path).digits_right > 13.5
     turned = lines(header="t,x,y,z", rows="1,0,0,1\n2,0,0,1")

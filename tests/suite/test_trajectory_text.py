@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import arb
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
+from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
 from heavytop.trajectories.columns import header
@@ -101,6 +103,63 @@ def test_what_stands_in_brackets_is_an_index_or_a_unit(names: str, quantity: str
     assert (found.others, {name: list(places) for name, places in found.places.items()}) == ((), {quantity: components})
 
 
+DEGREES, RPM = np.repeat([180 / np.pi, 1], 3), np.repeat([30 / np.pi, 1], 3)
+
+
+@pytest.mark.parametrize(
+    ("header", "factors", "time"),
+    [
+        ("t [ms],w1 [deg/s],w2 [deg/s],w3 [°/s],g1,g2,g3", DEGREES, 1000),
+        ("time (µs);omega[1] (deg/sec);omega[2] (deg/sec);omega[3] (deg/sec);g1 [-];g2 [-];g3 [-]", DEGREES, 1_000_000),
+        ("t / min,wx/(deg s^-1),wy/(deg s⁻¹),wz/deg·s^-1,g1,g2,g3", DEGREES, 1 / 60),
+        ("t [s],w1 [rpm],w2 [rev/min],w3 [RPM],g1,g2,g3", RPM, 1),
+        ("t,w1,w2,w3,g1,g2,g3", np.ones(6), 1),
+        ("t [s],w1 [rad/s],w2 [1/s],w3,g1 [1],g2,g3", np.ones(6), 1),
+    ],
+)
+def test_the_units_of_a_header_are_those_of_its_numbers(
+    header: str, factors: np.ndarray, time: float, tmp_path: Path
+) -> None:
+    """With the digits of the numbers: the units of the data are s and rad/s."""
+    rows = [[float(t) * time, *(np.array(state) * factors)] for t, state in zip(TIMES, STATES, strict=True)]
+    given = scored(tmp_path, table(header, ";" if ";" in header else ",", rows=rows))
+    assert [float(t) for t in given.times] == pytest.approx([float(t) for t in TIMES], rel=1e-15)
+    np.testing.assert_allclose(np.array(given.states, float), STATES, rtol=2**-51)
+    assert given.precision == DOUBLE
+    said = [note for note in given.notes if note.startswith("as the header says")]
+    assert len(said) == (time != 1 or factors[0] != 1)
+
+
+def test_a_number_in_degrees_is_converted_to_the_last_digit(tmp_path: Path) -> None:
+    """π to more digits than any number has: 90 of them, and the nearest double of each."""
+    values = ["180", "90." + 90 * "0", "1e-30", "36" + 60 * "0" + ".5"]
+    lines = "\n".join(f"{t},{value},0,0,0,0,1" for t, value in enumerate(values, 1))
+    given = scored(tmp_path, f"# precision: real:400\nt,w1 [deg/s],w2 [deg/s],w3 [deg/s],g1,g2,g3\n{lines}\n")
+    with working_precision(500):
+        for state, text in zip(given.states, values, strict=True):
+            assert state is not None
+            off = ball(state[0]) / (arb.pi() * ball(Fraction(text)) / 180) - 1
+            assert off.abs_upper() < arb(2) ** -398
+
+
+@pytest.mark.parametrize(
+    ("names", "places"),
+    [
+        ("t w x y z", {"quaternion": "wxyz"}),
+        ("t x y z w", {"quaternion": "xyzw"}),
+        ("t e0 e1 e2 e3 x y z", {"quaternion": "0123", "position": "xyz"}),
+        ("x y z t W X Y Z", {"quaternion": "wxyz", "position": "xyz"}),
+        ("t qw qx qy qz x y z w", {"quaternion": "wxyz", "position": "xyz"}),
+        ("t w y x z", {"position": "yxz"}),  # not beside each other in either order
+        ("t x y z", {"position": "xyz"}),
+        ("t e1 e2 e3 x y z", {"position": "xyz"}),
+    ],
+)
+def test_w_x_y_z_beside_each_other_are_a_quaternion(names: str, places: dict[str, str]) -> None:
+    found = header(names.split())
+    assert {quantity: "".join(components) for quantity, components in found.places.items()} == places
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -113,6 +172,8 @@ def test_what_stands_in_brackets_is_an_index_or_a_unit(names: str, quantity: str
         (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 stands twice"),
         (table("t,w0,w1,w3,g1,g2,g3"), "There are omega0 and omega3"),
         (table("t,phi [deg],theta [rad],psi [deg],g1,g2,g3"), "in degrees and in radians"),
+        (table("t,w1 [deg/s],w2 [rad/s],w3 [deg/s],g1,g2,g3"), "has the omega in deg/s and in rad/s"),
+        (table("t,w1 [rpm],w2,w3,g1,g2,g3"), "has the omega in rpm and without a unit"),
         (
             "# angles: degrees\n" + table("t,phi_rad,theta_rad,psi_rad,g1,g2,g3"),
             "header says radians and angles = degrees",

@@ -13,15 +13,18 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
+from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
+from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
-from heavytop.integrate.registry import Setup, described, named, require_reach
+from heavytop.integrate.registry import Setup, described, named, require_reach, seconds_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.derivatives import which_derivatives
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.motion import Motion, compute
-from heavytop.measure.reference import Finder, Reference
+from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import (
     DOUBLE,
@@ -81,7 +84,7 @@ def propagate(
         attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
             γ by the rule of `heavytop docs outputs`, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
-            nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
+            nine numbers.  None for True where the start has an attitude and the integrator declares that it carries it.
         angles: True for ``angles()`` of the run too, the Euler angles φ, θ, ψ with all turns, followed from t = 0 on
             ``attitude``; not with ``xi``, an ``observer`` or options of heyoka alone.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
@@ -166,8 +169,8 @@ def _prepared(
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, setup.watched(observer))
     wanted = arguments.flag(attitude, "attitude")
     which = named(integrator)
-    if wanted is None:  # integrators of other packages carry Ω and γ alone
-        wanted = state.attitude is not None and described(which).attitude
+    if wanted is None:
+        wanted = state.attitude is not None and ChosenIntegrator.of(which).carries_attitude
     beside = xi is None and wanted
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))
@@ -280,6 +283,7 @@ def reference(
     system: System | str | None = None,
     attitude: bool | None = None,
     derivatives: str | None = None,
+    effort: Number | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -293,6 +297,7 @@ def reference(
             attitude.
         derivatives: "start" for ∂(Ω, γ)(t)/∂(Ω0, γ0) as well, γ0 as three independent variables; "data" for
             ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r; "all" for both.
+        effort: seconds that an enclosure may take, by a model of its cost and no clock; 900 where None.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
@@ -304,7 +309,7 @@ def reference(
         InputError: for what is no motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
-    return known(top, start, times, digits, system, attitude, derivatives)
+    return known(top, start, times, digits, system, attitude, derivatives, effort=effort)
 
 
 def known(
@@ -316,6 +321,7 @@ def known(
     attitude: bool | None = None,
     derivatives: str | None = None,
     finder: Finder = find,
+    effort: Number | None = None,
 ) -> Reference:
     """:func:`reference`, whose progress may be watched: ``finder`` is :func:`heavytop.exact.catalogue.find`."""
     body, state = arguments.motion(top, start, of_any_size=True)
@@ -324,7 +330,8 @@ def known(
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
-    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which)
+    seconds = EFFORT if effort is None else seconds_of(effort, "effort")
+    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:

@@ -16,6 +16,7 @@ import typer
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
 from heavytop.errors import InputError
+from heavytop.files import replace
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -79,7 +80,8 @@ def write_motion(
         if path == _SCREEN:
             screen = content
         else:
-            _write_text(path, content)
+            with writing():
+                replace(path, content.encode())
             say(f"wrote {path}")
     if options.json:
         command, version = made_by()
@@ -88,14 +90,6 @@ def write_motion(
         print(screen, end="")
     elif table is not None:
         show_on_terminal(text(table))
-
-
-def _write_text(path: Path, content: str) -> None:
-    with writing():
-        try:
-            path.write_text(content, encoding="utf-8")
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path} cannot be written: {error}.") from None
 
 
 # The options of `propagate` and `reference` for events.
@@ -333,6 +327,9 @@ def reference(
     derivatives: Annotated[
         str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,
+    effort: Annotated[
+        str, typer.Option(help="Seconds that an enclosure may take, by its model of the cost.", metavar="SECONDS")
+    ] = "900",
 ) -> int:
     """Print proven states of one motion.
 
@@ -344,7 +341,8 @@ def reference(
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = known(asked.top, asked.start, asked.times, digits, asked.system, told, derivatives, watch.find)
+        given = asked.top, asked.start, asked.times, digits, asked.system
+        found = known(*given, told, derivatives, watch.find, effort)
         found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:
@@ -400,11 +398,11 @@ class _Watch:
         self.times = times
         self.solution: Any = None
 
-    def find(self, top: Any, start: Any, system: Any) -> Any:
+    def find(self, top: Any, start: Any, system: Any, effort: float) -> Any:
         """The known motion, which is watched from now on."""
         from heavytop.exact.catalogue import find
 
-        self.solution = find(top, start, system)
+        self.solution = find(top, start, system, effort)
         return self.solution
 
     def fraction(self) -> float:

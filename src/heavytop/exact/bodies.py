@@ -27,7 +27,7 @@ from flint import arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import state_and_attitude
-from heavytop.exact.enclosure.run import Uncertainty, Validated
+from heavytop.exact.enclosure.run import EFFORT, Uncertainty, Validated
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     BallLike,
@@ -47,7 +47,7 @@ from heavytop.top.bodies import IDENTITY, Body, PrincipalAxes
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-Finder = Callable[[HeavyTop, State, System], ExactSolution]
+Finder = Callable[[HeavyTop, State, System, float], ExactSolution]
 _DATA_BITS = 256
 _GUARD_BITS = 96
 _MORE_BITS, _NEAR = (0, 512, 2048, 8192, 32768), 8
@@ -216,6 +216,7 @@ class BodyMotion:
     """The known motion of a body or a top, in the axes in which it was given.
 
     body, start: as given, any attitude included.  system: of the motion.  finder: of the motion in principal axes.
+    effort: of its enclosure, :class:`heavytop.exact.enclosure.run.Validated`.
     Its balls hold the true motion, irrational data included: proven, not assumed.
     """
 
@@ -223,6 +224,7 @@ class BodyMotion:
     start: State
     system: System = HEAVY_TOP
     finder: Finder = find
+    effort: float = EFFORT
     _made: dict[int, tuple[Resolved, ExactSolution]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -265,7 +267,7 @@ class BodyMotion:
         known = self._known(_DATA_BITS)
         if known[0].uncertainty is not None:
             return self.method, self._enclosed
-        method, inner = state_and_attitude(known[1], latest, bits)
+        method, inner = state_and_attitude(known[1], latest, bits, self.effort)
         inner = _from_start(known, inner)
         if not known[0].turned:
             return method, inner
@@ -303,13 +305,14 @@ class BodyMotion:
         if bits not in self._made:
             resolved = resolve(self.body, self.start, bits)
             if resolved.uncertainty is None:
-                found = self.finder(resolved.top, resolved.start, self.system)
+                found = self.finder(resolved.top, resolved.start, self.system, self.effort)
             else:
                 found = Validated(
                     resolved.top,
                     resolved.start,
                     self.system,
                     xi=resolved.xi,
+                    effort=self.effort,
                     method="validated: Taylor enclosure of irrational data",
                     uncertainty=resolved.uncertainty,
                 )

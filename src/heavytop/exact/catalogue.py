@@ -33,7 +33,7 @@ from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.exact.closed_form import ALL, CYCLIC, Axes, ClosedForm, Renamed, inverse, renamed_state, renamed_top
-from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import require_handy
 from heavytop.exact.solution import Conditions, ExactSolution, equilibrium, hold
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
@@ -171,8 +171,8 @@ def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolu
         yield from _attempts(HeavyTop(top.inertia, top.weight, top.centre), start, HEAVY_TOP)
 
 
-def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:
-    """The simplest closed form of this motion, or its validated enclosure.
+def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float = EFFORT) -> ExactSolution:
+    """The simplest closed form of this motion, or its validated enclosure, of which a request may take that effort.
 
     The enclosure names the degenerate level where a class has the motion but not this level of it.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
@@ -182,4 +182,6 @@ def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSoluti
         if not isinstance(found, LevelNotDone):
             return found
         level = level or found.cause
-    return OnLevel(top, start, system, level=level) if level else Validated(top, start, system)
+    if level:
+        return OnLevel(top, start, system, effort=effort, level=level)
+    return Validated(top, start, system, effort=effort)

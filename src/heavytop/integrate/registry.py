@@ -28,10 +28,11 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
 from heavytop.exact.bodies import resolve
+from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import (
     DOUBLE,
     FORMATS,
@@ -159,7 +160,7 @@ loaded = lru_cache(maxsize=64)(load)
 
 
 def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
-    return Integrator(name, f"{_HERE}.peers.{place}", needs=needs, **capabilities)
+    return Integrator(name, f"{_HERE}.peers.{place}", needs=needs, attitude=True, **capabilities)
 
 
 INTEGRATORS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from math import inf
@@ -34,7 +34,6 @@ from heavytop.top.attitude import (
     output,
     quaternion_of_rows,
     quaternion_products,
-    rotated,
     rows_of,
     shaped,
     signs,
@@ -388,14 +387,33 @@ class InSpace:
         return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
 
+class _MadeWhenAsked:
+    """States that a function makes when they are first asked for."""
+
+    __slots__ = ("_make",)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """What is not there: ``states`` that are still to be made; of two threads both may make them."""
+            if name != "states":
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            make = self._make
+            if make is not None:
+                object.__setattr__(self, "states", make())
+                object.__setattr__(self, "_make", None)
+            return object.__getattribute__(self, "states")
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trajectory(Tabular, InSpace):
+class Trajectory(_MadeWhenAsked, Tabular, InSpace):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
     asked for.
     states: native numbers, an array of shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ
-    behind.  It may be given as rows; it has no row where an observer took the states.
+    behind.  It may be given as rows, or as a function that makes it when it is first asked for; it has no row where an
+    observer took the states.
     time_reached: exact time of the last finite step end, or the last time asked for.
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
@@ -427,6 +445,10 @@ class Trajectory(Tabular, InSpace):
 
         width = 6 if self.problem.xi is None or self.attitude is not None else 9
         given = self.states
+        if callable(given):
+            object.__setattr__(self, "_make", given)
+            object.__delattr__(self, "states")
+            return
         states = (
             (given if isinstance(given, numpy.ndarray) else numpy.array(given))
             if len(given)
@@ -604,95 +626,3 @@ class TaylorStep:
     length: Any
     coefficients: Any
     end: Any
-
-
-# A run that was computed in principal axes, in the axes in which its body was given.
-
-
-_SPLIT = 134217729.0
-"""2^27 + 1, by which Dekker splits a double."""
-
-
-def framed(run: Trajectory, frame: Frame) -> Trajectory:
-    """The run with its states, and ξ where it was computed, in the axes given; ``run`` is its ``principal``.
-
-    Each number is rounded once, to the format of the run; where the axes are the principal ones in another order or of
-    the other sign, none is.
-    """
-    states = in_frame(run.states, frame, run.problem.precision)
-    attitude = None if run.attitude is None else in_frame(run.attitude, frame, run.problem.precision)
-    return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
-
-
-def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
-    """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
-    import numpy
-
-    if not len(values):
-        return values
-    found = numpy.array(values, copy=True)
-    whole = [[entry.denominator == 1 for entry in row] for row in frame.axes]
-    for place in range(0, found.shape[1], 3):
-        part = values[:, place : place + 3]
-        if all(map(all, whole)):
-            turned = _permuted(part, frame)
-        elif precision == DOUBLE:
-            turned = _in_double(part.astype(float), frame)
-        else:
-            turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=found.dtype)
-        found[:, place : place + 3] = turned
-    return found
-
-
-def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
-    """One state of an observer, as :func:`in_frame`."""
-    import numpy
-
-    return in_frame(numpy.array([state]), frame, precision)[0]
-
-
-def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
-    """Each component of the axes given is one of the others, or its negative."""
-    import numpy
-
-    columns = []
-    for row in frame.axes:
-        axis = next(i for i in range(3) if row[i])
-        columns.append(part[:, axis] if row[axis] > 0 else -part[:, axis])
-    return numpy.stack(columns, axis=1)
-
-
-def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> list[Any]:
-    try:
-        vector = [exact(value) for value in line]
-    except InputError:  # the last state of a run that failed
-        return list(line)
-    return [number(value, precision) for value in rotated(frame.axes, vector)]
-
-
-def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
-    """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
-    import numpy
-
-    high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
-    low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
-    found = numpy.empty_like(part)
-    with numpy.errstate(invalid="ignore", over="ignore"):
-        for i in range(3):
-            total, rest = numpy.zeros(len(part)), numpy.zeros(len(part))
-            for j in range(3):
-                product, error = _product(part[:, j], high[i, j])
-                before, total = total, total + product
-                back = total - before
-                rest += (before - (total - back)) + (product - back) + error + part[:, j] * low[i, j]
-            found[:, i] = total + rest
-    return found
-
-
-def _product(a: NDArray[np.float64], b: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
-    product = a * b
-    scaled, other = _SPLIT * a, _SPLIT * b
-    a_high, b_high = scaled - (scaled - a), other - (other - b)
-    a_low, b_low = a - a_high, b - b_high
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low

@@ -46,7 +46,7 @@ def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> R
     if error <= _FAR:
         return row
     case, problem = task.given, run.problem
-    states = [tuple(map(exact, state)) for state in run.states]
+    states = [tuple(map(exact, state[:6])) for state in run.states]
     found = diagnose(case.top, case.start, case.system, run.times, states, problem.precision, error)
     if not found:
         return row

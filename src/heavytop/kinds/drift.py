@@ -19,8 +19,8 @@ from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import NOISE, NOT_MEASURED, Beside, Metric, Row, RowKey
-from heavytop.render.page import digits_columns, digits_headline, motions
+from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row, RowKey
+from heavytop.render.page import attitude_columns, digits_columns, digits_headline, motions
 from heavytop.render.plots import digits, growth
 from heavytop.render.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
@@ -48,8 +48,8 @@ class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
 class DriftTable(PlanTable, tag=NAME):
     """integrator: any that `heavytop list` shows.
 
-    attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
-    multiword: others are given Ω and γ alone.
+    attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too: of an integrator
+    that declares that it carries the attitude; others are given Ω and γ alone, and the flag of the row says so.
     noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
     """
 
@@ -100,7 +100,7 @@ class DriftKind(Kind):
         """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
         place reached with other flags.
         """
-        if task.options.attitude and task.integrator.supports_ensemble:
+        if task.options.attitude and task.integrator.carries_attitude:
             return _with_attitude(task)
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
@@ -120,13 +120,14 @@ class DriftKind(Kind):
         if task.integrator.supports_ensemble:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
-        return with_explanation(_row(task, run, scorer), task, run, scorer)
+        return _row(task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""
         if (found := digits_headline(rows)) is not None:
             yield found
         yield from digits_columns(rows)
+        yield from attitude_columns(rows)
         yield motions(
             "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals",
             rows,
@@ -140,10 +141,12 @@ class DriftKind(Kind):
 
 
 def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:
-    if task.options.noise:
-        return computed_row(task, run, _banded(task, run, scorer), scorer.series(time_text), scorer.against)
-    plain = replace(run, flags=run.flags | {NOISE: NOT_MEASURED})
-    return computed_row(task, plain, scorer.metrics(), scorer.series(time_text), scorer.against)
+    noise, alone = task.options.noise, task.options.attitude and run.problem.xi is None
+    left_out = ({} if noise else {NOISE: NOT_MEASURED}) | (NOT_CARRIED if alone else {})
+    metrics = _banded(task, run, scorer) if noise else scorer.metrics()
+    marked = replace(run, flags=run.flags | left_out)
+    row = computed_row(task, marked, metrics, scorer.series(time_text), scorer.against)
+    return with_explanation(row, task, run, scorer)
 
 
 def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:

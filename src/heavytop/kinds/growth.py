@@ -23,7 +23,7 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
 from heavytop.measure.truth import EnsembleReference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import Beside, Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, RowKey, by_name
 from heavytop.render.page import laws_headline
 from heavytop.render.plots import digits
 from heavytop.render.plots import growth as over_time
@@ -51,8 +51,8 @@ class GrowthRun(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
     in the reference: a planted fault.  reference: a format whose bits the runs have at least that stand for the truth
     where no closed form is known; None for 30 bits more than those of ``precision``, which they have in any case.
-    attitude: whether ξ rides along, and the laws of the errors of the attitude and of the centre of mass are found too;
-    of heyoka and multiword: others are given Ω and γ alone.
+    attitude: whether ξ rides along, and the laws of the errors of the attitude and of the centre of mass are found too:
+    of an integrator that declares that it carries the attitude, as a row of drift.
     """
 
     precision: str
@@ -145,7 +145,7 @@ class Growth(Kind):
         case, precision, run = task.given, task.precision, task.options
         members = ensemble_of(case, run.starts, run.seed)
         true = [Problem.of(*member, precision, case.system) for member in members]
-        turned = run.attitude and task.integrator.supports_ensemble
+        turned = run.attitude and task.integrator.carries_attitude
         posed = [_posed(problem, *member) if turned else problem for problem, member in zip(true, members, strict=True)]
         given = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]
@@ -178,6 +178,8 @@ class Growth(Kind):
         notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]
         if chaotic:
             notes.append("Rate: the median over the starts of their finite-time rates.")
+        lacking = dict.fromkeys(row.key.subject.name for row in rows if NOT_CARRIED.items() <= row.flags.items())
+        notes += [f"No attitude, which it does not carry: {', '.join(lacking)}."] if lacking else []
         columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
         columns.append("lost at |t|")
         title = "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
@@ -224,6 +226,7 @@ def _row(
 ) -> Row:
     """Where the motions ended, and what they come to together."""
     precision, first = task.precision, motions[0]
+    alone = task.options.attitude and not task.integrator.carries_attitude
     failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
     reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
     distance = math.sqrt(sum(float(part) ** 2 for part in task.given.top.centre))
@@ -244,7 +247,7 @@ def _row(
         reference=compared.against,
         measured=f"{who}, {len(motions)} {of}, root mean square over them",
         order=first.order,
-        flags=first.flags | {"bias": task.options.bias or "none"},
+        flags=first.flags | {"bias": task.options.bias or "none"} | (NOT_CARRIED if alone else {}),
         input_rounding=decimal_text(rounding, 3),
         series=found.series,
         samples=len(task.times),

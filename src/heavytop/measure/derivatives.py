@@ -12,7 +12,7 @@ from flint import arb
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.derivatives import DATA, METHOD, derivatives
-from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import ball, largest_singular_value, value_text, whole_evaluation, working_precision
 from heavytop.measure.certify import bits_of
 from heavytop.precision import exact, shown
@@ -74,11 +74,18 @@ def which_derivatives(value: object) -> str | None:
 
 
 def known_derivatives(
-    body: HeavyTop | Body, start: State, times: Sequence[Fraction], digits: int, system: System, which: str
+    body: HeavyTop | Body,
+    start: State,
+    times: Sequence[Fraction],
+    digits: int,
+    system: System,
+    which: str,
+    effort: float = EFFORT,
 ) -> Derivatives:
     """The derivatives at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1, absolute below.
 
     body, start: a body or a top, and its state, in whose axes they are given.  which: one of :data:`WHICH`.
+    effort: of the enclosure.
     Raises OutOfReach where the digits cannot be proven; InputError for a body whose principal axes are irrational.
     """
     resolved = resolve(body, start, bits_of(digits) + 256)
@@ -87,7 +94,8 @@ def known_derivatives(
             "Derivatives need exact data, but the principal axes or the attitude are irrational.",
             "Give principal moments, and gamma or an attitude with rational entries such as a quaternion.",
         )
-    known, bits = Validated(resolved.top, resolved.start, system), bits_of(digits) + _SPARE_BITS
+    known = Validated(resolved.top, resolved.start, system, effort=effort)
+    bits = bits_of(digits) + _SPARE_BITS
     found = derivatives(known, times, bits, which != "start")
     of_start = of_data = lyapunov = None
     if which != "data":

@@ -20,9 +20,9 @@ from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
-from heavytop.integrate.peers.command import NOT_COUNTED
+from heavytop.integrate.peers.command import NOT_COUNTED, Command
 from heavytop.integrate.peers.contract import require_equal
-from heavytop.integrate.registry import Integrator, IntegratorSource, described, load
+from heavytop.integrate.registry import Integrator, IntegratorSource, described, load, name_of
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Ensemble, band, law, root_mean_square
@@ -52,6 +52,11 @@ class ChosenIntegrator:
     setting: tuple[str, Fraction] | None = None
     source: IntegratorSource | None = None
 
+    @classmethod
+    def of(cls, which: str | IntegratorSource) -> ChosenIntegrator:
+        """The integrator that is named, or defined by its source."""
+        return cls(name_of(which), source=None if isinstance(which, str) else which)
+
     @property
     def which(self) -> str | IntegratorSource:
         """What it is looked up by."""
@@ -67,6 +72,19 @@ class ChosenIntegrator:
         """Whether many motions go side by side, which makes each cheap."""
         return bool(self.can.ensemble)
 
+    @property
+    def carries_attitude(self) -> bool:
+        """Whether it declares that ξ rides along; not one that cannot be used."""
+        if isinstance(self.source, Command):
+            return self.source.attitude
+        if self.can.own:
+            return self.can.attitude
+        try:
+            peer: Any = registry.ready(self.which)
+        except (InputError, PeerFailed):
+            return False
+        return bool(peer.carries_attitude)
+
     def propagate(
         self,
         top: HeavyTop,
@@ -76,14 +94,17 @@ class ChosenIntegrator:
         system: System,
         observer: Observer | None = None,
         *,
+        xi: Sequence[Fraction] | None = None,
         again: bool = True,
         **going_on: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
-        going_on: place and mark as in :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator
-        that knows no places.  again: whether a quick call of an integrator of another package is made twice, to see
-        whether it is the same.  Raises PeerFailed for whatever a third-party integrator does wrong.
+        xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
+        package is made twice, to see whether it is the same.  going_on: place and mark as in
+        :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
+
+        Raises PeerFailed for whatever a third-party integrator does wrong.
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
@@ -91,13 +112,14 @@ class ChosenIntegrator:
             return spoilt
         if self.can.streams:
             call = registry.propagator(self.name, {})
-            run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
+            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **going_on)
             return run
         try:
             peer = registry.ready(self.which, self.setting)
-            run = peer(top, start, times, precision, system=system)
+            beside = {} if xi is None else {"xi": xi}
+            run = peer(top, start, times, precision, system=system, **beside)
             if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
-                require_equal(self.name, run, peer(top, start, times, precision, system=system))
+                require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
         except Unsupported:
             raise
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
@@ -135,7 +157,8 @@ class ChosenIntegrator:
         for index, problem in enumerate(problems):
             watch = None if observer is None else _watching(observer, index)
             first = index == 0
-            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch, again=first))
+            arguments = *_given(problem), times, problem.precision, problem.system, watch
+            runs.append(self.propagate(*arguments, xi=problem.xi, again=first))
             if finished is not None:
                 finished(index, runs[-1])
         return runs
@@ -152,7 +175,7 @@ def _given(problem: Problem) -> tuple[HeavyTop, State]:
     """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
     if problem.system is not GYROSTAT:
         return problem.top, problem.start
-    if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system) != problem:
+    if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
         raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
     return problem.given
 

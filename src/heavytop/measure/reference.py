@@ -13,9 +13,10 @@ from flint import arb
 
 from heavytop.display import Tabular, TitledTable, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.bodies import BodyMotion
+from heavytop.exact.bodies import BodyMotion, Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import initial_xi
+from heavytop.exact.enclosure.run import EFFORT
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     ball,
@@ -27,7 +28,6 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
-from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import InSpace
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
@@ -257,7 +257,6 @@ _SHOWN = 15
 _WIDE, _ENDS = 52, 2
 """Characters of a number in a row, and times at either end that are shown of many."""
 
-Finder = Callable[[HeavyTop, State, System], ExactSolution]
 Evaluate = Callable[[Fraction, int], Sequence[Any]]
 
 
@@ -456,20 +455,23 @@ def reference(
     finder: Finder = find,
     attitude: bool = False,
     derivatives: str | None = None,
+    effort: float = EFFORT,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
     times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.  derivatives: "start", "data" or
-    "all" for those too.
+    "all" for those too.  effort: of an enclosure, :class:`heavytop.exact.enclosure.run.Validated`.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
         raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
-    known = BodyMotion(top, start, system, finder)
+    known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)
-    derived = None if derivatives is None else known_derivatives(top, start, instants, digits, system, derivatives)
+    derived = None
+    if derivatives is not None:
+        derived = known_derivatives(top, start, instants, digits, system, derivatives, effort)
     found = Reference(
         method=known.method,
         digits=digits,

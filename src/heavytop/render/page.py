@@ -42,11 +42,12 @@ from heavytop.document.document import (
 from heavytop.document.kind import Kinds, document, headlines, kind_of
 from heavytop.document.svg import quiet_style
 from heavytop.files import replace
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.render.text import drifts, failed, unsupported
 from heavytop.suite.plan import BUILT_IN
 
@@ -301,9 +302,9 @@ def named(rows: Sequence[Row]) -> Callable[[Row], str]:
     return lambda row: f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
 
 
-def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> list[Table]:
-    """A line a motion, a column a format, or an integrator where all are in one format, for a short summary; of two
-    rows in one place the later.  No table without rows.
+def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT) -> list[Table]:
+    """A line a motion, a column a format, or an integrator where all are in one format; of two rows in one place the
+    later.  No table without rows.
     """
     names, one_format = named(rows), len({row.precision for row in rows}) == 1
     lines: dict[str, dict[str, str]] = {}
@@ -320,7 +321,7 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> l
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
     room = min(max(room, 16), 39)
     named_cells = [line for name, found in zip(lines, cells, strict=True) for line in _in_lines(name, found, room)]
-    return [Table(title, ["", *columns], named_cells, shown=In.SHORT)]
+    return [Table(title, ["", *columns], named_cells, shown=shown)]
 
 
 def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
@@ -338,7 +339,27 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
         place = row.key.case, row.key.subject.name, row.precision
         if digits_kept(row) is not None and (place not in known or _end(row) >= _end(known[place])):
             known[place] = row
-    return in_columns("Digits right, to |t|", _digits_until, list(known.values()))
+    found = list(known.values())
+    more = "; of the attitude" if any(map(_attitude_asked, found)) else ""
+    return in_columns(f"Digits right, to |t|{more}", _digits_until, found)
+
+
+def attitude_columns(rows: Sequence[Row]) -> list[Table]:
+    """The largest errors of attitude and position, where a row was asked for them."""
+    title = "Largest error of the attitude (rad), of the position"
+    return in_columns(title, _attitude_errors, list(filter(_attitude_asked, rows)), In.FULL | In.PAGE)
+
+
+def _attitude_asked(row: Row) -> bool:
+    return row.metric(*_ATTITUDE) is not None or NOT_CARRIED.items() <= row.flags.items()
+
+
+_ATTITUDE, _POSITION = (ATTITUDE_ERROR, "", "max"), (POSITION_ERROR, "", "max")
+
+
+def _attitude_errors(row: Row) -> str:
+    found = [str(Value(metric, 2)) for each in (_ATTITUDE, _POSITION) if (metric := row.metric(*each))]
+    return ", ".join(found) or NOT_CARRIED["attitude"]
 
 
 def _until(row: Row) -> str:
@@ -355,7 +376,16 @@ def _digits_until(row: Row) -> str:
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}"
+    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}{_digits_of_attitude(row)}"
+
+
+def _digits_of_attitude(row: Row) -> str:
+    """−log10 of the largest angle in radians, at most the digits of the format, where the row was asked for it."""
+    error = row.metric(*_ATTITUDE)
+    if error is None:
+        return f"; {NOT_CARRIED['attitude']}" if _attitude_asked(row) else ""
+    most = row.bits * math.log10(2)
+    return f"; {digits_text(most if error.log10 is None else min(most, -error.log10))}"
 
 
 def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:

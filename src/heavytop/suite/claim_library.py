@@ -17,6 +17,7 @@ import msgspec
 from heavytop.claims.audit.audit import audited
 from heavytop.claims.audit.judge import StatementVerdict
 from heavytop.claims.library.entry import FOLDER, Entry, Verdict, library
+from heavytop.files import replace
 
 VERSION = "1.0.0"
 """Of the form: a key that is added raises the second place, one that changes the first."""
@@ -115,7 +116,7 @@ def write(out: Path) -> list[Path]:
     files = [out / "library.json", out / "library.schema.json"]
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(Library)}
     for path, content in zip(files, (document(), schema), strict=True):
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
+        replace(path, msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
     return files
 
 

@@ -23,6 +23,7 @@ from heavytop.integrate.peers.command import Command, Request, Session, begin_ro
 from heavytop.integrate.peers.contract import said
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
 from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
@@ -164,11 +165,11 @@ class _Contract:
             ("backwards", self._backwards),
             ("rest", self._rest),
             ("steps", self._steps),
+            ("attitude", self._attitude),
             *((f"format {each.name}", self._format(each)) for each in self.precisions[1:]),
             *((f"system {each}", self._of_system(each)) for each in self.systems[1:]),
         ]
         if self.program:
-            parts += [("attitude", self._attitude)] if self.program.attitude else []
             parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
         parts.append((_TOO_FAST, self._huge))
         return parts + ([("quit", self._quit), ("end of input", self._end_of_input)] if self.program else [])
@@ -297,12 +298,13 @@ class _Contract:
         )
 
     def _attitude(self) -> str:
+        if not ChosenIntegrator.of(self.which).carries_attitude:
+            return (
+                "It carries Ω and γ alone: it does not declare that it carries the attitude, and is not asked for it."
+            )
         xi = perpendicular(self.start.gamma)
-        assert self.program is not None
-        run = self.program.load()(self.top, self.start, [Fraction(1)], self.precision, system=self.system, xi=xi)
-        if run.outcome is not Outcome.SUCCESS:
-            raise _Violated(f"With the attitude it ends as {run.outcome.value}.")
-        known = propagate(self.top, self.start, [Fraction(1)], DOUBLE, system=self.system, xi=xi)
+        run = self._run([1], xi=xi)
+        known = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
         off = _distance(run.states[-1], known.states[-1])
         if off > _OFF:
             raise _Violated(f"With the attitude its state at t = 1 is off by {decimal_text(off, 2)}.")

@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from heavytop.cases import CASES, Case, named_bodies
+from heavytop.files import replace
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.reference import Ball, Reference, reference
 from heavytop.precision import exact, exact_text
@@ -130,10 +131,10 @@ def write(out: Path, times: int = TIMES, digits: int = DIGITS) -> list[Path]:
         motion, _ = entry(case, last, times, digits)
         found.append(motion)
         files.append(out / "csv" / f"{motion['name']}.csv")
-        files[-1].write_text(table(motion), encoding="utf-8")
+        replace(files[-1], table(motion).encode())
     document = {"pack": "heavytop reference pack", "version": VERSION, "conventions": _CONVENTIONS, "motions": found}
-    files[0].write_bytes(msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
-    files[1].write_bytes(msgspec.json.format(msgspec.json.encode(schema()), indent=1) + b"\n")
+    for path, content in zip(files, (document, schema()), strict=False):
+        replace(path, msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
     return files
 
 

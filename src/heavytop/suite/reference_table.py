@@ -22,6 +22,7 @@ from heavytop.exact.cases.staude import staude_motion
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.solution import ExactSolution
+from heavytop.files import replace
 from heavytop.measure.certify import Certificate, certify, enclosure_of
 from heavytop.measure.reference import Ball, ball_texts
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -178,7 +179,7 @@ def write(out: Path, digits: int = _DIGITS) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     target = out / "states.json"
     document = msgspec.json.encode([motion(case, digits) for case in cases()])
-    target.write_bytes(msgspec.json.format(document, indent=1) + b"\n")
+    replace(target, msgspec.json.format(document, indent=1) + b"\n")
     return target
 
 

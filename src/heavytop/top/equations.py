@@ -190,6 +190,11 @@ class System:
         """ξ' = ξ × ω for a vector ξ fixed in space."""
         return cross(xi, self.angular_velocity(p, y))
 
+    def with_attitude(self, p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """(Ω', γ') of six numbers, (Ω', γ', ξ') of nine, ξ behind."""
+        state = y[:6]
+        return (*self.field(p, state), *(self.attitude(p, state, y[6:]) if len(y) > 6 else ()))
+
 
 def rotor(top: HeavyTop, start: State) -> Fraction:
     """λ = P b / (M·γ), from the exact start.

@@ -5,20 +5,25 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from math import inf
 from typing import Any
+
+from flint import arb
 
 from heavytop import written_numbers
 from heavytop.errors import InputError, quoted
+from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
-from heavytop.precision import Vector, exact, vector
+from heavytop.precision import Vector, dot, exact, log10, vector
 from heavytop.trajectories.observed import RawStart
 
 REMEDY = "`heavytop docs score` lists the columns that are understood."
 _UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
 _INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)?[\])])+)(?:\s.*)?", re.IGNORECASE)
 _POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
+_PARTS = re.compile(r"(?:q|quat|quaternion)([wxyz0-4])")
 _MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
 _SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
 _FRAMED = re.compile(r"w([xyz])")
@@ -35,6 +40,33 @@ _TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
 _AXES = {"x": "1", "y": "2", "z": "3"}
 _CLASSIC = {"p": "1", "q": "2", "r": "3"}
 _TIME = ("t", "time")
+_TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
+"""Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
+_SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
+"""What stands in the last brackets of a name, or behind its first slash."""
+_A_SECOND = ("/s", "/sec", "/second", "s-1")
+_SECOND = {"ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "μs": Fraction(1, 10**6), "min": Fraction(60)}
+_RATE = {
+    **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
+    **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
+}
+_METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
+_UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
+"""Units that a header may have, in those of the data: s, rad/s (of these as multiples of π) and m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit that the header says, and what it is in that of the data.  turning: whether π is a factor of it too."""
+
+    name: str
+    size: Fraction
+    turning: bool = False
+
+    def factor(self, digits: int) -> Fraction:
+        """What numbers of so many digits are multiplied by; π to many more."""
+        with working_precision(4 * digits + 64):
+            return self.size * midpoint(arb.pi()) if self.turning else self.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +75,14 @@ class Header:
 
     time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
     their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
+    units: of t and of quantities, where they are not those of the data.
     """
 
     time: int | None
     places: Mapping[str, Mapping[str, int]]
     angles: str
     others: tuple[str, ...]
+    units: Mapping[str, Unit] = field(default_factory=dict)
 
     def of_state(self) -> dict[str, int]:
         """The places of t, omega1 to omega3, gamma1 to gamma3, as far as they are there; InputError for one twice."""
@@ -67,13 +101,18 @@ class Header:
 def header(names: Sequence[str]) -> Header:
     """The meaning of every column; raises InputError for one that stands twice."""
     found: dict[str, dict[str, int]] = {}
-    time, units, others = None, set(), []
-    for place, name in enumerate(names):
-        plain = _plain(_with_index(name.strip()))
+    time, angles, others = None, set(), []
+    units: dict[str, set[Unit]] = {}
+    plainly = [_plain(_with_index(name.strip())) for name in names]
+    together = _quaternion(plainly)
+    for place, (name, plain) in enumerate(zip(names, plainly, strict=True)):
+        if place in together.values():
+            continue
         if plain in _TIME:
             if time is not None:
                 raise InputError("The column t stands twice.", "Give each column once.")
             time = place
+            units["t"] = {_unit("t", name)}
             continue
         meaning = _meaning(plain)
         if meaning is None:
@@ -81,15 +120,46 @@ def header(names: Sequence[str]) -> Header:
             continue
         quantity, component = meaning
         if component in found.setdefault(quantity, {}):
-            plainly = quantity in ("omega", "gamma")
-            said = f"{quantity}{_AXES.get(component, component)}" if plainly else quoted(name)
+            of_state = quantity in ("omega", "gamma")
+            said = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
             raise InputError(f"The column {said} stands twice.", "Give each column once.")
         found[quantity][component] = place
+        units.setdefault(quantity, set()).add(_unit(quantity, name))
         if quantity == "euler" and (unit := _UNIT.search(name.strip())):
-            units.add("degrees" if unit[1] else "radians")
-    if len(units) > 1:
+            angles.add("degrees" if unit[1] else "radians")
+    if len(angles) > 1:
         raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
-    return Header(time, found, "".join(units), tuple(others))
+    if together:
+        found["quaternion"] = together
+    return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
+
+
+def _quaternion(plain: Sequence[str]) -> dict[str, int]:
+    """The places of w, x, y, z or e0 to e3 beside each other, where no column is called one of a quaternion."""
+    if any(_PARTS.fullmatch(name) for name in plain):
+        return {}
+    runs = ((place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3))
+    first, run = next((each for each in runs if each[1] in _TOGETHER), (0, ()))
+    return {name[-1]: first + number for number, name in enumerate(run)}
+
+
+def _unit(quantity: str, name: str) -> Unit:
+    """The unit of a column; that of the data where it says none that is known."""
+    match = _SAID.search(name.strip())
+    text = unicodedata.normalize("NFKC", (match[1] or match[2] or "") if match else "").lower()
+    text = re.sub(r"[\s*·^().]", "", text.replace("−", "-"))
+    known = _UNITS.get(quantity, {})
+    return Unit(text, known.get(text, Fraction(1)), text in _RATE and known is _RATE)
+
+
+def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
+    """The unit of each quantity that has another than the data; raises InputError for one that has several."""
+    for quantity, said in units.items():
+        if len({(unit.size, unit.turning) for unit in said}) > 1:
+            names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in said))
+            raise InputError(f"The header has the {_words(quantity)} {names}.", "Give all of it in one unit.")
+    found = {quantity: min(said, key=lambda unit: unit.name) for quantity, said in units.items()}
+    return {quantity: unit for quantity, unit in found.items() if unit.size != 1}
 
 
 def _with_index(name: str) -> str:
@@ -115,7 +185,7 @@ def _meaning(plain: str) -> tuple[str, str] | None:
         return "omega", _CLASSIC[plain]
     if plain in _TAIT_BRYAN:
         return "euler", _TAIT_BRYAN[plain]
-    if match := re.fullmatch(r"(?:q|quat|quaternion)([wxyz0-4])", plain):
+    if match := _PARTS.fullmatch(plain):
         return "quaternion", match[1]
     if match := _MATRIX.fullmatch(plain):
         return "matrix", match[1] + match[2]
@@ -314,6 +384,7 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     space, last = in_space(document), said.quaternion_order == "xyzw"
     both = {"omega", "gamma"} <= header.places.keys()
     places: dict[str, list[tuple[str, int]]] = {}
+    units: dict[str, Unit] = {}
     for quantity, components in header.places.items():
         try:
             ordered = ordered_places(quantity, components, last, said.sequence)
@@ -327,12 +398,43 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
         if name in places:
             raise InputError(f"The columns of {name} stand twice.", "Give each quantity once, and say its frame.")
         places[name] = ordered
+        if quantity in header.units and quantity != "position":  # of which the body decides
+            units[name] = header.units[quantity]
     values: dict[str, list[tuple[Fraction, ...] | None]] = {name: [] for name in WIDTHS if name in places}
     for number, row in zip(lines, cells, strict=True):
         for name in values:
             values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
     texts = [row[place] for row in cells for name in values for _, place in places[name]]
+    for name, unit in units.items():
+        values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
     return ColumnTable(values, texts, [f"line {number}" for number in lines])
+
+
+def _times(factor: Fraction, rows: Sequence[tuple[Fraction, ...] | None]) -> list[tuple[Fraction, ...] | None]:
+    return [None if row is None else tuple(factor * value for value in row) for row in rows]
+
+
+def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention, centre: Vector) -> ColumnTable:
+    """The table with positions in the unit of the body: its data are in that of the header, such as mm, or in m.
+
+    Whichever brings the first position nearer to the distance of the point from the fixed point.
+    """
+    unit = None if header is None else header.units.get("position")
+    rows = table.values.get("position", [])
+    first = next((row for row in rows if row is not None), None)
+    point = centre if said.point is None else said.point
+    distance = log10(dot(point, point))
+    if unit is None or first is None or distance is None:
+        return table
+
+    def off(size: Fraction) -> float:
+        apart = [size * value - place for value, place in zip(first, said.pivot, strict=True)]
+        found = log10(dot(apart, apart))
+        return inf if found is None else abs(found - distance)
+
+    if off(unit.size) >= off(Fraction(1)):
+        return table
+    return replace(table, values={**table.values, "position": _times(unit.size, rows)})
 
 
 def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
@@ -480,10 +582,10 @@ def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[F
 
 def times(document: Mapping[str, Any]) -> list[Fraction]:
     """The column t of a text table; raises InputError that names the line of what is not a finite number."""
-    found = []
+    found, unit = [], document["header"].units.get("t")
     for number, text in zip(document["lines"], document["times"], strict=True):
         value = cell(text, f"Line {number}, column t")
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
-        found.append(value)
+        found.append(value if unit is None else unit.size * value)
     return found

@@ -98,7 +98,9 @@ class TextTable:
         names = self._without_header(len(first)) if header is None else header
         self.cells = _split(body, self.lines, separator, len(names))
         found = observed_columns.header(names)
-        if found.time is not None and observed_columns.is_more_than_states(found):
+        said = [f"{name} in {unit.name}" for name, unit in found.units.items() if name != "position"]
+        self.notes += [f"as the header says, {', '.join(said)}"] if said else []
+        if found.time is not None and (found.units or observed_columns.is_more_than_states(found)):
             self.header, others = found, list(found.others)
         else:
             places = found.of_state()
@@ -344,6 +346,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     table = observed_columns.columns(document, said)
     require_states(times, table.places)
     body = _body(document, case)
+    table = observed_columns.in_unit_of_body(table, document.get("header"), said, body.centre)
     which = system_of(_system(document, case), body)
     require_system(which)
     if case is not None and isinstance(body, HeavyTop):

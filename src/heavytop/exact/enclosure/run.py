@@ -129,10 +129,10 @@ class EnclosureRun:
         passed = bisect_right(self.falls, time, key=lambda fall: fall.time)
         return self.falls[passed - 1][1:] if passed else (self.precision, self.certified)
 
-    def after(self, found: Step) -> Node:
+    def after(self, found: Step, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
         """The node at the end of a step, remembered; in fewer bits where that is time."""
         precision = self.motion.fewer(found.precision, found.node.errors.bits)
-        node = found.end(dropped=found.precision - precision)
+        node = found.end(transfer, found.precision - precision)
         if precision < found.precision and (not self.falls or self.falls[-1].time < node.time):
             self.falls = (*self.falls, Fall(node.time, precision, self.motion.certified_at(precision)))
         self.keep(node)
@@ -396,6 +396,8 @@ _HOPELESS, _SURELY = 8, 1.25
 """Times the effort, and times what a cost may be, beyond which a pilot is abandoned after its first hundred steps."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
+EFFORT = 900.0
+"""Seconds of the cost model that a request for an enclosure may take."""
 
 
 def seconds_a_step(precision: int, in_words: bool) -> float:
@@ -420,7 +422,7 @@ class Validated:
     system: System = HEAVY_TOP
     rotor: Fraction | None = None
     xi: Vector | None = None
-    effort: float = 900.0
+    effort: float = EFFORT
     method: str = "validated: Taylor enclosure"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)

@@ -9,17 +9,18 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, OutOfReach
 from heavytop.integrate.multiword.engines import choose, compiled
+from heavytop.integrate.registry import expected_steps
 from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, Trajectory, sampled
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
-from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.fixed_point.fixed_point_run import LONGEST_STEP, Fixed
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
-from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, exact, number, numbers, require
+from heavytop.precision import DOUBLE, Array, OrderedRing, Precision, decimal_text, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
+from heavytop.top.heavy_top import DoubleTimes, HeavyTop, RoundedTimes, State, check_times
 
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
@@ -31,6 +32,8 @@ _EVERY_BIT = 1200
 """Bits in which sums of doubles below 2^100 are exact."""
 _SLACK = 8
 """Bits that words are wider than those of their grid, and sums of them than they, at most."""
+_TOO_MANY, _FEW = 1000, 10**6
+"""Times the steps that a motion asks for, and so many more: in quad 10**9 take twenty minutes."""
 _LEAST_LOW = 2.0**-960
 """A low word that is larger has all its bits."""
 OUTCOMES = {
@@ -64,7 +67,10 @@ def propagate_words(
     Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
-    targets = numbers(check_times(times), precision)
+    given = check_times(times)
+    # doubles serve here as they are: to make reals of them takes as long as hundreds of steps
+    wide = precision.bits >= DOUBLE.bits
+    targets = given.numbers if wide and isinstance(given, DoubleTimes) else numbers(given, precision)
     return follow(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
 
 
@@ -89,9 +95,13 @@ def follow(
     forwards = bool(targets[-1] >= 0)
     began = perf_counter()
     pace = _Pace(arithmetic.begin(scaled, forwards), scaled, problem.precision, step_limit, between)
+    if step_limit is None and isinstance(pace.run, Fixed):
+        _require_reach(problem, scaled, exact(targets[-1]))
+    times: Sequence[Fraction]
+    states: Any
     if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
-        outcome, states = pace.sampled(targets, problem.precision)
-        times: Sequence[Fraction] = RoundedTimes(targets[: len(states)])
+        outcome, count, make = pace.sampled(targets, problem.precision)
+        times, states = RoundedTimes(targets[:count]), make
         seconds = perf_counter() - began
     else:
         times, states, outcome, seconds = sampled(pace, targets, flags, began, observer, place, mark)
@@ -107,6 +117,21 @@ def follow(
         {"compile": compiling, "run": seconds},
         flags,
     )
+
+
+def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
+    """Raises OutOfReach for a run on a grid of many more steps than the motion asks for, and than anyone waits for.
+
+    A grid bounds |Ω| by the energy over the least moment: of a thin rod by a rate at which it does not move.
+    """
+    fewest = abs(end) * scaled.rate / LONGEST_STEP
+    if not scaled.rest and fewest > _TOO_MANY * (expected_steps(problem, end) + _FEW):
+        raise OutOfReach(
+            f"A run of multiword in {problem.precision.name} to t = {decimal_text(end, 6)} takes "
+            f"{decimal_text(fewest, 2)} steps or more: they are as short as if all the energy were in a spin about the "
+            "axis of the least moment.",
+            "Use double-double or heyoka, whose steps follow the motion, or limit the steps.",
+        )
 
 
 def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
@@ -162,17 +187,20 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
     return found
 
 
-def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
+def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
     """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
-    import numpy
-
-    odd = _outside(highs + lows, 1 / _LARGE, _LARGE)
-    if precision.family in ("double", "extended"):
-        # a zero has no sign
-        found = numpy.add(highs + 0.0, lows, dtype="longdouble" if precision.family == "extended" else float)
-        return found if (sizes == 1).all() else found * sizes, odd
+    highs, lows = pair
+    total = highs + lows
+    odd = _outside(total, 1 / _LARGE, _LARGE)
+    if precision.family == "double":
+        total += 0.0  # a zero has no sign
+        return total if (sizes == 1).all() else total * sizes, odd
     lows = lows * sizes
     odd |= _outside(lows, _LEAST_LOW, math.inf)
+    if precision.family == "extended":
+        found = (highs * sizes + 0.0).astype("longdouble")
+        found += lows
+        return found, odd
     return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd
 
 
@@ -248,6 +276,11 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     return found, odd
 
 
+def _exact_sums(words: Iterable[Doubles]) -> tuple[Fraction, ...]:
+    """The sum of the words of each component."""
+    return tuple(sum(map(Fraction, each), Fraction(0)) for each in zip(*(word.tolist() for word in words), strict=True))
+
+
 def _widening(precision: Precision) -> Callable[[float], Any]:
     """A double as a number of a format with as many bits or more."""
     if precision.family in ("double-double", "real"):
@@ -294,53 +327,87 @@ class _Pace:
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
         return Outcome.SUCCESS
 
-    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, Any]:
-        """The states at many doubles that are reached, as from :meth:`reach` and :meth:`sample`, in few calls."""
+    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, int, Callable[[], Array]]:
+        """The outcome, how many of many times are reached, and what makes the states there, as from :meth:`reach` and
+        :meth:`sample`, in few calls.
+        """
         import numpy
 
         if targets[0] == 0:
-            outcome, states = self.sampled(targets[1:], precision)
+            outcome, count, make = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
-            return outcome, numpy.concatenate([[start], states])
+            return outcome, count + 1, lambda: numpy.concatenate([[start], make()])
         found = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
-        status, states, others = found(targets, numpy.array([float(size) for size in self.scaled.sizes]), precision)
-        for row, known in sorted(others.items()):
-            state = None if known is None else native_state(self.scaled.back(known), precision)
-            if state is None:
-                return Outcome.CAPACITY if known is None else Outcome.NON_FINITE, states[:row]
-            states[row] = state
-        return OUTCOMES[status], states
+        sizes = numpy.array([float(size) for size in self.scaled.sizes])
+        status, count, others, make = found(targets, sizes, precision)
+        outcome, known = OUTCOMES[status], dict[int, Any]()
+        for row, state in sorted(others.items()):
+            rounded = None if state is None else native_state(self.scaled.back(state), precision)
+            if rounded is None:
+                outcome, count = Outcome.CAPACITY if state is None else Outcome.NON_FINITE, row
+                break
+            known[row] = rounded
+
+        def states() -> Array:
+            made: Array = make()[:count]
+            for row, state in known.items():
+                made[row] = state
+            return made
+
+        return outcome, count, states
 
     def _of_two_words(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
-        """How it ended, the states at many times, and by their rows those that only exact numbers tell."""
+        """How it ended, how many times are reached, by their rows the states that only exact numbers tell, and what
+        makes all others: to make reals takes longer than to sample.
+        """
         import numpy
 
         assert isinstance(self.run, Floating)
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
         lows = numpy.zeros(len(times)) if (times == highs).all() else (times - highs).astype(float)
-        status, words = self.run.sampled(highs * rate, lows * rate)
-        places = list(PLACES[: len(self.scaled.sizes)])
-        pairs = words.take(places, 1), words.take([place + 8 for place in places], 1)
-        states, odd = _sums_of_columns(*pairs, sizes, precision)
-        others = {row: self.run.exact_state(words[row]) for row in map(int, numpy.flatnonzero(odd))}
-        return status, states, others
+        places = [[place + word for place in PLACES[: len(sizes)]] for word in (0, 8)]
+        is_double, count, others = precision == DOUBLE, 0, dict[int, tuple[Fraction, ...]]()
+        kept = [numpy.empty((len(times), len(sizes))) for _ in range(1 if is_double else 2)]
+        for words in self.run.sampled(highs * rate, lows * rate):
+            found = [words.take(each, 1) for each in places]
+            if is_double:
+                total, odd = _sums_of_columns(found, sizes, precision)
+                others |= {count + int(row): _exact_sums(word[row] for word in found) for row in numpy.flatnonzero(odd)}
+                found = [total]
+            for array, values in zip(kept, found, strict=True):
+                array[count : count + len(words)] = values
+            count += len(words)
+
+        def make() -> Array:
+            if is_double:
+                return kept[0]
+            states, odd = _sums_of_columns([word[:count] for word in kept], sizes, precision)
+            for row in numpy.flatnonzero(odd):
+                states[row] = native_state(self.scaled.back(_exact_sums(word[row] for word in kept)), precision)
+            return states
+
+        return self.run.status, count, others, make
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
         import numpy
 
         assert isinstance(self.run, Fixed)
-        given, rate = numpy.asarray(targets), self.scaled.rate
+        given, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
         times: Doubles = given.astype(float)
         if (given == times).all():  # the rate is a power of two
             status, words, others = self.run.sampled(abs(times) * float(rate))
         else:
             status, words, others = self.run.sampled([abs(exact(target)) * rate for target in targets])
-        states, odd = _sums_of_words(words, self.run.grid, sizes, precision)
-        for row in map(int, numpy.flatnonzero(odd)):
-            if row not in others:
-                others[row] = tuple(sum(map(Fraction, column), Fraction(0)) for column in words[row].T.tolist())
-        return status, states, others
+
+        def make() -> Array:
+            states, odd = _sums_of_words(words, grid, sizes, precision)
+            for row in numpy.flatnonzero(odd):
+                if row not in others:
+                    states[row] = native_state(self.scaled.back(_exact_sums(words[row])), precision)
+            return states
+
+        return status, len(words), others, make
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""

@@ -26,7 +26,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy
 
-from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.errors import InputError, PeerFailed
 from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -100,7 +100,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     @property
     def declared(self) -> Declared:
         """What it can do."""
-        return Declared(self.systems, self.directions, self.precisions)
+        return Declared(self.systems, self.directions, self.precisions, self.attitude)
 
     def load(self) -> CommandIntegrator:
         """What integrates with it; nothing is started yet."""
@@ -142,9 +142,7 @@ class CommandIntegrator:
         """
         command = self.command
         instants = check_times(times)
-        command.declared.require(command.name, system, instants[-1], precision)
-        if xi is not None and not command.attitude:
-            raise Unsupported(f"{command.name} declares that it does not carry the attitude.", "Ask for no attitude.")
+        command.declared.require(command.name, system, instants[-1], precision, xi)
         value = self._setting(setting, precision)
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]

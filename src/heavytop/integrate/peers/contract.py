@@ -6,6 +6,7 @@ PeerFailed, which says in a sentence what it did.
 
 from __future__ import annotations
 
+import inspect
 import io
 import os
 import pickle
@@ -135,15 +136,20 @@ class Declared:
     """What an integrator declares that it can do; None where it declares nothing.
 
     systems: names such as "heavy_top".  directions: "forward", "backward".  precisions: names of formats, "real:BITS"
-    for any number of bits.
+    for any number of bits.  attitude: whether ξ rides along.
     """
 
     systems: tuple[str, ...] | None = None
     directions: tuple[str, ...] | None = None
     precisions: tuple[str, ...] | None = None
+    attitude: bool = False
 
-    def require(self, name: str, system: System, end: Fraction, precision: Precision) -> None:
+    def require(
+        self, name: str, system: System, end: Fraction, precision: Precision, xi: Sequence[Fraction] | None
+    ) -> None:
         """Raises Unsupported for a motion of ``system`` to the time ``end`` that is not among what is declared."""
+        if xi is not None and not self.attitude:
+            raise Unsupported(f"{name} declares that it does not carry the attitude.", "Ask for no attitude.")
         direction = "backward" if end < 0 else "forward"
         generic = f"{precision.family}:BITS"
         asked = (
@@ -172,8 +178,9 @@ def with_tolerance(run: Run) -> Callable[..., Trajectory]:
         *,
         system: System = HEAVY_TOP,
         tolerance: Fraction | None = None,
+        xi: tuple[Fraction, ...] | None = None,
     ) -> Trajectory:
-        return run(Problem.of(top, start, precision, system), times, tolerance)
+        return run(Problem.of(top, start, precision, system, xi), times, tolerance)
 
     return propagate
 
@@ -196,6 +203,14 @@ class Contained:
     ) -> None:
         self.name, self.call, self.own, self.declared, self.setting = name, call, own, declared, setting or {}
 
+    @property
+    def carries_attitude(self) -> bool:
+        """Whether ξ rides along: what is declared, and of a peer that declares nothing whether it takes ``xi``."""
+        if self.declared is not None:
+            return self.declared.attitude
+        with contained(self.name, " when its arguments were looked at"):
+            return "xi" in inspect.signature(self.call).parameters
+
     def __call__(
         self,
         top: HeavyTop,
@@ -204,6 +219,7 @@ class Contained:
         precision: Precision = DOUBLE,
         *,
         system: System = HEAVY_TOP,
+        xi: tuple[Fraction, ...] | None = None,
         **setting: Any,
     ) -> Trajectory:
         """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input.
@@ -211,15 +227,16 @@ class Contained:
         ``run`` of the seconds of one that is not own is that of the call and of reading its states, by the clock here.
         Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
         """
-        problem = Problem.of(top, start, precision, system)
+        problem = Problem.of(top, start, precision, system, xi)
+        beside = setting if xi is None else {"xi": xi, **setting}
         asked = [exact(number(time, precision)) for time in times]
         if self.declared is not None and asked:
-            self.declared.require(self.name, system, asked[-1], precision)
+            self.declared.require(self.name, system, asked[-1], precision, xi)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
         given: list[Any]
         own: dict[str, Any]
         try:
-            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **setting})))
+            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **beside})))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}
@@ -243,7 +260,7 @@ class Contained:
         began = perf_counter()
         run = SimpleNamespace(**{name: getattr(returned, name) for name in Trajectory.__slots__ if name != "problem"})
         self._require(isinstance(run.outcome, Outcome), f"the outcome {said(repr(run.outcome))}, which is none")
-        states = tuple(self._state(state, problem.precision) for state in run.states)
+        states = tuple(self._state(state, problem) for state in run.states)
         spent += perf_counter() - began
         self._require(len(states) <= len(asked), f"{len(states)} states for {len(asked)} times")
         done = len(states) == len(asked)
@@ -283,13 +300,15 @@ class Contained:
         if not condition:
             raise PeerFailed(f"{self.name} returned {what}")
 
-    def _state(self, state: Any, precision: Precision) -> Any:
-        """Six numbers of the format, as it holds them."""
+    def _state(self, state: Any, problem: Problem) -> Any:
+        """Six numbers of the format, as it holds them; nine with ξ."""
+        precision, width = problem.precision, 6 if problem.xi is None else 9
         self._require(not isinstance(state, str | bytes | dict | set), f"a {type(state).__name__} as a state")
         dtype = getattr(state, "dtype", None)
         self._require(dtype is None or dtype != numpy.dtype(object), "an array of objects as a state")
         values = list(state)
-        self._require(len(values) == 6, f"a state of {len(values)} components instead of 6")
+        asked = "6" if width == 6 else "9, Ω, γ and ξ: it carries the attitude"
+        self._require(len(values) == width, f"a state of {len(values)} components instead of {asked}")
         native = type(number(Fraction(1), precision))
         for value in values:
             plain = isinstance(value, native | Real) and not isinstance(value, bool | numpy.bool_)
@@ -320,7 +339,9 @@ def require_equal(name: str, one: Trajectory, other: Trajectory) -> None:
         ends = (f"{run.outcome.value} at t = {said(run.time_reached)} in {run.steps} steps" for run in (one, other))
         raise PeerFailed(f"{name} ended two equal calls as {' and as '.join(ends)}")
     for time, *states in zip(one.times, one.states, other.states, strict=True):
-        for component, *values in zip(NAMES, *(map(exact, state) for state in states), strict=True):
+        for component, *values in zip(
+            (*NAMES, "ξ1", "ξ2", "ξ3"), *(map(exact, state) for state in states), strict=False
+        ):
             if values[0] != values[1]:
                 first, second = (decimal_text(value, 17) for value in values)
                 where = f"{component} at t = {decimal_text(time, 6)}"

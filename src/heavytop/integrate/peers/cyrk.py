@@ -12,19 +12,19 @@ from heavytop.top.equations import System
 
 
 @compiled_once
-def _machine_code(system: System) -> Any:
-    return cyjit(fill(system))
+def _machine_code(system: System, width: int) -> Any:
+    return cyjit(fill(system, width))
 
 
 @compiled_once
-def _warm(system: System, method: str) -> None:
+def _warm(system: System, width: int, method: str) -> None:
     """Compiles what a first call would compile."""
-    _call(Given(system, numpy.zeros(6), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
+    _call(Given(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
 
 
 def _call(given: Given, method: str) -> Any:
     return nbsolve2_ivp(
-        _machine_code(given.system).address,
+        _machine_code(given.system, given.width).address,
         (0.0, float(given.times[-1])),
         given.start,
         method,
@@ -37,7 +37,7 @@ def _call(given: Given, method: str) -> Any:
 
 def _solver(method: str) -> Solve:
     def solve(given: Given) -> Solved:
-        _, seconds = timed(_warm, given.system, method)
+        _, seconds = timed(_warm, given.system, given.width, method)
         run = _call(given, method)
         try:
             states = run.y.T.copy()
@@ -48,5 +48,5 @@ def _solver(method: str) -> Solve:
     return solve
 
 
-dop853 = double_peer("cyrk:DOP853", 8, _solver("DOP853"))
-vern8 = double_peer("cyrk:Vern8", 8, _solver("Vern8"))
+dop853 = double_peer("cyrk:DOP853", 8, _solver("DOP853"), attitude=True)
+vern8 = double_peer("cyrk:Vern8", 8, _solver("Vern8"), attitude=True)

@@ -19,12 +19,12 @@ _MOST_STEPS = 2**24
 
 
 @compiled_once
-def _compiled(system: System, samples: int) -> Callable[..., Any]:
-    """The integration to so many times as machine code."""
+def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
+    """The integration of so many numbers to so many times as machine code."""
     read = reader(system)
 
     def field(_time: Any, y: Any, n: Any) -> Any:
-        return jnp.stack(system.field(read(n), y))
+        return jnp.stack(system.with_attitude(read(n), y))
 
     def integrate(start: Any, times: Any, numbers: Any, tolerance: Any) -> Any:
         return diffrax.diffeqsolve(
@@ -44,14 +44,14 @@ def _compiled(system: System, samples: int) -> Callable[..., Any]:
             throw=False,
         )
 
-    shapes = [jax.ShapeDtypeStruct(shape, float) for shape in ((6,), (samples,), (count(system),), ())]
+    shapes = [jax.ShapeDtypeStruct(shape, float) for shape in ((width,), (samples,), (count(system),), ())]
     return jax.jit(integrate).lower(*shapes).compile()
 
 
 def _solve(given: Given) -> Solved:
     # settings of this thread and this block alone: the user's jax stays what it is
     with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
-        code, seconds = timed(_compiled, given.system, len(given.times))
+        code, seconds = timed(_compiled, given.system, given.width, len(given.times))
         run = code(given.start, given.times, given.numbers, given.setting)
         states = numpy.asarray(jax.block_until_ready(run.ys))
     # diffrax fills what it did not reach with infinities
@@ -63,4 +63,4 @@ def _solve(given: Given) -> Solved:
     return Solved(states, 0.0, int(run.stats["num_steps"]), None, seconds, outcome)
 
 
-dopri8 = double_peer("diffrax:Dopri8", 8, _solve)
+dopri8 = double_peer("diffrax:Dopri8", 8, _solve, attitude=True)

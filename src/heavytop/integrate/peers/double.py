@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from threading import RLock
 from time import perf_counter
 from typing import Any, TypeVar
@@ -29,8 +29,9 @@ FINEST = Fraction(1, 10**15)
 class Given:
     """A problem in double.
 
-    start: shape (6,).  times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor:
-    shape (7,) with λ, 0 for the heavy top, or (9,) with k for the heavy gyrostat.
+    start: shape (6,), or (9,) with ξ behind where the attitude is asked for.  times: shape (n,), strictly monotone away
+    from 0.  numbers: the parameters I, n and the rotor: shape (7,) with λ, 0 for the heavy top, or (9,) with k for the
+    heavy gyrostat.
     setting: the tolerance, or the step of a method with fixed steps.  step_limit: steps after which an adaptive method
     should give up, with the states so far and ``Outcome.STEP_LIMIT``.
     """
@@ -47,13 +48,23 @@ class Given:
         """The numbers as ``system.field`` takes them: Python's, which are faster one at a time than an array's."""
         return reader(self.system)(self.numbers.tolist())
 
+    @property
+    def field(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
+        """y -> y', six numbers (Ω', γ'), or nine with ξ' behind: as many as ``start`` has."""
+        return partial(self.system.with_attitude, self.parameters)
+
+    @property
+    def width(self) -> int:
+        """Numbers of a state: 6, or 9 with ξ."""
+        return len(self.start)
+
 
 @dataclass(frozen=True, slots=True)
 class Solved:
     """What a library gave back.
 
-    states: shape (m, 6), one for each of the first m <= n times.  reached: the last time it stood at.
-    evaluations: of the field.  compile: seconds of the run that went into compiling.
+    states: shape (m, 6), or (m, 9) from a start of nine numbers, one for each of the first m <= n times.  reached: the
+    last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
     outcome: how a run that did not come to the end failed; :func:`double_peer` sees by itself to the rest.
     """
 
@@ -77,6 +88,7 @@ def double_peer(
     systems: Sequence[str] | None = None,
     directions: Sequence[str] | None = None,
     precisions: Sequence[str] | None = None,
+    attitude: bool = False,
 ) -> Callable[..., Trajectory]:
     """``solve`` as a peer, a callable that ``integrator`` takes wherever it takes a name.
 
@@ -88,15 +100,16 @@ def double_peer(
         systems, directions, precisions: what it declares that it can do, such as ["heavy_top"], ["forward"],
             ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
             declares nothing: a row that it cannot do is then ``failed``.
+        attitude: declares that it carries ξ: where that is asked for, states have nine numbers, and so has ``start``.
 
     Returns:
-        The peer, called as ``peer(top, start, times, precision, *, system, tolerance)`` (or ``step``).  It raises
+        The peer, called as ``peer(top, start, times, precision, *, system, tolerance, xi)`` (or ``step``).  It raises
         InputError for a format other than double, for times out of order and for a setting out of range.
 
     Raises:
         InputError: for declarations that are not lists of text.
     """
-    declared = Declared(*(_declared(each) for each in (systems, directions, precisions)))
+    declared = Declared(_declared(systems), _declared(directions), _declared(precisions), attitude)
 
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
@@ -104,7 +117,7 @@ def double_peer(
         solved = _from_start(name, given, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {knob: repr(given.setting), "field": field_kind()}
-        return _judged(problem, name, order, given.times, solved, seconds, flags)
+        return _judged(problem, name, order, given, solved, seconds, flags)
 
     def with_step(
         top: HeavyTop,
@@ -114,8 +127,9 @@ def double_peer(
         *,
         system: System = HEAVY_TOP,
         step: Fraction = Fraction(1, 100),
+        xi: tuple[Fraction, ...] | None = None,
     ) -> Trajectory:
-        return integrate(Problem.of(top, start, precision, system), times, step)
+        return integrate(Problem.of(top, start, precision, system, xi), times, step)
 
     def by_tolerance(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
         return integrate(problem, times, FINEST if tolerance is None else tolerance)
@@ -139,7 +153,8 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
         raise InputError(f"{name} cannot use the {knob} {decimal_text(setting, 6)}.", f"Give one {limits}.")
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
     numbers = numpy.array(problem.native(problem.parameters.numbers), dtype=float)
-    return Given(problem.system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+    start = numpy.array(problem.native((*problem.start.flat, *(problem.xi or ()))))
+    return Given(problem.system, start, grid, numbers, float(setting))
 
 
 def _from_start(name: str, given: Given, solve: Solve) -> Solved:
@@ -147,12 +162,12 @@ def _from_start(name: str, given: Given, solve: Solve) -> Solved:
     at_start = int(given.times[0] == 0)
     # the times are judged by as they were, whatever is done to those that are given
     later = replace(given, times=given.times[at_start:].copy())
-    solved = solve(later) if len(later.times) else Solved(numpy.empty((0, 6)), 0.0, 0, 0)
+    solved = solve(later) if len(later.times) else Solved(numpy.empty((0, given.width)), 0.0, 0, 0)
     if not isinstance(solved, Solved):
         raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
     if not at_start:
         return solved
-    states = _states(name, solved.states, len(later.times))
+    states = _states(name, solved.states, len(later.times), given.width)
     return replace(solved, states=numpy.concatenate([[given.start], states]))
 
 
@@ -160,13 +175,14 @@ def _judged(
     problem: Problem,
     name: str,
     order: int,
-    times: Any,
+    given: Given,
     solved: Solved,
     seconds: dict[str, float],
     flags: dict[str, str],
 ) -> Trajectory:
     """What was solved, up to the first state that is not finite."""
-    states = _states(name, solved.states, len(times))
+    times = given.times
+    states = _states(name, solved.states, len(times), given.width)
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
     reached = times[-1] if count == len(times) else solved.reached
@@ -186,15 +202,16 @@ def _judged(
     )
 
 
-def _states(name: str, given: Any, count: int) -> Any:
-    """The states as an array of doubles, shape (m, 6) with m <= count; raises PeerFailed for anything else."""
+def _states(name: str, given: Any, count: int, width: int) -> Any:
+    """The states as an array of doubles, shape (m, width) with m <= count; raises PeerFailed for anything else."""
     states = numpy.asarray(given)
     if not states.size:
-        return numpy.zeros((0, 6))
+        return numpy.zeros((0, width))
     if states.dtype.kind not in "fiu":
         raise PeerFailed(f"{name} returned states of {states.dtype}, not numbers of double")
-    if states.ndim != 2 or states.shape[1] != 6 or len(states) > count:
-        raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times")
+    if states.ndim != 2 or states.shape[1] != width or len(states) > count:
+        why = " where states have 9 numbers, Ω, γ and ξ" if width == 9 else ""
+        raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times{why}")
     return states.astype(float)
 
 
@@ -250,33 +267,45 @@ def count(system: System) -> int:
 
 
 @compiled_once
-def fill(system: System) -> Callable[..., None]:
-    """(rates, t, y, numbers): writes the field at y into ``rates``.
+def fill(system: System, width: int = 6) -> Callable[..., None]:
+    """(rates, t, y, numbers): writes the field at y, of ``width`` numbers, 6 or 9 with ξ, into ``rates``.
 
     All but ``t`` are arrays, or pointers in machine code.
     """
-    field, read = compiler()(system.field), compiler()(reader(system))
+    jit = compiler()
+    field, velocity, read = jit(system.field), jit(system.angular_velocity), jit(reader(system))
 
     def write(rates: Any, _time: float, y: Any, numbers: Any) -> None:
         values = field(read(numbers), (y[0], y[1], y[2], y[3], y[4], y[5]))
         for i in range(6):
             rates[i] = values[i]
 
-    return write
+    if width == 6:
+        return write
+    write, product = jit(write), vectors.cross
+
+    def write_with_attitude(rates: Any, time: float, y: Any, numbers: Any) -> None:
+        write(rates, time, y, numbers)
+        turning = velocity(read(numbers), (y[0], y[1], y[2], y[3], y[4], y[5]))
+        values = product((y[6], y[7], y[8]), turning)
+        for i in range(3):
+            rates[6 + i] = values[i]
+
+    return write_with_attitude
 
 
 @compiled_once
-def rates(system: System) -> Callable[..., Any]:
+def rates(system: System, width: int = 6) -> Callable[..., Any]:
     """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
-    write = compiler()(fill(system))
+    write = compiler()(fill(system, width))
 
     def rates(time: float, y: Any, numbers: Any) -> Any:
-        result = numpy.empty(6)
+        result = numpy.empty(width)
         write(result, time, y, numbers)
         return result
 
     compiled = compiler()(rates)
-    compiled(0.0, numpy.zeros(6), numpy.ones(count(system)))
+    compiled(0.0, numpy.zeros(width), numpy.ones(count(system)))
     return compiled  # type: ignore[no-any-return]
 
 

@@ -25,10 +25,11 @@ def constants(
     *,
     system: System = HEAVY_TOP,
     tolerance: Fraction | None = None,
+    xi: tuple[Fraction, ...] | None = None,
 ) -> Trajectory:
     """heyoka with the top's numbers compiled into its code, anew for each top; the peers are given them at run time."""
     given = Problem.of(top, start, precision, system).parameters
-    run = propagate(top, start, times, precision, system=system, tolerance=tolerance, constants=given)
+    run = propagate(top, start, times, precision, system=system, xi=xi, tolerance=tolerance, constants=given)
     return replace(run, integrator="heyoka:constants")
 
 

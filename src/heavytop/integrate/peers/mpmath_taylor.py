@@ -41,11 +41,11 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
     def rates(_time: Any, y: Any) -> list[Any]:
         nonlocal evaluations
         evaluations += 1
-        return list(system.field(p, y))
+        return list(system.with_attitude(p, y))
 
     p = problem.parameters.mapped(lambda value: big(Fraction(value)))
     wanted = None if tolerance is None else big(tolerance)
-    solve = own.odefun(rates, 0, [big(v) for v in problem.start.flat], tol=wanted)
+    solve = own.odefun(rates, 0, [big(v) for v in (*problem.start.flat, *(problem.xi or ()))], tol=wanted)
     values = [[exact(v) for v in solve(big(time))] for time in grid]
     seconds = perf_counter() - began
     states = tuple(numpy.array([number(v, precision) for v in row]) for row in values)

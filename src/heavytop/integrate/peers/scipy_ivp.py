@@ -15,7 +15,7 @@ def _solver(method: str) -> Solve:
     def solve(given: Given) -> Solved:
         from scipy.integrate import solve_ivp
 
-        field, seconds = timed(rates, given.system)
+        field, seconds = timed(rates, given.system, given.width)
         dense = len(given.times) > 1
         try:
             run = solve_ivp(
@@ -39,6 +39,6 @@ def _solver(method: str) -> Solve:
     return solve
 
 
-dop853 = double_peer("scipy:DOP853", 8, _solver("DOP853"))
-lsoda = double_peer("scipy:LSODA", 12, _solver("LSODA"))
-radau = double_peer("scipy:Radau", 5, _solver("Radau"))
+dop853 = double_peer("scipy:DOP853", 8, _solver("DOP853"), attitude=True)
+lsoda = double_peer("scipy:LSODA", 12, _solver("LSODA"), attitude=True)
+radau = double_peer("scipy:Radau", 5, _solver("Radau"), attitude=True)

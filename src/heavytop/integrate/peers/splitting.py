@@ -1,6 +1,6 @@
 """A structure-preserving method with fixed steps: the energy split into parts whose flows are elementary.
 
-½ M1²/I1, ½ M2²/I2, ½ M3²/I3 turn M and γ about one axis each, n·γ kicks M by γ × n; a rotor turns along, and k of a
+½ M1²/I1, ½ M2²/I2, ½ M3²/I3 turn M, γ and ξ about one axis each, n·γ kicks M by γ × n; a rotor turns along, and k of a
 heavy gyrostat makes them ½ (M1 − k1)²/I1 and so on.  Each flow
 keeps |γ|² and M·γ, and is exact but for rounding.  One symmetric sequence of them has order 2 (Touma and Wisdom,
 1994; McLachlan and Quispel, Acta Numerica 2002); symmetric compositions of it have the orders 4 (Suzuki 1990) and
@@ -48,7 +48,7 @@ STAGES = {
 
 @compiled_once
 def _stepper(system: System) -> Callable[..., None]:
-    """(M and γ in one array, numbers, k, h, count, stages): ``count`` steps of size h."""
+    """(M, γ, and ξ or not, in one array, numbers, k, h, count, stages): ``count`` steps of size h."""
     jit = compiler()
     field, velocity, read = jit(system.field), jit(system.angular_velocity), jit(reader(system))
     cos, sin = math.cos, math.sin
@@ -62,7 +62,7 @@ def _stepper(system: System) -> Callable[..., None]:
         i1, i2, i3 = p.inertia
         omega = velocity(p, ((v[0] - k[0]) / i1, (v[1] - k[1]) / i2, (v[2] - k[2]) / i3))
         c, s = cos(h * omega[axis]), sin(h * omega[axis])
-        for vector in (0, 3):
+        for vector in range(0, len(v), 3):
             a, b = vector + (axis + 1) % 3, vector + (axis + 2) % 3
             v[a], v[b] = v[a] * c + v[b] * s, v[b] * c - v[a] * s
 
@@ -105,4 +105,6 @@ def _solver(order: int) -> Solve:
     return solve
 
 
-order2, order4, order8 = (double_peer(f"splitting:{order}", order, _solver(order), "step") for order in (2, 4, 8))
+order2, order4, order8 = (
+    double_peer(f"splitting:{order}", order, _solver(order), "step", attitude=True) for order in (2, 4, 8)
+)

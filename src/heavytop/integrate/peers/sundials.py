@@ -17,14 +17,14 @@ _MOST_STEPS = 10**8
 
 
 @compiled_once
-def _machine_code(system: System) -> Any:
-    write = compiler()(fill(system))
-    write(numpy.empty(6), 0.0, numpy.zeros(6), numpy.ones(count(system)))
+def _machine_code(system: System, width: int) -> Any:
+    write = compiler()(fill(system, width))
+    write(numpy.empty(width), 0.0, numpy.zeros(width), numpy.ones(count(system)))
     return write
 
 
 def _solve(given: Given) -> Solved:
-    write, seconds = timed(_machine_code, given.system)
+    write, seconds = timed(_machine_code, given.system, given.width)
 
     def rates(time: float, y: Any, result: Any) -> None:
         write(result, time, y, given.numbers)
@@ -38,4 +38,4 @@ def _solve(given: Given) -> Solved:
     return Solved(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
 
 
-cvode = double_peer("sundials:CVODE", 12, _solve)
+cvode = double_peer("sundials:CVODE", 12, _solve, attitude=True)

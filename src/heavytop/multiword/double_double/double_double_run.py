@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -52,7 +52,8 @@ _USUAL_UNITS = -34.0
 """log2 of the product of two units where the state is about 1."""
 _NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
-_STEPS_AT_ONCE = 1024
+_STEPS_AT_ONCE, _SAMPLES_AT_ONCE = 1024, 2048
+"""Words of so many samples fit into a near cache; memory that is new to the process takes longer than they do."""
 PLACES = (*range(6), *range(19, 22))
 """Where the first words of Ω, γ and ξ stand; the second are 8 behind."""
 
@@ -158,10 +159,10 @@ class Floating(ResumableRun):
         arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         taken = self.machine.functions["advance"](*arrays, steps)
         self.steps += taken
-        return Status(int(self.counts[dd.STATUS]))
+        return self.status
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
-        return self.exact_state(self.words_at(time))
+        return _exact_state(self.words_at(time), len(self.problem.state))
 
     def words_at(self, time: Fraction) -> Doubles:
         """The words of the state at ``time``, inside the last step."""
@@ -171,28 +172,34 @@ class Floating(ResumableRun):
         self.machine.functions["sample"](series, *orders, *split(behind if self.forwards else -behind), found)
         return self.found.copy()
 
-    def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
-        """A state out of its words."""
-        return _exact_state(words, len(self.problem.state))
+    @property
+    def status(self) -> Status:
+        """How the last advance ended."""
+        return Status(int(self.counts[dd.STATUS]))
 
-    def sampled(self, highs: Doubles, lows: Doubles) -> tuple[Status, Doubles]:
-        """Steps until the last of the times |τ| > 0, in order, in two words; the words of the states that were reached,
-        a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
+    def sampled(self, highs: Doubles, lows: Doubles) -> Iterator[Doubles]:
+        """Steps until the last of the times |τ| > 0, in order, in two words; the words of the states that are reached,
+        a row each, of many at a time, which the next overwrite: the bits of :meth:`advance` and :meth:`sample` one by
+        one.
         """
-        row, count, status = 16 * self.layout.vectors, len(highs), Status.FINE
-        found, progress = doubles(row * (count + dd.AT_ONCE)), numpy.zeros(2, numpy.int64)
+        row, progress = 16 * self.layout.vectors, numpy.zeros(2, numpy.int64)
+        found = doubles(row * (min(len(highs), _SAMPLES_AT_ONCE) + dd.AT_ONCE))
         own = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
-        arrays, result = [*own, pointer(highs), pointer(lows), pointer(progress)], pointer(found)
-        while progress[0] < count and status is Status.FINE:
-            done, taken = progress
-            self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, result)
-            status = Status(int(self.counts[dd.STATUS]))
-            if status is Status.FINE and tuple(progress) == (done, taken):  # a time that takes exact numbers
-                time = Fraction(highs[done]) + Fraction(lows[done])
-                found[row * done : row * (done + 1)] = self.words_at(time)
-                progress[0] += 1
-        self.steps += int(progress[1])
-        return status, found[: row * progress[0]].reshape(-1, row)
+        for first in range(0, len(highs), _SAMPLES_AT_ONCE):
+            times = [words[first : first + _SAMPLES_AT_ONCE] for words in (highs, lows)]
+            arrays, count = [*own, *map(pointer, times), pointer(progress)], len(times[0])
+            progress[:] = 0
+            while progress[0] < count and self.status is Status.FINE:
+                done, taken = progress
+                self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, pointer(found))
+                if self.status is Status.FINE and tuple(progress) == (done, taken):  # a time that takes exact numbers
+                    time = Fraction(times[0][done]) + Fraction(times[1][done])
+                    found[row * done : row * (done + 1)] = self.words_at(time)
+                    progress[0] += 1
+            self.steps += int(progress[1])
+            yield found[: row * progress[0]].reshape(-1, row)
+            if self.status is not Status.FINE:
+                return
 
     def derivatives(self, n: int) -> tuple[Fraction, ...]:
         """y_n of the last step, exactly as it was computed; a step back in time has a negative length."""

@@ -17,6 +17,8 @@ from heavytop.multiword.problem import ResumableRun, Scaled, Status
 
 _FIRST_HALVINGS = 3
 _FEWEST_HALVINGS = -4
+LONGEST_STEP = 2**-_FEWEST_HALVINGS
+"""In the units of the scaled problem."""
 _MOST_HALVINGS = 40
 _HALVED_SAMPLES = 4
 _FINEST_TIME = _MOST_HALVINGS + 1
