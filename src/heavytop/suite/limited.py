@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import product
+from itertools import islice, product
 from time import monotonic
 from typing import Any
 
@@ -33,6 +33,7 @@ _TIMES = 10.0
 _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
 _MOST_DEATHS = 3
+_LOOKED_AT = 64
 _AHEAD = 4
 """Tasks of a worker, the one under way among them; one where a third-party integrator runs in it."""
 
@@ -89,7 +90,7 @@ class _Worker:
 
     It serves one third-party integrator at most, which may change whatever is around it.
 
-    rows: of its tasks, with their indices; the first is under way, since ``began``.
+    rows: of its tasks, with their indices; the first is under way, since ``began``.  precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
@@ -98,6 +99,7 @@ class _Worker:
         self._guest = ""
         self._hello: Future[int] | None = None
         self.rows: deque[tuple[int, Future[Row]]] = deque()
+        self.precision = ""
         self.began = 0.0
         self.limit: float | None = None
 
@@ -188,7 +190,7 @@ def in_processes(
         while waiting or any(worker.rows for worker in pool):
             for ahead, worker in product(range(_AHEAD), pool):
                 if waiting and worker.takes(tasks[waiting[0]], ahead):
-                    index = waiting.popleft()
+                    index = _taken(worker, pool, waiting, tasks)
                     task = tasks[index]
                     limit = limits.seconds(task, costs[index]) if task.is_third_party else None
                     worker.submit(index, limit, kinds[task.key.kind], task, saved(index))
@@ -220,6 +222,22 @@ def in_processes(
     finally:
         for worker in pool:
             worker.end()
+
+
+def _taken(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], tasks: Sequence[Task]) -> int:
+    """The task that a worker is given next, taken out of those that wait.
+
+    Of the first of them one in the format of its last, else in that of no other worker: each compiles for itself.
+    """
+    place = 0
+    if not tasks[waiting[0]].is_third_party:
+        others = {each.precision for each in pool if each is not worker}
+        formats = [tasks[index].key.precision for index in islice(waiting, _LOOKED_AT)]
+        place = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
+    index = waiting[place]
+    del waiting[place]
+    worker.precision = tasks[index].key.precision
+    return index
 
 
 def in_order(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[dict[int, float], deque[int]]:

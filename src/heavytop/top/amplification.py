@@ -185,13 +185,15 @@ def _series(linear: Doubles, flat: Doubles, state: Doubles) -> Doubles:
     """
     import numpy
 
-    found, jacobians = numpy.empty((_ORDER + 1, 6, 7)), numpy.empty((6, _ORDER, 6))
+    found, jacobians = numpy.empty((_ORDER + 1, 6, 7)), numpy.empty((6, 6 * _ORDER))
     found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)
+    columns, shares = found.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):
-        jacobians[:, n] = 2 * (flat @ found[n, :, 0]).reshape(6, 6)
-        sums = jacobians[:, n::-1].reshape(6, -1) @ found[: n + 1].reshape(-1, 7)
-        sums[:, 0] /= 2
-        found[n + 1] = (sums + linear @ found[n]) / (n + 1)
+        place = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
+        jacobians[:, place : place + 6] = 2 * (flat @ found[n, :, 0]).reshape(6, 6)
+        sums = shares * (jacobians[:, place:] @ columns[: 6 * n + 6])
+        sums += linear @ found[n]
+        numpy.divide(sums, n + 1, out=found[n + 1])
     return found
 
 
