@@ -12,8 +12,13 @@ carry the errors of the motion, {Q x: |x_i| ≤ r_i}: with Q'^-1 Φ Q within η 
 
     r' = |T| r + η max r + |Q'^-1| e,     e = (|Φ − Φ̂| |J|_1 + |σ − σ̂| + ½ ulp),
 
-so a column of errors is carried by Lohner's method as one more set of errors of the motion.  The working precision is
-chosen so that the digits come out: it is raised by what was lacking, up to six times.
+so a column of errors is carried by Lohner's method as one more set of errors of the motion.
+
+Φ and σ take fewer bits than the motion: what they lack at t_n is multiplied by ∂y(t)/∂y(t_n) and J(t_n), seldom by much
+more than J(t), to which digits are relative, while W, which Φ lacks too, has grown by ∂y(t_n)/∂y(0) before.  They are
+computed beside each step of the motion, along a polynomial in their own bits
+(:func:`heavytop.exact.enclosure.step.in_other_bits`).  Both precisions are chosen so that the digits come out, and
+raised by what was lacking, up to six times.
 
 One or two columns of S follow from the others.  A body of c times the mass moves as before, unless it has a rotor of
 given momentum; and γ and n enter by their products, so that from (Ω0, c γ0) with n/c the motion is (Ω, c γ):
@@ -26,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import exp, inf, lcm
+from math import exp, inf, lcm, log2
 from operator import mul
 from typing import Protocol, TypeAlias
 
@@ -35,7 +40,7 @@ from flint import arb, fmpz, fmpz_mat
 from gmpy2 import mpq, mpz
 
 from heavytop.errors import Contradiction, OutOfReach
-from heavytop.exact.enclosure.run import ScaledMotion, Validated, own_parameters, seconds_a_step
+from heavytop.exact.enclosure.run import EnclosureRun, ScaledMotion, Validated, own_parameters, seconds_a_step
 from heavytop.exact.enclosure.step import (
     Matrix,
     Node,
@@ -45,11 +50,11 @@ from heavytop.exact.enclosure.step import (
     Whole,
     falling,
     horner,
+    in_other_bits,
     lacking,
     norm,
     quadratic,
     start_node,
-    step,
 )
 from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
 from heavytop.multiword.codegen.recurrence import Coefficients, coefficients_of
@@ -392,6 +397,8 @@ _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
+_OF_COLUMNS, _MOST_OF_COLUMNS = 10, 60
+"""Bits that Φ and σ lose by what they lack themselves, and the loss of the motion beyond which that grows no more."""
 _OF_DATA = 8
 """Bits that S has fewer than J: a second run costs more than they do."""
 _OF_LAWS = 4
@@ -458,18 +465,22 @@ def _one_way(
     """Those at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
-    forecast, steps = known.forecast(time, bits)
+    loss, steps = known.forecast(time, bits)
     places = _independent(known, motion) if data else ()
     spare = (_OF_DATA + _OF_LAWS * (len(places) < len(DATA))) * data
-    loss, wanted = forecast, bits + _GUARD + spare + int(min(forecast, _FEW * bits) / 4)
+    wanted = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
+    own = bits + _OF_COLUMNS + 0.8 * min(loss, _MOST_OF_COLUMNS) + log2(steps + 1)
     for _ in range(_ATTEMPTS):
-        columns = 7 + len(places)
-        planned = motion.precision(wanted + loss, steps * columns)
-        if not steps * columns * seconds_a_step(*planned) < known.effort:
+        columns = steps * (7 + len(places))
+        of_columns = motion.precision(own, columns)
+        planned = max(motion.precision(wanted, steps), of_columns)
+        if not motion.seconds(planned, loss, steps) + columns * seconds_a_step(*of_columns) < known.effort:
             break
-        tangent = _tangent(known, motion, *planned, places)
+        tangent = _tangent(known, motion, *of_columns, places)
+        start = start_node(motion.field, motion.scaled.state, planned[0])
+        run = EnclosureRun(motion, planned[0], (start,), motion.certified(planned[0]) if planned[1] else None)
         found, lacking = {}, 0
-        for span, values in _run(tangent, motion, spans):
+        for span, values in _run(tangent, run, spans):
             at = _in_units(known, motion, tangent, values) if values else None
             lacking = bits - (
                 min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0
@@ -479,8 +490,7 @@ def _one_way(
             found[direction * span] = at
         else:
             return found
-        wanted += lacking + _GUARD // 2
-        loss += lacking
+        wanted, own = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
     raise OutOfReach(
         f"Derivatives at t = {decimal_text(time, 6)} to so many digits are out of reach of a validated integration.",
         "Ask for fewer digits, or for an earlier time.",
@@ -558,42 +568,42 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         return
 
 
-def _run(tangent: Tangent, motion: ScaledMotion, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
+def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator[tuple[Fraction, Centre | None]]:
     """(span, centre and radii there) for each; None in place of them, and an end, where the errors are too large."""
-    node = start_node(motion.field, motion.scaled.state, tangent.precision)
-    size = motion.field.dimension
+    node, size, rate = run.nodes[0], tangent.field.dimension, run.motion.scaled.rate
     columns = _Columns(unit_columns(size, tangent.precision, tangent.width), np.zeros((size, tangent.width)), 0)
-    rest = [(span * motion.scaled.rate, span) for span in spans]
+    rest = list(spans)
     while rest:
-        found, own = _step(tangent, node)
-        while found is not None and rest and node.time + found.length >= rest[0][0]:
-            scaled, span = rest.pop(0)
-            at = step_derivatives(tangent, found, (scaled - node.time) / found.length)
-            yield span, None if at is None else _at(tangent, found, at, columns, (scaled - node.time) / found.length)
-        if found is None or own is None:
-            yield from [(span, None) for _, span in rest[:1]]
+        found = _step(tangent, run, node)
+        if found is None:
+            yield rest[0], None
             return
+        whole, along, own = found
+        while rest and node.time + whole.length >= rest[0] * rate:
+            tau = (rest[0] * rate - node.time) / whole.length
+            at = own if tau == 1 else step_derivatives(tangent, along, tau)
+            yield rest.pop(0), None if at is None else _at(tangent, whole, at, columns, tau)
         if rest:
-            transfer = found.transfer()
-            columns = _carried(tangent, found, own, columns, transfer)
-            node = found.end(transfer)
+            transfer = whole.transfer()
+            columns = _carried(tangent, whole, own, columns, transfer)
+            node = run.after(whole, transfer)
             if not np.isfinite(columns.radii).all():
-                yield rest[0][1], None
+                yield rest[0], None
                 return
 
 
-def _step(tangent: Tangent, node: Node) -> tuple[Step, StepDerivatives] | tuple[None, None]:
-    """The step from a node with its derivatives; shorter where they need it, in integers where words will not do."""
+def _step(tangent: Tangent, run: EnclosureRun, node: Node) -> tuple[Step, Step, StepDerivatives] | None:
+    """A step, the same in their bits, and its derivatives; shorter where they need it, in integers if words fail."""
     for certified in (tangent.certified, None) if tangent.certified else (None,):
         for shorter in range(_SHORTENED):
-            trial = replace(node, halvings=node.halvings + shorter)
-            found = step(tangent.field, trial, tangent.precision, certified)
+            found = run.step(replace(node, halvings=node.halvings + shorter))
             if found is None:
-                break
-            own = step_derivatives(tangent, found, Fraction(1))
-            if own is not None:
-                return found, own
-    return None, None
+                return None
+            along = in_other_bits(tangent.field, found, tangent.precision, certified)
+            own = None if along is None else step_derivatives(tangent, along, Fraction(1))
+            if along is not None and own is not None:
+                return found, along, own
+    return None
 
 
 def _product(tangent: Tangent, own: StepDerivatives, rows: list[list[mpz]]) -> list[list[mpz]]:

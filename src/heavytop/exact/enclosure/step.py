@@ -38,11 +38,11 @@ Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 10
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from math import exp, inf, isfinite, lcm, log2
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from flint import arb, fmpz, fmpz_poly
@@ -219,7 +219,7 @@ class Whole:
         """Bits of β_n, in ulps."""
         return np.array([max(map(abs, column)).bit_length() for column in zip(*self.values, strict=True)])
 
-    @property
+    @cached_property
     def sizes(self) -> Matrix:
         """The first in binary64, the others by their lengths."""
         bounds = np.ldexp(1.0, np.maximum(self._lengths - self.precision, -200))
@@ -482,23 +482,63 @@ def taylor_series(field: Quadratic, node: Node, precision: int, certified: Certi
 
 def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> Step | None:
     """The step with its bounds from the theorem; None where they are not finite."""
+    tail = _tail(field, node, series, precision)
+    if tail is None:
+        return None
+    h, q, scale = 2.0**-node.halvings, float(field.q) * _UP, node.errors.exponent
+    variation, powers, variation_error = _variation(field, series, h, h * 2 * q * series.sizes)
+    square = np.ldexp(h * q * tail.bound * tail.bound, max(scale - precision, -2000)) + _TINY
+    local = float(tail.factor * (tail.defect + square) * _UP)
+    error = tail.factor * variation_error * _UP
+    return Step(node, precision, series, variation, powers, error, local, tail.widest, tail.bound)
+
+
+class _Tail(NamedTuple):
+    """e^Λ of the theorem, D and W in ulps 2^errors.exponent, and W as a number."""
+
+    factor: float
+    defect: float
+    bound: float
+    widest: float
+
+
+def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _Tail | None:
+    """Of the polynomial from ``node``; None where it is too long for the theorem."""
     h, q, slope = 2.0**-node.halvings, float(field.q) * _UP, float(field.l) * _UP
-    sizes = series.sizes
-    growth = h * (2 * q * float(sizes.sum()) + slope + q * CAP) * _UP
+    growth = h * (2 * q * float(series.sizes.sum()) + slope + q * CAP) * _UP
     if not growth < 4 * _LARGEST_SLOPE:
         return None
-    factor = exp(growth) * _UP
-    scale = node.errors.exponent
+    factor, scale = exp(growth) * _UP, node.errors.exponent
     defect = defect_bound(series, precision, h * q, h * slope)
     # what the field itself lacks: |y' − f(y)| on the true motion
     lacking, exponent = field.slack
     defect = np.ldexp(defect, -scale) + np.ldexp(h * lacking * _UP, exponent + precision - scale) + _TINY
-    variation, powers, variation_error = _variation(field, series, h, h * 2 * q * sizes)
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
-    square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
-    local = float(factor * (defect + square) * _UP)
-    widest = float(np.ldexp(bound, min(scale - precision, 900)))
-    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest, bound)
+    return _Tail(factor, defect, bound, float(np.ldexp(bound, min(scale - precision, 900))))
+
+
+def in_other_bits(field: Quadratic, found: Step, precision: int, certified: CertifiedSeries | None) -> Step | None:
+    """``found`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
+
+    The set of errors is a box around that of ``found``, wider by what was rounded.  V̂ remains that along the polynomial
+    of ``found``: W is the larger of both, so that the motion is within it of either.
+    """
+    node, shift = found.node, precision - found.precision
+    if not shift and isinstance(found.series, Whole) == (certified is None):
+        return found
+    centre = rounded_off(node.centre, -shift) if shift < 0 else tuple(mpz(value) << shift for value in node.centre)
+    smaller, exponent = min(0, node.errors.exponent + shift), max(0, node.errors.exponent + shift)
+    radii = np.ldexp(node.errors.sizes(), smaller) + (np.ldexp(0.5, -exponent) * (shift < 0) + _TINY)
+    box = Errors(_identity(len(radii)), radii * _UP, exponent)
+    rounded = Node(node.time, centre, box, node.halvings)
+    series = taylor_series(field, rounded, precision, certified)
+    tail = None if series is None else _tail(field, rounded, series, precision)
+    if series is None or tail is None:
+        return None
+    bound = max(tail.bound, float(np.ldexp(found.widest_ulps, smaller)) + _TINY)
+    widest = max(tail.widest, found.widest)
+    kept = replace(found, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
+    return kept if widest < CAP else None
 
 
 def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
