@@ -71,15 +71,19 @@ class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
 
 
 @contextmanager
-def _safe_path() -> Iterator[None]:
-    """What is started meanwhile begins with :data:`SAFE_PATH`."""
-    own = SAFE_PATH in os.environ
-    os.environ.setdefault(SAFE_PATH, "1")
+def _environment_of_trackers() -> Iterator[None]:
+    """What is started meanwhile begins with :data:`SAFE_PATH`, and is silent about what a signal left to clean up."""
+    wanted = {SAFE_PATH: os.environ.get(SAFE_PATH, "1"), "PYTHONWARNINGS": "ignore"}
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
     try:
         yield
     finally:
-        if not own:
-            os.environ.pop(SAFE_PATH, None)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _end_with(parent: Connection) -> None:
@@ -99,7 +103,10 @@ class ChildContext(LokyContext):  # type: ignore[misc]
         self.mark = mark
         self._parent, self._lifeline = multiprocessing.Pipe(duplex=False)
         self._children: list[_Child] = []
-        with _starting, _safe_path():  # the first lock of a pool would start them, from the working directory
+        with (
+            _starting,
+            _environment_of_trackers(),
+        ):  # the first lock of a pool would start them, from the working directory
             if os.name == "posix":
                 resource_tracker.ensure_running()
             loky_tracker.ensure_running()

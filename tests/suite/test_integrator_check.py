@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -74,6 +77,25 @@ def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) ->
     while any(alive(int(each)) for each in left) and monotonic() < wait:
         sleep(0.05)
     assert not any(alive(int(each)) for each in left)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM])
+def test_a_check_that_is_stopped_says_nothing_and_leaves_no_process(number: signal.Signals, tmp_path: Path) -> None:
+    """The processes that clean up behind others hold standard error until they end."""
+    fault = f"open({str(tmp_path / 'began')!r}, 'w').write(str(os.getpid())); time.sleep(600)"
+    (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", fault))
+    command = [sys.executable, "-m", "heavytop", "check-integrator", str(tmp_path / "mine.py:solve")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    began, wait = tmp_path / "began", monotonic() + 60
+    while not (began.exists() and began.read_text()) and monotonic() < wait:
+        sleep(0.05)
+    process.send_signal(number)
+    assert process.communicate(timeout=60) == ("", "")
+    assert process.returncode in (-number, 128 + number)
+    wait = monotonic() + 20
+    while alive(int(began.read_text())) and monotonic() < wait:
+        sleep(0.05)
+    assert not alive(int(began.read_text()))
 
 
 def alive(process: int) -> bool:

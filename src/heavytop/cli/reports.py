@@ -56,7 +56,7 @@ def compare(
     from heavytop.api.reports import compared
 
     require_apart((html, markdown, junit), baseline, candidate, policy)
-    with counted("comparing", 2, "reports read", _REPORT_SECONDS) as advance:
+    with counted("comparing", 3, "parts", _REPORT_SECONDS) as advance:  # two reports that are read, and their rows
         found = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
     files: list[tuple[Path, str]] = []
     if html is not None:

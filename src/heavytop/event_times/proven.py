@@ -35,6 +35,8 @@ from heavytop.precision import decimal_text
 
 _GUARD_BITS = 24
 _ATTEMPTS = 3
+_MOST_PARTS = 4096
+"""Of a step.  A simple zero takes some twenty; where a function is as small as its error, chance decides each."""
 _REFINEMENTS = 200
 _MOST_ORDER = 8
 """Derivatives that may vanish at t = 0 beside a function that does."""
@@ -108,6 +110,38 @@ class _Piece:
     def part(self, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
         """The s of two scaled times, as far as this step goes."""
         return max(Fraction(0), (low - self.began) / self.length), min(self.last, (high - self.began) / self.length)
+
+
+class _Near(NamedTuple):
+    """The polynomials of a piece on a part of it, in x = (s − low)/width, without what is far below their error."""
+
+    low: Fraction
+    width: Fraction
+    value: Any
+    rate: Any
+    first: Any
+
+    @classmethod
+    def of(cls, piece: _Piece, low: Fraction, high: Fraction) -> _Near:
+        """At low ≤ s ≤ high: there a multiple zero takes thousands of evaluations, of polynomials of a few terms."""
+        line = arb_poly([ball(low), ball(high - low)])
+        return cls(low, high - low, *(_without_tail(part(line)) for part in (piece.value, piece.rate, piece.first)))
+
+    def over(self, what: Any, low: Fraction, high: Fraction) -> Any:
+        """As :meth:`_Piece.over`."""
+        middle, half = ((low + high) / 2 - self.low) / self.width, (high - low) / 2 / self.width
+        found = what(ball(middle) + arb(0, ball(half).upper()))
+        return found if half == 0 or _sign(found) else _range(what, middle, half)
+
+
+def _without_tail(what: Any) -> Any:
+    """A polynomial at 0 ≤ x ≤ 1 whose constant coefficient holds all later ones that add a thousandth to its radius."""
+    kept = what.coeffs() or [arb(0)]
+    allowed, rest = kept[0].rad() / 1024, arb(0)
+    while len(kept) > 1 and (more := (rest + abs(kept[-1])).upper()) <= allowed:
+        rest = more
+        kept.pop()
+    return arb_poly([kept[0] + arb(0, rest), *kept[1:]])
 
 
 def _range(what: Any, middle: Fraction, half: Fraction) -> Any:
@@ -354,25 +388,29 @@ def _cells(piece: _Piece, fresh: bool) -> list[_Cell] | Fraction:
     found: list[_Cell] = []
     deepest = piece.bits // 2 + 16
     with working_precision(piece.bits):
-        parts = [(Fraction(0), piece.last, 0)]
-        while parts:
-            low, high, depth = parts.pop()
+        parts: list[tuple[Fraction, Fraction, int, _Piece | _Near]] = [(Fraction(0), piece.last, 0, piece)]
+        for _ in range(_MOST_PARTS):
+            if not parts:
+                return found
+            low, high, depth, near = parts.pop()
+            if near is piece and high - low <= 2 * _WIDE:
+                near = _Near.of(piece, low, high)
             ends = piece.began + low * piece.length, piece.began + high * piece.length
             if fresh and low == 0:
-                if _sign(piece.over(piece.first, low, high)):
+                if _sign(near.over(near.first, low, high)):
                     found.append(_Cell(*ends, 0, 0, 0))
                     continue
-            elif clear := _sign(piece.over(piece.value, low, high)):
+            elif clear := _sign(near.over(near.value, low, high)):
                 found.append(_Cell(*ends, clear, 0, clear))
                 continue
-            elif slope := _sign(piece.over(piece.rate, low, high)):
-                found.append(_Cell(*ends, 0, slope, _sign(piece.over(piece.value, high, high))))
+            elif slope := _sign(near.over(near.rate, low, high)):
+                found.append(_Cell(*ends, 0, slope, _sign(near.over(near.value, high, high))))
                 continue
             if depth >= deepest:
                 return ends[0]
             middle = (low + high) / 2
-            parts += [(middle, high, depth + 1), (low, middle, depth + 1)]
-    return found
+            parts += [(middle, high, depth + 1, near), (low, middle, depth + 1, near)]
+    return ends[0]
 
 
 def _hull(pieces: Sequence[_Piece], choose: Callable[[_Piece], Any], low: Fraction, high: Fraction) -> Any:

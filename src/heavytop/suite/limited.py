@@ -1,20 +1,21 @@
 """Tasks in processes of their own, each under a time limit where a third-party integrator runs in it.
 
-Every worker is one process with one task, so that a task that does not end is ended with its process, also where it is
-stuck in native code, and nothing but that task is lost.  The process leads a process group, which ends as a whole: what
-an integrator started does not outlive it.
+Every worker is one process that takes one task after another, so that a task that does not end is ended with its
+process, also where it is stuck in native code, and nothing but that task is lost.  The process leads a process group,
+which ends as a whole: what an integrator started does not outlive it.
 """
 
 from __future__ import annotations
 
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import product
 from time import monotonic
 from typing import Any
 
@@ -32,6 +33,8 @@ _TIMES = 10.0
 _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
 _MOST_DEATHS = 3
+_AHEAD = 4
+"""Tasks of a worker, the one under way among them; one where a third-party integrator runs in it."""
 
 
 @dataclass(slots=True)
@@ -82,9 +85,11 @@ class RowLimits:
 
 
 class _Worker:
-    """A process for one task at a time, started when it is first used.
+    """A process for one task after another, started when it is first used.
 
     It serves one third-party integrator at most, which may change whatever is around it.
+
+    rows: of its tasks, with their indices; the first is under way, since ``began``.
     """
 
     def __init__(self, kinds: Kinds) -> None:
@@ -92,8 +97,7 @@ class _Worker:
         self._process: GuardedProcess | None = None
         self._guest = ""
         self._hello: Future[int] | None = None
-        self.index = -1
-        self.row: Future[Row] | None = None
+        self.rows: deque[tuple[int, Future[Row]]] = deque()
         self.began = 0.0
         self.limit: float | None = None
 
@@ -104,21 +108,39 @@ class _Worker:
             return None
         return self.began + self.limit - monotonic()
 
+    def takes(self, task: Task, ahead: int) -> bool:
+        """Whether it may be given one more, with so many before it."""
+        if not self.rows:
+            return True
+        return self.limit is None and not task.is_third_party and len(self.rows) <= ahead
+
     def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
-        """Begins a task: its time runs from when the process is there."""
+        """Begins a task, behind those that it has: its time runs from when the process is there."""
         guest = task.key.subject.name if task.is_third_party else ""
         if self._guest not in ("", guest):
             self.end()
         self._guest = guest
-        self.index, self.limit, self.began = index, limit, monotonic()
+        if not self.rows:
+            self.limit, self.began = limit, monotonic()
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
             self._hello = self._process.submit(os.getpid)
         try:
-            self.row = self._process.submit(measure, kind, task, saved)
-        except BrokenProcessPool:  # it died between two tasks
-            self.end()
-            self.submit(index, limit, kind, task, saved)
+            self.rows.append((index, self._process.submit(measure, kind, task, saved)))
+        except BrokenProcessPool as error:
+            if self.rows:  # told with those before it
+                lost: Future[Row] = Future()
+                lost.set_exception(error)
+                self.rows.append((index, lost))
+            else:  # it died between two tasks
+                self.end()
+                self.submit(index, limit, kind, task, saved)
+
+    def finish(self) -> None:
+        """Its first task, unless it was ended with it, is done, and the next under way."""
+        if self.rows:
+            self.rows.popleft()
+        self.began = monotonic()
 
     @property
     def ending(self) -> str:
@@ -127,7 +149,7 @@ class _Worker:
 
     def awaited(self) -> list[Future[Any]]:
         """What is to be waited for: the process, then its row."""
-        return [each for each in (self._hello, self.row) if each is not None]
+        return [future for _, future in [*self.rows][:1]] + ([] if self._hello is None else [self._hello])
 
     def greet(self) -> None:
         """Puts a guard into the group of a process that has just begun, and starts its clock."""
@@ -140,47 +162,50 @@ class _Worker:
         """Kills the process and whatever it started."""
         if self._process is not None:
             self._process.end()
-        self._process = self._hello = self.row = None
+        self._process = self._hello = None
+        self.rows.clear()
         self._guest = ""
 
 
-def in_limited_processes(
+def in_processes(
     tasks: Sequence[Task],
     kinds: Kinds,
-    queue: deque[int],
+    costs: Mapping[int, float],
+    waiting: deque[int],
     workers: int,
     saved: Callable[[int], Saved],
     begun: Callable[[Task], None],
     row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
-    """(index of the task, its row) as they finish.
+    """(index of the task, its row) as they finish, of the tasks that wait (:func:`in_order`).
 
     A task whose process died is run again, three times in all; then it is a row that failed, or where the integrator is
     this program's, a HeavyTopError.
     """
-    costs, waiting = in_order(tasks, kinds, queue)
     limits, deaths = RowLimits(row_timeout), Counter[int]()
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
-        while waiting or any(worker.row for worker in pool):
-            for worker in pool:
-                if worker.row is None and waiting:
+        while waiting or any(worker.rows for worker in pool):
+            for ahead, worker in product(range(_AHEAD), pool):
+                if waiting and worker.takes(tasks[waiting[0]], ahead):
                     index = waiting.popleft()
                     task = tasks[index]
                     limit = limits.seconds(task, costs[index]) if task.is_third_party else None
-                    begun(task)
                     worker.submit(index, limit, kinds[task.key.kind], task, saved(index))
+                    if len(worker.rows) == 1:
+                        begun(task)
             _wait(pool)
             for worker in pool:
                 worker.greet()
-                if worker.row is None:
+                if not worker.rows:
                     continue
-                index = worker.index
+                index, *behind = (each for each, _ in worker.rows)
                 try:
                     row = _ended(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
                     how = worker.ending
                     worker.end()
+                    waiting.extendleft(reversed(behind))
                     deaths[index] += 1
                     if deaths[index] < _MOST_DEATHS:
                         waiting.appendleft(index)
@@ -189,19 +214,21 @@ def in_limited_processes(
                         raise died(tasks[index], deaths[index]) from None
                     row = ended_its_process(tasks[index], deaths[index], how)
                 if row is not None:
+                    if worker.rows:
+                        begun(tasks[worker.rows[0][0]])
                     yield index, row
     finally:
         for worker in pool:
             worker.end()
 
 
-def in_order(tasks: Sequence[Task], kinds: Kinds, queue: Iterable[int]) -> tuple[dict[int, float], deque[int]]:
-    """The cost of each task, and the tasks in the order in which they are to begin.
+def in_order(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[dict[int, float], deque[int]]:
+    """The cost of each task that is not done, and these tasks in the order in which they are to begin: long ones first.
 
-    Those of third-party integrators come first, one integrator after the other, and of each the quick ones before the
-    long ones, whose limits rest on them.
+    Those of third-party integrators come before them, one integrator after the other, and of each the quick ones before
+    the long ones, whose limits rest on them.
     """
-    costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
+    costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
     guests = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
 
     def place(index: int) -> tuple[int, float]:
@@ -238,27 +265,28 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
 
 def _wait(pool: Sequence[_Worker]) -> None:
     """Until a process is there, a row is done, or a limit is reached."""
-    futures = [future for worker in pool if worker.row is not None for future in worker.awaited()]
-    left = [worker.left for worker in pool if worker.row is not None]
+    futures = [future for worker in pool if worker.rows for future in worker.awaited()]
+    left = [worker.left for worker in pool if worker.rows]
     wait(futures, min((max(each, 0.0) for each in left if each is not None), default=None), FIRST_COMPLETED)
 
 
 def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:
     """The row of a worker that has ended or had to be; None where it goes on.  Raises BrokenProcessPool."""
-    assert worker.row is not None
-    if worker.row.done():
-        name, error = task.key.subject.name, worker.row.exception()
+    _, future = worker.rows[0]
+    if future.done():
+        name, error = task.key.subject.name, future.exception()
         if error is None:
-            row, worker.row = worker.row.result(), None
+            row = future.result()
         elif isinstance(error, KeyboardInterrupt):
             # a child leaves interrupts to this process, so one that comes from there was raised by its integrator
-            row, worker.row = failed(task, f"{name} raised KeyboardInterrupt"), None
+            row = failed(task, f"{name} raised KeyboardInterrupt")
         elif not task.is_third_party or isinstance(error, HeavyTopError | BrokenProcessPool):
             raise error
         else:  # it changed what is around it, such as modules of this program
             row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
             worker.end()
         limits.finished(task, cost, monotonic() - worker.began)
+        worker.finish()
         return row
     if worker.left is None or worker.left > 0:
         return None

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Container, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections import deque
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from operator import itemgetter
 from threading import Lock
 from time import monotonic
 from typing import Any, TypeVar
 
 from heavytop.errors import HeavyTopError, InputError
-from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Checkpoint, Saved
-from heavytop.suite.limited import RowLimits, in_limited_process, in_limited_processes, in_order
-from heavytop.suite.rows import RESUME, Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, measure
+from heavytop.suite.limited import RowLimits, in_limited_process, in_order, in_processes
+from heavytop.suite.rows import RESUME, Kinds, MeasuredKind, Task, ended_its_process, measure
 
 # Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 #
@@ -68,83 +65,35 @@ def rows(
     begun: called with a task that begins; on a cluster and with several workers, with one that is under way.
     row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
 
-    Where a task has a third-party integrator, all tasks run in processes of their own, also with one worker
-    (:mod:`heavytop.suite.limited`); on a cluster that task alone does, in a child of the worker, under the same limit.
+    Several workers are processes, and so is one where a task has a third-party integrator
+    (:mod:`heavytop.suite.limited`); on a cluster that task alone runs in a child of the worker, under the same limit.
 
     A task whose worker died is run again, three times in all; a third-party integrator that it ran is then a row that
     failed.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
-    queue, third_party = _longest_first(tasks, kinds, done)
+    costs, waiting = in_order(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
-        yield from _on_cluster(tasks, kinds, queue, scheduler, begun, row_timeout)
-    elif third_party:
-        yield from in_limited_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
-    elif workers > 1:
-        yield from _in_processes(tasks, kinds, queue, workers, saved, begun)
+        yield from _on_cluster(tasks, kinds, costs, waiting, scheduler, begun, row_timeout)
+    elif waiting and (workers > 1 or tasks[waiting[0]].is_third_party):
+        yield from in_processes(tasks, kinds, costs, waiting, workers, saved, begun, row_timeout)
     else:
-        for index in queue:
+        for index in waiting:
             begun(tasks[index])
             yield index, measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
-
-
-def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[deque[int], bool]:
-    """The tasks that are left, and whether one of them has a third-party integrator."""
-    costs: dict[int, float] = {}
-    third_party = False
-    for index, task in enumerate(tasks):
-        if index not in done:
-            costs[index] = kinds[task.key.kind].cost(task)
-            third_party = third_party or task.is_third_party
-    return deque(sorted(costs, key=lambda index: -costs[index])), third_party
-
-
-def _in_processes(
-    tasks: Sequence[Task],
-    kinds: Kinds,
-    queue: deque[int],
-    workers: int,
-    saved: Callable[[int], Saved],
-    begun: Callable[[Task], None],
-) -> Iterator[tuple[int, Row]]:
-    deaths: Counter[int] = Counter()
-    under_way: dict[Future[Row], int] = {}
-
-    def submit(index: int) -> Future[Row]:
-        return pool.submit(measure, kinds[tasks[index].key.kind], tasks[index], saved(index))
-
-    def at_once() -> int:
-        # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
-        return (_AHEAD * workers, workers, 1)[max(deaths.values(), default=0)]
-
-    while queue:
-        try:
-            with _pool(workers, kinds) as pool:
-                for index, future in _windowed(queue, under_way, submit, at_once, lambda i: begun(tasks[i])):
-                    row = future.result()
-                    deaths.pop(index, None)
-                    yield index, row
-        except BrokenProcessPool:
-            lost = list(under_way.values())
-            under_way.clear()
-            deaths.update(lost)
-            queue.extendleft(reversed(lost))
-            worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
-            if times > 2:
-                raise died(tasks[worst], times) from None
 
 
 def _on_cluster(
     tasks: Sequence[Task],
     kinds: Kinds,
-    queue: deque[int],
+    costs: Mapping[int, float],
+    waiting: deque[int],
     scheduler: str,
     begun: Callable[[Task], None],
     row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
-    costs, queue = in_order(tasks, kinds, queue)
     limits = RowLimits(row_timeout)
     with _client(scheduler) as client:
         from distributed import KilledWorker
@@ -162,7 +111,7 @@ def _on_cluster(
             return _AHEAD * len(client.nthreads())
 
         try:
-            for index, future in _windowed(queue, {}, submit, at_once, lambda i: begun(tasks[i])):
+            for index, future in _windowed(waiting, {}, submit, at_once, lambda i: begun(tasks[i])):
                 try:
                     row, seconds = future.result()
                 except KilledWorker as error:
@@ -226,22 +175,6 @@ def _measure_as(expected: Versions, kind: MeasuredKind, task: Task, limit: float
             return in_limited_process(kind, task, limit)
         began = monotonic()
         return measure(kind, task, Saved()), monotonic() - began
-
-
-@contextmanager
-def _pool(workers: int, kinds: Kinds) -> Iterator[ProcessPoolExecutor]:
-    context = ChildContext()
-    with ProcessPoolExecutor(
-        workers, mp_context=context, initializer=begin_worker, initargs=tuple(kinds.values())
-    ) as pool:
-        try:
-            yield pool
-        except BrokenProcessPool:
-            raise  # the pool ends its own processes then
-        except BaseException:  # Ctrl-C, SIGTERM or an error: else the tasks under way are waited for, hours perhaps
-            pool.shutdown(wait=False, cancel_futures=True)
-            context.terminate()
-            raise
 
 
 @contextmanager

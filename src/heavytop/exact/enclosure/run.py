@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, inf, log10
@@ -180,25 +180,25 @@ class Pilot:
     run: EnclosureRun
     ahead: Ahead
 
-    def forecast(self, span: Fraction, most_steps: float) -> tuple[float, float]:
+    def forecast(self, span: Fraction, hopeless: Callable[[float, float], bool]) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
 
-        The pilot is abandoned after a hundred steps where, steps as long as these, ``most_steps`` would not do.
+        hopeless: whether so many bits lost and steps are, in which case the pilot goes no further; it is asked after
+        every hundred steps.
         """
-        times, losses = self._ahead(span, most_steps)
-        if not times:
-            return float(self.run.precision), 64 * float(min(span, FAR))
-        index = min(bisect_left(times, span), len(times) - 1)
-        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
+        times, losses = self._ahead(span, hopeless)
+        return _forecast(times, losses, span) if times else (float(self.run.precision), 64 * float(min(span, FAR)))
 
-    def _ahead(self, span: Fraction, most_steps: float) -> tuple[Sequence[Fraction], Sequence[float]]:
+    def _ahead(
+        self, span: Fraction, hopeless: Callable[[float, float], bool]
+    ) -> tuple[Sequence[Fraction], Sequence[float]]:
         """The times and the bits lost as far as ``span``, where the pilot comes so far."""
         node, known, bits = self.ahead
         if known and known[-1] >= span:
             return known, bits
         times, losses, run = list(known), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > most_steps:
+            if times and len(times) % _TRIED == 0 and hopeless(*_forecast(times, losses, span)):
                 break
             found = run.step(node)
             if found is None:
@@ -216,6 +216,12 @@ class Pilot:
         _, times, losses = self.ahead
         index = bisect_left(times, span)
         return index < len(times) and self.run.precision - losses[index] >= bits
+
+
+def _forecast(times: Sequence[Fraction], losses: Sequence[float], span: Fraction) -> tuple[float, float]:
+    """(bits lost, steps taken) up to ``span``."""
+    index = min(bisect_left(times, span), len(times) - 1)
+    return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
 
 
 def _carried_on(times: Sequence[Fraction], losses: Sequence[float], index: int, span: Fraction) -> float:
@@ -321,6 +327,10 @@ class ScaledMotion:
         precisions = [self.fewer(begun, lost * i / _PLACES) for i in range(_PLACES)]
         words = [in_words if p == begun else self.grid(p) is not None for p in precisions]
         return steps / _PLACES * sum(map(seconds_a_step, precisions, words))
+
+    def seconds_for(self, bits: float, lost: float, steps: float) -> float:
+        """The same, where ``bits`` are to be left."""
+        return self.seconds(self.precision(bits + lost, steps), lost, steps)
 
     def certified(self, precision: int) -> CertifiedSeries:
         """The Taylor coefficients in ``precision`` bits, one of those that words have."""
@@ -590,10 +600,9 @@ class Validated:
         pilot = self._pilot(direction, start, bits)
         if most is None:
             a_step = seconds_a_step(pilot.run.precision, pilot.run.certified is not None)
-            return pilot.forecast(span, _HOPELESS * self.effort / a_step)
-        # the enclosure may take fewer bits than its pilot
-        fewest = self._motion(direction, start).precision(bits, inf)
-        return pilot.forecast(span, _SURELY * most / seconds_a_step(*fewest))
+            return pilot.forecast(span, lambda _, steps: steps * a_step > _HOPELESS * self.effort)
+        motion, limit = self._motion(direction, start), _SURELY * most
+        return pilot.forecast(span, lambda lost, steps: motion.seconds_for(bits, lost, steps) > limit)
 
     def _cost(
         self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
@@ -602,8 +611,7 @@ class Validated:
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
-        lost = max(loss, forecast)
-        return motion.seconds(motion.precision(bits + lost, steps), lost, steps)
+        return motion.seconds_for(bits, max(loss, forecast), steps)
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
         """Fewer bits than ``bits``, within the effort."""

@@ -32,7 +32,7 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
 
-_FLOAT_BITS = 46
+_FLOAT_BITS = 52
 _ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
 _REPEATED = 6
 

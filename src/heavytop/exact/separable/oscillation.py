@@ -40,6 +40,7 @@ from heavytop.exact.flint.balls import Balls, current_precision, to_bits, workin
 from heavytop.precision import cross, dot
 
 MOST_TERMS = 1 << 17
+_FEW_TERMS = 512
 _WIDTH, _FARTHEST, _BOUND_BITS = 0.9, 100, 64
 
 
@@ -94,10 +95,13 @@ class Roots:
 
 
 class SineSums:
-    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once."""
+    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once: few as polynomials in e^iθ."""
 
     def __init__(self, rows: Sequence[Sequence[arb]]) -> None:
         length = len(rows[0]) + 1
+        self.polynomials = [arb_poly([0, *row]) for row in rows] if length <= _FEW_TERMS else []
+        if self.polynomials:
+            return
         self.small = max(1, isqrt(length))
         self.large = -(-length // self.small)
         size = self.small * self.large
@@ -106,6 +110,10 @@ class SineSums:
 
     def at(self, angle: arb) -> list[arb]:
         """Each sum at the angle: sin(l + j)θ = sin lθ cos jθ + cos lθ sin jθ."""
+        if self.polynomials:
+            sine, cosine = angle.sin_cos()
+            place = acb(cosine, sine)
+            return [polynomial(place).imag for polynomial in self.polynomials]
         steps = [(angle * j).sin_cos() for j in range(self.small)]
         inner = self.matrix * arb_mat([[cosine, sine] for sine, cosine in steps])
         leaps = [(angle * (i * self.small)).sin_cos() for i in range(self.large)]
@@ -136,6 +144,8 @@ class Gap:
         self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
         self._mean_floats = np.array([float(mean) for mean in self.means])
         self._orders = np.arange(1, self._floats.shape[1] + 1)
+        means, sines_held = self._mean_floats, np.isfinite(self._floats).all()
+        self._in_floats = bool(sines_held and np.isfinite(means).all() and means.any())
 
     @property
     def column(self) -> list[arb]:
@@ -172,7 +182,7 @@ class Gap:
         """See :class:`heavytop.exact.separable.abel.Variable`; raises OutOfReach where floats do not hold the
         coefficients.
         """
-        if not (np.isfinite(self._floats).all() and np.isfinite(self._mean_floats).all() and self._mean_floats.any()):
+        if not self._in_floats:
             raise OutOfReach(
                 "The period of a separated variable is beyond the range of binary64: moments, weight and rates "
                 "differ by too many decades.",

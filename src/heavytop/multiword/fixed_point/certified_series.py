@@ -148,7 +148,7 @@ class CertifiedSeries:
 
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
         self.vectors = 1 if len(problem.state) == 6 else 2
-        self.machine = fixed_point_run.machine(grid, problem.system, self.vectors == 2, processor)
+        self.machine = fixed_point_run.machine(grid, problem.system, self.vectors == 2, processor, False)
         self.extents = arithmetic.machine(grid, self.vectors).functions["extents"]
         self.problem, self.grid, self.sign = problem, grid, 1.0 if forwards else -1.0
         self.excess = fixed_point_run.excess(problem)

@@ -369,8 +369,11 @@ FINE, TOO_SMALL, CAPACITY = 0, 2, 3
 _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
-def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
-    """``series`` for this system and, unless the grid is relative, ``advance``, ``follow`` and ``samples``.
+def build(
+    grid: Grid, system: System, attitude: bool, processor: Processor | None = None, stepping: bool = True
+) -> Machine:
+    """``series`` for this system and, with ``stepping``, ``advance``, ``follow`` and ``samples``; a relative grid has
+    ``series`` alone.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
@@ -385,7 +388,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     signatures: dict[str, tuple[Any, Sequence[Any]]] = {
         "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
     }
-    if not grid.relative:
+    if stepping and not grid.relative:
         advance = _Advance(module, grid, series.vectors, made)
         advance.write()
         samples = write_samples(module, grid, series.vectors)
