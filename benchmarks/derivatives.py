@@ -1,7 +1,7 @@
 """Proven derivatives on random data of every class: contained differences, laws of the flow, radii and cost.
 
     python benchmarks/derivatives.py [--count 100] [--case NAME] [--records FILE [--seconds 240]]
-    python benchmarks/derivatives.py --cost
+    python benchmarks/derivatives.py --cost [DIGITS,TIME ...]
 
 For each built-in case and named body, COUNT random starts of its top, each at a random time (of a special motion COUNT
 times, in other units of mass and time and with other names of its axes):
@@ -42,10 +42,10 @@ def main() -> int:
     options.add_argument("--case")
     options.add_argument("--records", type=Path)
     options.add_argument("--seconds", type=float, default=float("inf"))
-    options.add_argument("--cost", action="store_true")
+    options.add_argument("--cost", nargs="*")
     given = options.parse_args()
-    if given.cost:
-        _cost()
+    if given.cost is not None:
+        _cost([(int(digits), int(until)) for digits, until in (each.split(",") for each in given.cost)] or _COSTS)
         return 0
     lines = given.records.read_text().splitlines() if given.records and given.records.exists() else []
     known = {(record["case"], record["motion"]): record for record in map(json.loads, lines)}
@@ -55,10 +55,13 @@ def main() -> int:
     return int(any(wrong))
 
 
-def _cost() -> None:
+_COSTS = [(20, 8), (30, 8), (40, 8), (60, 8), (25, 30), (30, 100)]
+
+
+def _cost(motions: list[tuple[int, int]]) -> None:
     top = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
     start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
-    for digits, until in ((20, 8), (30, 8), (40, 8), (60, 8), (25, 30), (30, 100)):
+    for digits, until in motions:
         found: dict[str | None, list[float]] = {None: [], "start": [], "all": []}
         for _ in range(4):
             for which, seconds in found.items():

@@ -21,6 +21,7 @@ from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
 from heavytop.suite.integrator_check import check
 from heavytop.suite.plan import read
+from heavytop.top.attitude import perpendicular
 from support import in_process
 
 COMPILERS = {"python": "python3", "c": "cc", "cpp": "g++", "rust": "rustc", "julia": "julia", "fortran": "gfortran"}
@@ -66,7 +67,15 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
         run = registry.ready(command)(case.top, case.start, [1, 2], DOUBLE)
         known = propagate(case.top, case.start, [1, 2], DOUBLE)
         assert abs(run.to_numpy() - known.to_numpy()).max() < 1e-9
-        assert {each.check for each in check(command) if each.verdict != "kept"} == {"huge"}
+        xi = perpendicular(case.start.gamma)
+        turned, known = (
+            each(case.top, case.start, [1, 2], DOUBLE, xi=xi) for each in (registry.ready(command), propagate)
+        )
+        assert abs(turned.to_numpy() - known.to_numpy()).max() < 1e-9
+        assert (turned.to_numpy()[:, :6] == run.to_numpy()).all()
+        found = {each.check: each for each in check(command)}
+        assert [name for name, each in found.items() if each.verdict != "kept"] == ["huge"]
+        assert found["attitude"].text == "It carries the attitude."
     finally:
         close_all()
 

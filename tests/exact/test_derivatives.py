@@ -213,6 +213,13 @@ def test_the_bound_of_a_step_holds_at_every_corner_of_its_set_of_errors(size, pr
     found = step(scaled.field, node, of_motion, scaled.certified_at(of_motion))
     along = in_other_bits(scaled.field, found, precision, tangent.certified)
     assert (along is found) == (of_motion == precision)
+    box = [
+        Fraction(float(r)) * Fraction(2) ** (along.node.errors.exponent - precision) for r in along.node.errors.sizes()
+    ]
+    for mine, own_centre, reach in zip(node.centre, along.node.centre, box, strict=True):
+        apart = abs(Fraction(int(mine), 2**of_motion) - Fraction(int(own_centre), 2**precision))
+        assert apart + Fraction(radius, 2**of_motion) <= reach
+    assert along.widest >= found.widest
     own = step_derivatives(tangent, along, Fraction(1))
     fine = module._tangent(motion, scaled, 512, False, tuple(SIX))
     rng, worst, shift = random.Random(1), Fraction(0), 512 - of_motion

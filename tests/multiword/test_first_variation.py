@@ -1,14 +1,17 @@
 """The proven bound of first variations in words, attacked with exact integers."""
 
 from fractions import Fraction
+from math import ldexp
 from random import Random
 
+import numpy
 import pytest
 
 from heavytop.exact.enclosure import derivatives
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import Whole, lacking
 from heavytop.multiword.fixed_point.arithmetic import grid_of
+from heavytop.multiword.fixed_point.first_variation import WordColumns
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from multiword.test_proven import extreme_centre, rounded
@@ -72,3 +75,12 @@ def test_columns_that_are_0_at_first_are_not_lost(omega) -> None:
     """From rest the first coefficients of many columns are 0 and later ones are not."""
     known = Validated(HeavyTop((3, 2, 1), 1, (0, 0, 1)), State(omega, ("3/5", 0, "4/5")), HEAVY_TOP)
     assert max(used(known, 4, False, Random(1))) <= 1
+
+
+@pytest.mark.parametrize("words", [3, 24])
+def test_columns_end_where_their_last_coefficients_are_a_thousand_ulps(words: int) -> None:
+    """Also of 1,032 bits, the ulp of which is no normal double."""
+    grid = grid_of(words, whole=True)
+    for ulps, small in ((1000, True), (1100, False)):
+        sizes = numpy.array([[1.0, 0.0], [0.5, ldexp(ulps, -grid.total)]])
+        assert WordColumns([], None, sizes, (0.0, 0.0)).ends_small(grid) == small

@@ -15,7 +15,7 @@ from heavytop.exact.flint.balls import FUNCTIONS, whole_evaluation, working_prec
 from heavytop.integrate import registry
 from heavytop.integrate.registry import IntegratorSource, Setup, described, expected_steps
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.scalar import GUARD_BITS, text, to_ball
+from heavytop.measure.scalar import GUARD_BITS, text, to_balls
 from heavytop.measure.scorer import Drift
 from heavytop.precision import Precision, cross, decimal_text, dot, exact, exact_text, number
 from heavytop.records import Metric
@@ -332,7 +332,7 @@ def _on_the_way(problem: Problem, end: Fraction) -> list[Fraction]:
 def _angles(state: Any, followed: Sequence[float], precision: Precision) -> list[str]:
     """(φ, θ, ψ) of one state, shifted by the whole turns that were followed; ``nan`` at a pole."""
     with working_precision(precision.bits + GUARD_BITS):
-        values = [to_ball(value) for value in state]
+        values = to_balls(state)
         angles = euler_angles(values[3:6], values[6:9], FUNCTIONS)
         shifted = [a + 2 * arb.pi() * round((f - float(a)) / math.tau) for a, f in zip(angles, followed, strict=True)]
         return [text(angle, precision.digits) for angle in shifted]

@@ -45,6 +45,11 @@ def to_ball(value: Any) -> arb:
         return arb("nan")
 
 
+def to_balls(state: Sequence[Any]) -> list[arb]:
+    """:func:`to_ball` of each number of a state; of doubles Python's own take a third of the time."""
+    return [to_ball(value) for value in (state.tolist() if isinstance(state, numpy.ndarray) else state)]
+
+
 def _by_doubles(value: Any) -> arb | None:
     """A wide native float as the sum of doubles, exactly; None for other numbers, and beyond the range of doubles."""
     if type(value).__name__ not in _WIDE:

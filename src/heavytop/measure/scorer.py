@@ -20,7 +20,7 @@ from heavytop.exact.flint.balls import (
     working_precision,
 )
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_ball
+from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_balls
 from heavytop.measure.truth import Truth
 from heavytop.precision import dot, log10
 from heavytop.records import Against, Metric, Quantity, Series, by_name
@@ -173,7 +173,7 @@ class Drift(Statistics):
     @whole_evaluation
     def following(self, state: Sequence[Any]) -> list[Sums]:
         """What the drifts add up to with this native state; nothing is taken in."""
-        return at_precision(self.bits, current_length(), lambda _: self.sums([to_ball(value) for value in state]))
+        return at_precision(self.bits, current_length(), lambda _: self.sums(to_balls(state)))
 
     def sums(self, y: Sequence[arb]) -> list[Sums]:
         """The same with a state of balls, at a working precision of ``bits``."""
@@ -268,7 +268,7 @@ class SolutionError(Statistics):
         if truth is None:
             return None
         with working_precision(self.bits):
-            return self.errors([to_ball(value) for value in state[:6]], truth)
+            return self.errors(to_balls(state[:6]), truth)
 
     def known(self, time: Fraction) -> list[arb] | None:
         """The true state; None where there is none."""
@@ -389,7 +389,7 @@ class Scorer(DriftAndError):
         error = self.error
         truth = None if error is None else error.known(time)
         with working_precision(self.drift.bits):
-            y = [to_ball(value) for value in state]  # once for both
+            y = to_balls(state)  # once for both
             return self.drift.sums(y), None if error is None or truth is None else error.errors(y[:6], truth)
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:

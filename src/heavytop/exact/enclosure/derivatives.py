@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import exp, inf, lcm, log2
+from math import exp, inf, lcm
 from operator import mul
 from typing import Protocol, TypeAlias
 
@@ -397,8 +397,8 @@ _UNIT = 2.0**-53
 _ATTEMPTS = 6
 _GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
-_OF_COLUMNS, _MOST_OF_COLUMNS = 10, 60
-"""Bits that Φ and σ lose by what they lack themselves, and the loss of the motion beyond which that grows no more."""
+_OF_COLUMNS, _MOST_OF_COLUMNS = 13, 60
+"""Bits that Φ and σ lose where the motion loses few; and the loss of a motion beyond which they lose no more."""
 _OF_DATA = 8
 """Bits that S has fewer than J: a second run costs more than they do."""
 _OF_LAWS = 4
@@ -469,7 +469,7 @@ def _one_way(
     places = _independent(known, motion) if data else ()
     spare = (_OF_DATA + _OF_LAWS * (len(places) < len(DATA))) * data
     wanted = bits + loss + _GUARD + spare + int(min(loss, _FEW * bits) / 4)
-    own = bits + _OF_COLUMNS + 0.8 * min(loss, _MOST_OF_COLUMNS) + log2(steps + 1)
+    own = bits + _OF_COLUMNS + 0.9 * min(loss, _MOST_OF_COLUMNS)
     for _ in range(_ATTEMPTS):
         columns = steps * (7 + len(places))
         of_columns = motion.precision(own, columns)

@@ -27,6 +27,8 @@ CHUNK_SECONDS = 0.25
 _ON_A_GRID = ("double", "extended", "quad")
 _MANY, _CLOSE = 256, 20
 """States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
+_FAR = 100
+"""Longest steps: farther times are foreseen by the mean step."""
 _FORGETS = 0.98
 """The part of a miss, in steps, that still counts at the next far time."""
 
@@ -91,7 +93,7 @@ class Stepper:
         if self._one_by_one or not self._largest_step or distance < 2 * self._largest_step:
             return 1
         # many steps average out; each of a few may be as long as the longest so far
-        if distance > 100 * self._largest_step:
+        if distance > _FAR * self._largest_step:
             expected = distance / (self._mean_step or abs(float(self.time)) / self.steps)
             self._foreseen = self._foreseen or self.steps + expected
             count = self._part * expected
@@ -110,7 +112,7 @@ class Stepper:
         engine = self.engine
         state, before, began = engine.state.copy(), engine.dtime, perf_counter()
         self._before = state, before, self.steps
-        outcome, length = (engine.step if self.forwards else engine.step_backward)(write_tc=True)
+        outcome, length = (engine.step if self.forwards else engine.step_backward)(True)  # write_tc
         self._seconds_per_step = perf_counter() - began
         self._covers, now = True, engine.time
         if outcome == self._not_finite or now - now != 0:  # infinity and nan
@@ -143,7 +145,7 @@ class Stepper:
             if failed:
                 # over the same ground again, one by one, to find where
                 self._one_by_one = True
-            else:
+            elif abs(float(target - self.engine.time)) <= _FAR * self._largest_step:
                 self._largest_step *= 1.5
             return Outcome.SUCCESS
         self._went(done, self.engine.time)
@@ -230,7 +232,8 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
 @lru_cache(maxsize=64)
 def far(forwards: bool, precision: Precision) -> Any:
     """A time beyond every other."""
-    return number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+    found = number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+    return float(found) if precision.family == "double" else found  # heyoka takes Python's floats in half the time
 
 
 def at_rest(state: Any, coefficients: Any) -> bool:
@@ -308,6 +311,8 @@ def follow(
         if found is not None:
             return found
     load(engine, problem)
+    if problem.precision.family == "double":
+        targets = list(map(float, targets))  # as far() is
     forwards = bool(targets[-1] >= 0)
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
     return _trajectory(

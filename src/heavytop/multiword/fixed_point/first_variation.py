@@ -211,6 +211,10 @@ class WordColumns:
         """Upper bounds of 2^(rate n) |v_n|."""
         return numpy.ldexp(self.sizes, rate * numpy.arange(self.sizes.shape[1]))
 
+    def ends_small(self, grid: Grid) -> bool:
+        """Whether no last coefficient is above :data:`_LARGEST_LAST` ulps, which may be no normal doubles."""
+        return bool(self.sizes[:, -1].max() < ldexp(_LARGEST_LAST, -grid.total))
+
 
 class CertifiedColumns:
     """The columns beside one motion on one grid; any thread may ask.
@@ -241,7 +245,7 @@ class CertifiedColumns:
         while True:
             rows[row * (order + 1) : row * (reached + 1)] = 0  # what the motion has no coefficients for
             found = self._of_order(own, widest, reached, halvings, values)
-            if found is None or reached == most or found.sizes[:, -1].max() * 2.0**certified.grid.total < _LARGEST_LAST:
+            if found is None or reached == most or found.ends_small(certified.grid):
                 return found
             reached = min(most, reached + reached // 2 + 8)
 

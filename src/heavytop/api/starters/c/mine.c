@@ -5,48 +5,57 @@
 #include <string.h>
 
 static double inertia[3], n[3]; /* principal moments I; n = P r */
+static int size = 6;            /* of a state: 9 where the attitude is asked for, with xi behind gamma */
 
-/* Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega */
-static void field(const double y[6], double f[6])
+/* Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega; xi' = xi x Omega */
+static void field(const double y[9], double f[9])
 {
     const double *I = inertia, *w = y, *g = y + 3;
     f[0] = ((I[1] - I[2]) * w[1] * w[2] + g[1] * n[2] - g[2] * n[1]) / I[0];
     f[1] = ((I[2] - I[0]) * w[2] * w[0] + g[2] * n[0] - g[0] * n[2]) / I[1];
     f[2] = ((I[0] - I[1]) * w[0] * w[1] + g[0] * n[1] - g[1] * n[0]) / I[2];
-    f[3] = g[1] * w[2] - g[2] * w[1];
-    f[4] = g[2] * w[0] - g[0] * w[2];
-    f[5] = g[0] * w[1] - g[1] * w[0];
+    for (int i = 3; i < size; i += 3) {
+        f[i] = y[i + 1] * w[2] - y[i + 2] * w[1];
+        f[i + 1] = y[i + 2] * w[0] - y[i] * w[2];
+        f[i + 2] = y[i] * w[1] - y[i + 1] * w[0];
+    }
 }
 
 /* y after one step of size h: replace this by your method */
-static void step(double y[6], double h)
+static void step(double y[9], double h)
 {
     static const double at[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
-    double k[6] = {0}, sum[6] = {0}, z[6];
+    double k[9] = {0}, sum[9] = {0}, z[9];
     for (int stage = 0; stage < 4; stage++) {
-        for (int i = 0; i < 6; i++)
+        for (int i = 0; i < size; i++)
             z[i] = y[i] + at[stage] * h * k[i];
         field(z, k);
-        for (int i = 0; i < 6; i++)
+        for (int i = 0; i < size; i++)
             sum[i] += weight[stage] * k[i];
     }
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < size; i++)
         y[i] += h / 6.0 * sum[i];
 }
 
-static void take(char *text, double *values, long count)
+/* the numbers of the text, at most so many; how many there are */
+static long take(char *text, double *values, long most)
 {
-    for (long i = 0; i < count; i++)
-        values[i] = strtod(text, &text);
+    char *end;
+    for (long i = 0; i < most; i++, text = end) {
+        values[i] = strtod(text, &end);
+        if (end == text)
+            return i;
+    }
+    return most;
 }
 
 int main(void)
 {
     char *line = NULL, *rest;
-    size_t size = 0;
-    double y[6] = {0}, h = 0.01, *times = NULL;
+    size_t room = 0;
+    double y[9] = {0}, h = 0.01, *times = NULL;
     long count = 0;
-    while (getline(&line, &size, stdin) > 0) {
+    while (getline(&line, &room, stdin) > 0) {
         const char *name = strtok_r(line, " \n", &rest);
         if (name == NULL)
             continue;
@@ -57,7 +66,7 @@ int main(void)
         else if (!strcmp(name, "moment"))
             take(rest, n, 3);
         else if (!strcmp(name, "state"))
-            take(rest, y, 6);
+            size = take(rest, y, 9);
         else if (!strcmp(name, "setting"))
             take(rest, &h, 1);
         else if (!strcmp(name, "times")) {
@@ -72,7 +81,10 @@ int main(void)
                     step(y, length);
                 t = times[i];
                 steps += parts;
-                printf("state %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n", t, y[0], y[1], y[2], y[3], y[4], y[5]);
+                printf("state %.17g", t);
+                for (int j = 0; j < size; j++)
+                    printf(" %.17g", y[j]);
+                puts("");
                 fflush(stdout);
             }
             printf("done steps %.0f evaluations %.0f\n", steps, 4 * steps);

@@ -5,23 +5,32 @@ module heavy_top
   real(dp) :: inertia(3), n(3)   ! principal moments I; n = P r
 contains
   ! Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega
+  ! xi' = xi x Omega; xi is 0 where the attitude is not asked for
   function field(y) result(f)
-    real(dp), intent(in) :: y(6)
-    real(dp) :: f(6), w(3), g(3)
+    real(dp), intent(in) :: y(9)
+    real(dp) :: f(9), w(3), g(3)
     w = y(1:3)
     g = y(4:6)
     f(1) = ((inertia(2) - inertia(3)) * w(2) * w(3) + g(2) * n(3) - g(3) * n(2)) / inertia(1)
     f(2) = ((inertia(3) - inertia(1)) * w(3) * w(1) + g(3) * n(1) - g(1) * n(3)) / inertia(2)
     f(3) = ((inertia(1) - inertia(2)) * w(1) * w(2) + g(1) * n(2) - g(2) * n(1)) / inertia(3)
-    f(4) = g(2) * w(3) - g(3) * w(2)
-    f(5) = g(3) * w(1) - g(1) * w(3)
-    f(6) = g(1) * w(2) - g(2) * w(1)
+    f(4:6) = fixed_in_space(g, w)
+    f(7:9) = fixed_in_space(y(7:9), w)
+  end function
+
+  ! the rate of a vector that is fixed in space: v x Omega
+  function fixed_in_space(v, w) result(f)
+    real(dp), intent(in) :: v(3), w(3)
+    real(dp) :: f(3)
+    f(1) = v(2) * w(3) - v(3) * w(2)
+    f(2) = v(3) * w(1) - v(1) * w(3)
+    f(3) = v(1) * w(2) - v(2) * w(1)
   end function
 
   ! y after one step of size h: replace this by your method
   function step(y, h) result(z)
-    real(dp), intent(in) :: y(6), h
-    real(dp) :: z(6), k1(6), k2(6), k3(6), k4(6)
+    real(dp), intent(in) :: y(9), h
+    real(dp) :: z(9), k1(9), k2(9), k3(9), k4(9)
     k1 = field(y)
     k2 = field(y + h / 2 * k1)
     k3 = field(y + h / 2 * k2)
@@ -35,10 +44,11 @@ program mine
   implicit none
   character(len=2000000) :: line
   character(len=40) :: name
-  real(dp) :: y(6), h, t, length
+  real(dp) :: y(9), h, t, length
   real(dp), allocatable :: times(:)
-  integer :: count, status, i, k, parts, steps
+  integer :: count, status, i, k, parts, steps, width
   h = 0.01_dp
+  width = 6
   do
     read (*, '(a)', iostat=status) line
     if (status /= 0) exit
@@ -51,7 +61,14 @@ program mine
     case ('moment')
       read (line, *) name, n
     case ('state')
-      read (line, *) name, y
+      y = 0
+      width = 9
+      read (line, *, iostat=status) name, y
+      if (status /= 0) then
+        width = 6
+        read (line, *) name, y(1:6)
+        y(7:9) = 0
+      end if
     case ('setting')
       read (line, *) name, h
     case ('times')
@@ -70,7 +87,7 @@ program mine
         end do
         t = times(i)
         steps = steps + parts
-        print '(a, 7(1x, es24.16e3))', 'state', t, y
+        print '(a, 10(1x, es24.16e3))', 'state', t, y(1:width)
         flush (6)
       end do
       print '(a, i0, a, i0)', 'done steps ', steps, ' evaluations ', 4 * steps

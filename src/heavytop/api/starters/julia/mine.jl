@@ -1,16 +1,18 @@
 # The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
 
-# Ω' and γ' of M' = M × Ω + P γ × r, γ' = γ × Ω; M = IΩ, n = P r
+# Ω' and γ' of M' = M × Ω + P γ × r, γ' = γ × Ω; M = IΩ, n = P r; ξ' = ξ × Ω of nine numbers, with the attitude
 function field(I, n, y)
     w1, w2, w3, g1, g2, g3 = y
-    return [
+    rates = [
         ((I[2] - I[3]) * w2 * w3 + g2 * n[3] - g3 * n[2]) / I[1],
         ((I[3] - I[1]) * w3 * w1 + g3 * n[1] - g1 * n[3]) / I[2],
         ((I[1] - I[2]) * w1 * w2 + g1 * n[2] - g2 * n[1]) / I[3],
-        g2 * w3 - g3 * w2,
-        g3 * w1 - g1 * w3,
-        g1 * w2 - g2 * w1,
     ]
+    for k in 4:3:length(y)
+        a, b, c = y[k:k+2]
+        append!(rates, [b * w3 - c * w2, c * w1 - a * w3, a * w2 - b * w1])
+    end
+    return rates
 end
 
 # y after one step of size h: replace this by your method

@@ -3,11 +3,12 @@
 use std::collections::HashMap;
 use std::io::{self, BufRead, Write};
 
-type State = [f64; 6];
+/// Omega, gamma, and xi, which stays 0 where the attitude is not asked for.
+type State = [f64; 9];
 
-/// Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega, n = P r.
+/// Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega, n = P r; xi' = xi x Omega.
 fn field(i: &[f64], n: &[f64], y: &State) -> State {
-    let [w1, w2, w3, g1, g2, g3] = *y;
+    let [w1, w2, w3, g1, g2, g3, x1, x2, x3] = *y;
     [
         ((i[1] - i[2]) * w2 * w3 + g2 * n[2] - g3 * n[1]) / i[0],
         ((i[2] - i[0]) * w3 * w1 + g3 * n[0] - g1 * n[2]) / i[1],
@@ -15,6 +16,9 @@ fn field(i: &[f64], n: &[f64], y: &State) -> State {
         g2 * w3 - g3 * w2,
         g3 * w1 - g1 * w3,
         g1 * w2 - g2 * w1,
+        x2 * w3 - x3 * w2,
+        x3 * w1 - x1 * w3,
+        x1 * w2 - x2 * w1,
     ]
 }
 
@@ -33,7 +37,8 @@ fn step(f: impl Fn(&State) -> State, y: &State, h: f64) -> State {
 fn run(given: &HashMap<String, Vec<f64>>, out: &mut impl Write) -> io::Result<()> {
     let (i, n) = (&given["inertia"], &given["moment"]);
     let h = given.get("setting").map_or(0.01, |value| value[0]);
-    let mut y: State = std::array::from_fn(|j| given["state"][j]);
+    let start = &given["state"];
+    let mut y: State = std::array::from_fn(|j| start.get(j).copied().unwrap_or(0.0));
     let (mut time, mut steps) = (0.0_f64, 0.0);
     for &end in &given["times"][1..] {
         let count = ((end - time).abs() / h).ceil();
@@ -43,7 +48,7 @@ fn run(given: &HashMap<String, Vec<f64>>, out: &mut impl Write) -> io::Result<()
         }
         time = end;
         steps += count;
-        let numbers: Vec<String> = y.iter().map(|value| format!("{value:e}")).collect();
+        let numbers: Vec<String> = y[..start.len()].iter().map(|value| format!("{value:e}")).collect();
         writeln!(out, "state {time:e} {}", numbers.join(" "))?;
         out.flush()?;
     }
