@@ -183,11 +183,14 @@ class Pilot:
     def forecast(self, span: Fraction, hopeless: Callable[[float, float], bool]) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
 
-        hopeless: whether so many bits lost and steps are, in which case the pilot goes no further; it is asked after
-        every hundred steps.
+        hopeless: whether so many bits lost, of those that will be, and so many steps are; then the pilot goes no
+        further.  It is asked after every hundred steps.
         """
         times, losses = self._ahead(span, hopeless)
-        return _forecast(times, losses, span) if times else (float(self.run.precision), 64 * float(min(span, FAR)))
+        if not times:
+            return float(self.run.precision), 64 * float(min(span, FAR))
+        index = min(bisect_left(times, span), len(times) - 1)
+        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
 
     def _ahead(
         self, span: Fraction, hopeless: Callable[[float, float], bool]
@@ -198,7 +201,8 @@ class Pilot:
             return known, bits
         times, losses, run = list(known), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            if times and len(times) % _TRIED == 0 and hopeless(*_forecast(times, losses, span)):
+            taken = len(times)
+            if taken and taken % _TRIED == 0 and hopeless(losses[-1], taken * _times_as_far(span, times[-1])):
                 break
             found = run.step(node)
             if found is None:
@@ -216,12 +220,6 @@ class Pilot:
         _, times, losses = self.ahead
         index = bisect_left(times, span)
         return index < len(times) and self.run.precision - losses[index] >= bits
-
-
-def _forecast(times: Sequence[Fraction], losses: Sequence[float], span: Fraction) -> tuple[float, float]:
-    """(bits lost, steps taken) up to ``span``."""
-    index = min(bisect_left(times, span), len(times) - 1)
-    return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
 
 
 def _carried_on(times: Sequence[Fraction], losses: Sequence[float], index: int, span: Fraction) -> float:
