@@ -188,7 +188,9 @@ def in_processes(
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
         while waiting or any(worker.rows for worker in pool):
-            for ahead, worker in product(range(_AHEAD), pool):
+            # of the last ones none waits for one worker while another has none
+            most = _AHEAD if len(waiting) > _AHEAD * len(pool) else 1
+            for ahead, worker in product(range(most), pool):
                 if waiting and worker.takes(tasks[waiting[0]], ahead):
                     index = _taken(worker, pool, waiting, tasks)
                     task = tasks[index]

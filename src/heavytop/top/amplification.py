@@ -125,7 +125,7 @@ class _Path:
     def __init__(self, linear: Doubles, products: Doubles, start: Sequence[float]) -> None:
         import numpy
 
-        self._linear, self._flat = linear, products.reshape(36, 6)
+        self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
         self._steps = [(0.0, numpy.array(start), numpy.eye(6), 1.0)]
         self._ended = False
         self._lock = Lock()
@@ -154,7 +154,7 @@ class _Path:
         import numpy
 
         time, state, carried, largest = before
-        series = _series(self._linear, self._flat, state)
+        series = _series(self._linear, self._twice, state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
         step = min(most, _TOLERANCE ** (1 / _ORDER) / last if last else most)
         if step == math.inf:
@@ -178,10 +178,12 @@ def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], f
     return _Path(linear, products, [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
 
 
-def _series(linear: Doubles, flat: Doubles, state: Doubles) -> Doubles:
+def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
     """Taylor coefficients of (y, Φ) from y and Φ = 1, shape (order + 1, 6, 7).
 
     (n + 1) Φ_(n+1) = Σ_m J_m Φ_(n−m) with J_m = 2 B(y_m, ·), and L in J_0; of y itself half of the products.
+
+    linear: L; None where it is 0.  twice: 2 B, shape (36, 6).
     """
     import numpy
 
@@ -190,9 +192,10 @@ def _series(linear: Doubles, flat: Doubles, state: Doubles) -> Doubles:
     columns, shares = found.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):
         place = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
-        jacobians[:, place : place + 6] = 2 * (flat @ found[n, :, 0]).reshape(6, 6)
+        jacobians[:, place : place + 6] = (twice @ found[n, :, 0]).reshape(6, 6)
         sums = shares * (jacobians[:, place:] @ columns[: 6 * n + 6])
-        sums += linear @ found[n]
+        if linear is not None:
+            sums += linear @ found[n]
         numpy.divide(sums, n + 1, out=found[n + 1])
     return found
 
