@@ -16,6 +16,7 @@ from multiprocessing import current_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
 from threading import Lock, Thread
+from time import monotonic, sleep
 from typing import Any, ParamSpec, TypeVar
 from uuid import uuid4
 
@@ -30,6 +31,7 @@ T = TypeVar("T")
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Python's own: a file such as random.py in the working directory is not taken for a module."""
+_POLL = 0.005
 _LAST_SECONDS = 5.0
 """That a process has to end once it has closed its pipe."""
 _starting = Lock()
@@ -130,7 +132,9 @@ class ChildContext(LokyContext):  # type: ignore[misc]
         child = self._children[-1]
         if child.pid is None:
             return ""
-        child.join(_LAST_SECONDS)
+        given_up = monotonic() + _LAST_SECONDS
+        while child.exitcode is None and monotonic() < given_up:  # the thread of the pool may know first
+            sleep(_POLL)
         return "" if child.exitcode is None else how_it_ended(child.exitcode)
 
     def kill(self) -> None:
