@@ -1,6 +1,7 @@
 """Tables as other programs write them, cases that fill in what a file leaves out, the format read off the digits."""
 
 import codecs
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -244,3 +245,26 @@ def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
         TextTable("\n".join([",".join(names), ",".join("0" * len(names)), ",".join("1" * len(names))]), []).notes == []
     )
     assert unread([*own, "energy", "energies_radius"], names) == ["columns that are not read: energy, energies_radius"]
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ("t,wx deg/s,wy deg/s,wz deg/s,gamma1,gamma2,gamma3", "'wx deg/s' begins like one of the angular velocity"),
+        ("t,wx_dps,wy_dps,wz_dps,gamma1,gamma2,gamma3", "'wx_dps' begins like one of the angular velocity"),
+        ("t,omega1 {rpm},omega2 {rpm},omega3 {rpm},qw,qx,qy,qz", "'omega1 {rpm}' begins like"),
+        ("t,omega1,omega2,omega3,gamma1 m,gamma2 m,gamma3 m", "'gamma1 m' begins like one of the gamma"),
+        ("t,qw,qx,qy,qz,x mm,y mm,z mm", "'x mm' begins like one of the position"),
+        ("t,x,y,z,w,x,y,z", "more than four may be a quaternion"),
+    ],
+)
+def test_a_quantity_is_not_passed_over_for_how_its_unit_is_written(names: str, message: str) -> None:
+    with pytest.raises(InputError, match=re.escape(message)):
+        header(names.split(","))
+
+
+def test_what_is_of_another_quantity_is_left_out() -> None:
+    others = ["theta_dot", "omega_x_ref", "x_err", "cpu time", "r_err", "w [-]"]
+    found = header(["t", *(f"omega{k}" for k in "123"), *(f"gamma{k}" for k in "123"), *others])
+    assert found.others == tuple(others)
+    assert set(header(["t", "w [-]", "x [mm]", "y [mm]", "z [mm]"]).places) == {"position"}

@@ -36,6 +36,7 @@ _PATIENCE = 60
 _FAREWELL = 2.0
 _OFF = 0.05
 """An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
+_ATTITUDE_TIMES = (Fraction(1, 4), Fraction(1), Fraction(3, 2), Fraction(2))
 _AS_RIGHT = 100
 """How many times as large the error of a motion back in time may be as that of its mirror image."""
 _RESTART = 1000
@@ -303,11 +304,14 @@ class _Contract:
                 "It carries Ω and γ alone: it does not declare that it carries the attitude, and is not asked for it."
             )
         xi = perpendicular(self.start.gamma)
-        run = self._run([1], xi=xi)
+        run = self._run(_ATTITUDE_TIMES, xi=xi)
         known = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
-        off = _distance(run.states[-1], known.states[-1])
-        if off > _OFF:
-            raise _Violated(f"With the attitude its state at t = 1 is off by {decimal_text(off, 2)}.")
+        for time, state, true in zip(run.times, run.states, known.states, strict=True):
+            off = _distance(state, true)
+            if off > _OFF:
+                raise _Violated(
+                    f"With the attitude its state at t = {decimal_text(time, 6)} is off by {decimal_text(off, 2)}."
+                )
         return "It carries the attitude."
 
     def _unknown_lines(self) -> str:

@@ -51,6 +51,8 @@ _RATE = {
     **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
 }
 _METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
+_LENGTHS = ("m", *_METRE)
+_OMEGA = ("omega", "omega_space", "framed")
 _UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
 """Units that a header may have, in those of the data: s, rad/s (of these as multiples of π) and m."""
 
@@ -104,7 +106,7 @@ def header(names: Sequence[str]) -> Header:
     time, angles, others = None, set(), []
     units: dict[str, set[Unit]] = {}
     plainly = [_plain(_with_index(name.strip())) for name in names]
-    together = _quaternion(plainly)
+    together = _quaternion(names, plainly)
     for place, (name, plain) in enumerate(zip(names, plainly, strict=True)):
         if place in together.values():
             continue
@@ -131,16 +133,45 @@ def header(names: Sequence[str]) -> Header:
         raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
     if together:
         found["quaternion"] = together
+    for name in others:
+        _require_no_quantity(name, found)
     return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
 
 
-def _quaternion(plain: Sequence[str]) -> dict[str, int]:
-    """The places of w, x, y, z or e0 to e3 beside each other, where no column is called one of a quaternion."""
+def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
+    """The places of w, x, y, z or e0 to e3 beside each other, where no column is called one of a quaternion.
+
+    Lengths are none.  Raises InputError where x, y, z may belong to either of two, as in x,y,z,w,x,y,z.
+    """
     if any(_PARTS.fullmatch(name) for name in plain):
         return {}
-    runs = ((place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3))
-    first, run = next((each for each in runs if each[1] in _TOGETHER), (0, ()))
-    return {name[-1]: first + number for number, name in enumerate(run)}
+    runs = [(place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3)]
+    lengths = [_unit("position", name).name in _LENGTHS for name in names]
+    found = [(place, run) for place, run in runs if run in _TOGETHER and not any(lengths[place : place + 4])]
+    if len(found) > 1:
+        raise InputError(
+            f"Of the columns {quoted(','.join(names))[:80]} more than four may be a quaternion.",
+            "Call them qw,qx,qy,qz, and positions px,py,pz.",
+        )
+    return {name[-1]: place + number for place, run in found for number, name in enumerate(run)}
+
+
+def _require_no_quantity(name: str, found: Mapping[str, object]) -> None:
+    """Raises InputError for a column that is not read, called as one of a quantity that no other column gives.
+
+    So of a unit that does not stand in brackets: the quantity would be passed over.  What stands behind ``_`` makes
+    another quantity of all but Ω and γ, as in theta_dot.
+    """
+    parts = re.split(r"([\s_{}<>]+)", name.strip())
+    for end in range(1, len(parts), 2):
+        begins = _plain(begun := "".join(parts[:end]))
+        quantity = (None if begins in _CLASSIC else _meaning(begins)) or ("", "")
+        named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
+        if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & found.keys():
+            raise InputError(
+                f"The column {quoted(name)} begins like one of the {_words(quantity[0])}, and is not understood.",
+                f"Write a unit in brackets, {quoted(begun + ' [unit]')}, or give the column another name.",
+            )
 
 
 def _unit(quantity: str, name: str) -> Unit:

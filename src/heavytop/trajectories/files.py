@@ -98,7 +98,8 @@ class TextTable:
         names = self._without_header(len(first)) if header is None else header
         self.cells = _split(body, self.lines, separator, len(names))
         found = observed_columns.header(names)
-        said = [f"{name} in {unit.name}" for name, unit in found.units.items() if name != "position"]
+        units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
+        said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
         self.notes += [f"as the header says, {', '.join(said)}"] if said else []
         if found.time is not None and (found.units or observed_columns.is_more_than_states(found)):
             self.header, others = found, list(found.others)
