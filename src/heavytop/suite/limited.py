@@ -34,8 +34,8 @@ _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
 _MOST_DEATHS = 3
 _LOOKED_AT = 64
-_AHEAD = 4
-"""Tasks of a worker, the one under way among them; one where a third-party integrator runs in it."""
+_AHEAD, _SHORT = 4, 0.25
+"""Tasks of a worker, the one under way among them, where each takes fewer seconds than that; else one."""
 
 
 @dataclass(slots=True)
@@ -110,11 +110,12 @@ class _Worker:
             return None
         return self.began + self.limit - monotonic()
 
-    def takes(self, task: Task, ahead: int) -> bool:
-        """Whether it may be given one more, with so many before it."""
+    def takes(self, task: Task, ahead: int, costs: Mapping[int, float]) -> bool:
+        """Whether it may be given one more, with so many before it, which are short: no task waits for a long one."""
         if not self.rows:
             return True
-        return self.limit is None and not task.is_third_party and len(self.rows) <= ahead
+        short = all(costs[index] < _SHORT for index, _ in self.rows)
+        return short and self.limit is None and not task.is_third_party and len(self.rows) <= ahead
 
     def submit(self, index: int, limit: float | None, kind: MeasuredKind, task: Task, saved: Saved) -> None:
         """Begins a task, behind those that it has: its time runs from when the process is there."""
@@ -188,10 +189,8 @@ def in_processes(
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
         while waiting or any(worker.rows for worker in pool):
-            # of the last ones none waits for one worker while another has none
-            most = _AHEAD if len(waiting) > _AHEAD * len(pool) else 1
-            for ahead, worker in product(range(most), pool):
-                if waiting and worker.takes(tasks[waiting[0]], ahead):
+            for ahead, worker in product(range(_AHEAD), pool):
+                if waiting and worker.takes(tasks[waiting[0]], ahead, costs):
                     index = _taken(worker, pool, waiting, tasks)
                     task = tasks[index]
                     limit = limits.seconds(task, costs[index]) if task.is_third_party else None
