@@ -150,12 +150,6 @@ class ChildContext(LokyContext):  # type: ignore[misc]
                     os.killpg(child.pid, signal.SIGKILL)
         self.kill()
 
-    def terminate(self) -> None:
-        """Asks its processes to end."""
-        for child in self._children:
-            if child.is_alive():
-                child.terminate()
-
 
 def _lead_group(initializer: Callable[..., object] | None, initargs: tuple[Any, ...]) -> None:
     os.setpgid(0, 0)

@@ -25,7 +25,7 @@ from heavytop.processes import ChildContext
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.render.terminal import brief, summary
 from heavytop.store.checks import contradictions
-from heavytop.suite import run
+from heavytop.suite import limited, run
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
 from heavytop.suite.rows import Task
@@ -131,10 +131,18 @@ def kill(pid: int) -> None:
     os.kill(pid, signal.SIGKILL)
 
 
+@pytest.fixture(params=[0.25, 100])
+def short(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks that wait for others of so many seconds: none of these tasks, or several behind each worker's."""
+    monkeypatch.setattr(limited, "_SHORT", request.param)
+
+
+@pytest.mark.usefixtures("short")
 def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected) -> None:
     assert measured(tasks, 2, after_first=lambda: kill(active_children()[0].pid)) == expected
 
 
+@pytest.mark.usefixtures("short")
 def test_a_task_that_kills_its_worker_every_time_is_named_and_the_others_are_measured(tasks) -> None:
     found = []
     with pytest.raises(HeavyTopError, match="died 3 times during drift poison"):

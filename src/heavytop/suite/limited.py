@@ -34,6 +34,7 @@ _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
 _MOST_DEATHS = 3
 _LOOKED_AT = 64
+"""Tasks that wait, among which one in the format of a worker is looked for."""
 _AHEAD, _SHORT = 4, 0.25
 """Tasks of a worker, the one under way among them, where each takes fewer seconds than that; else one."""
 
