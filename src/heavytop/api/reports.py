@@ -20,7 +20,7 @@ from heavytop.document.document import row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
-from heavytop.precision import ordered, whole
+from heavytop.precision import as_integer, ordered
 from heavytop.render import export as exports
 from heavytop.render import history as over
 from heavytop.render.comparison import headline, metric_name, values
@@ -104,7 +104,7 @@ class Comparison(Tabular, comparing.Differences):
         """The page of `compare --html`, with both reports on the same axes; their rows are read for it."""
         from heavytop.render.page import comparison_page
 
-        old, new = (store.whole(report) for report in self.reports)
+        old, new = (store.full_report(report) for report in self.reports)
         return comparison_page(old, new, self, KINDS)
 
     def to_junit(self) -> str:
@@ -196,7 +196,7 @@ def run(
         resume=bool(arguments.flag(resume, "resume")),
         workers=workers,
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
-        seed=whole(seed, "seed"),
+        seed=as_integer(seed, "seed"),
         integrator=_integrator(integrator),
         with_parquet=bool(arguments.flag(parquet, "parquet")),
         row_timeout=row_timeout,

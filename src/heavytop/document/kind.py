@@ -27,7 +27,7 @@ class ReportedKind(Protocol):
     noise_factor: float | None = None
     largest_amplification: float = math.inf
     samples_are_steps: bool = False
-    may_give_up: str = ""
+    may_end_early: str = ""
     may_overflow: bool = False
     place: int = 0
 

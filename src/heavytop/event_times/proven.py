@@ -26,7 +26,15 @@ from typing import Any, NamedTuple
 from flint import arb, arb_poly
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
-from heavytop.event_times.functions import EventFunction, by_omega, composed, first_term, rate_along, terms_of, turned
+from heavytop.event_times.functions import (
+    EventFunction,
+    by_omega,
+    composed,
+    first_term,
+    in_body_axes,
+    rate_along,
+    terms_of,
+)
 from heavytop.exact.bodies import Resolved
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import Step
@@ -198,8 +206,8 @@ def proven_events(
     cannot decide whether there is an event.
     """
     wanted = ceil(digits * log2(10)) + _GUARD_BITS
-    axes = None if resolved is None or not resolved.turned else resolved.axes
-    inner = function if axes is None else turned(function, axes)
+    axes = None if resolved is None or not resolved.is_rotated else resolved.axes
+    inner = function if axes is None else in_body_axes(function, axes)
     order, sign = (0, 0) if solution.uncertainty is not None else _begins(solution, inner)
     undecided: _Undecided | None = None
     for attempt in range(_ATTEMPTS):

@@ -63,22 +63,22 @@ class ChosenIntegrator:
         return self.source or self.name
 
     @property
-    def can(self) -> Integrator:
+    def capabilities(self) -> Integrator:
         """What it can do."""
         return FAULTS[self.fault].integrator if self.fault else described(self.which)
 
     @property
     def supports_ensemble(self) -> bool:
         """Whether many motions go side by side, which makes each cheap."""
-        return bool(self.can.ensemble)
+        return bool(self.capabilities.ensemble)
 
     @property
     def carries_attitude(self) -> bool:
         """Whether it declares that ξ rides along; not one that cannot be used."""
         if isinstance(self.source, Command):
             return self.source.attitude
-        if self.can.own:
-            return self.can.attitude
+        if self.capabilities.own:
+            return self.capabilities.attitude
         try:
             peer: Any = registry.ready(self.which)
         except (InputError, PeerFailed):
@@ -96,7 +96,7 @@ class ChosenIntegrator:
         *,
         xi: Sequence[Fraction] | None = None,
         again: bool = True,
-        **going_on: Any,
+        **resume: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
@@ -108,17 +108,19 @@ class ChosenIntegrator:
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
-            spoilt: Trajectory = load(self.can.propagate)(top, start, times, precision, system=system, observer=watch)
+            spoilt: Trajectory = load(self.capabilities.propagate)(
+                top, start, times, precision, system=system, observer=watch
+            )
             return spoilt
-        if self.can.streams:
+        if self.capabilities.streams:
             call = registry.propagator(self.name, {})
-            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **going_on)
+            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
             peer = registry.ready(self.which, self.setting)
             beside = {} if xi is None else {"xi": xi}
             run = peer(top, start, times, precision, system=system, **beside)
-            if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
+            if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
                 require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
         except Unsupported:
             raise
@@ -167,7 +169,9 @@ class ChosenIntegrator:
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
     ) -> tuple[Trajectory, list[TaylorStep]]:
         """As :func:`heavytop.integrate.heyoka.motions.first_steps`, where its steps are exposed."""
-        found: tuple[Trajectory, list[TaylorStep]] = load(self.can.steps)(top, start, until, precision, system=system)
+        found: tuple[Trajectory, list[TaylorStep]] = load(self.capabilities.steps)(
+            top, start, until, precision, system=system
+        )
         return found
 
 

@@ -296,7 +296,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
