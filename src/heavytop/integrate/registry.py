@@ -179,9 +179,9 @@ INTEGRATORS = {
         _peer("heyoka:lanes", "heyoka_taylor:lanes"),
         Integrator(
             "multiword",
-            f"{_HERE}.multiword.motions:propagate_words",
+            f"{_HERE}.multiword.motions:propagate_multiword",
             _EVERY,
-            ensemble=f"{_HERE}.multiword.lanes:propagate_words_ensemble",
+            ensemble=f"{_HERE}.multiword.lanes:propagate_multiword_ensemble",
             attitude=True,
             streams=True,
         ),

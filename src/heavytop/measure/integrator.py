@@ -101,7 +101,7 @@ class ChosenIntegrator:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
-        package is made twice, to see whether it is the same.  going_on: place and mark as in
+        package is made twice, to see whether it is the same.  resume: place and mark as in
         :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
