@@ -37,6 +37,8 @@ Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0)]
+UNRESOLVED_SECONDS = "unresolved"
+"""Of the seconds of a row: how many are resolved at least, where its own are fewer."""
 MetricKind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 

@@ -27,6 +27,7 @@ from heavytop.records import (
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNMEASURED,
+    UNRESOLVED_SECONDS,
     UNSUPPORTED,
     Against,
     Metric,
@@ -201,7 +202,7 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
-    """Seconds by their own rule."""
+    """Seconds of an integrator by the ratio that is allowed, above the floor."""
     if not (math.isfinite(old) and math.isfinite(new)):
         return Verdict.INCOMPARABLE, "no finite time"
     ratio = max(new, timings.floor) / max(old, timings.floor)
@@ -235,13 +236,16 @@ def judge_repeated(
     if not all(math.isfinite(seconds) for each in (old, new) for seconds in each.values()):
         yield "run", (Verdict.INCOMPARABLE, "no finite time")
         return
-    if old[BAND] > _WIDEST:
+    resolved = old.get(UNRESOLVED_SECONDS, 0.0), new.get(UNRESOLVED_SECONDS, 0.0)
+    if all(resolved):
+        return
+    if old[BAND] > _WIDEST and not resolved[0]:
         yield BAND, (Verdict.INCOMPARABLE, f"runs of the baseline scatter by a factor of {10 ** (2 * old[BAND]):.2g}")
         return
-    allowed = max(math.log10(ratio), noise * math.sqrt(2) * old[BAND])
+    allowed = max(math.log10(ratio), noise * math.sqrt(2) * (0.0 if resolved[0] else old[BAND]))
     for name in ("run", "least"):
-        yield name, _apart(old.get(name, 0.0), new[name], allowed)
-    if new[BAND] > _WIDEST:
+        yield name, _apart(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed)
+    if new[BAND] > _WIDEST and not resolved[1]:
         yield BAND, (Verdict.INCOMPARABLE, f"its runs scatter by a factor of {10 ** (2 * new[BAND]):.2g}")
 
 

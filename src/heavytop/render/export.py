@@ -26,7 +26,7 @@ from heavytop.document.document import Block, Card, Cell, Headline, In, Note, Ta
 from heavytop.document.kind import Kinds, document, headlines, kind_of
 from heavytop.errors import InputError, quoted
 from heavytop.measure.scalar import digits_kept
-from heavytop.records import UNSUPPORTED, Quantity, Report, Row
+from heavytop.records import UNRESOLVED_SECONDS, UNSUPPORTED, Quantity, Report, Row
 from heavytop.render import FORMATS
 from heavytop.render.comparison import headline, metric_name, values
 from heavytop.render.text import drifts, failed
@@ -71,7 +71,8 @@ def measures(row: Row) -> Iterator[Measure]:
         if law.exponent is not None:
             yield Measure(f"exponent of {name}", law.exponent, "exponent", law.low, law.high)
     if "run" in row.seconds:
-        yield Measure("seconds", row.seconds.get("least", row.seconds["run"]), "s")
+        seconds = max(row.seconds.get("least", row.seconds["run"]), row.seconds.get(UNRESOLVED_SECONDS, 0.0))
+        yield Measure("seconds", seconds, "s")
 
 
 def export(report: Report, to: str, kinds: Kinds) -> str:

@@ -16,7 +16,7 @@ from msgspec.structs import replace as replace_struct
 from heavytop.comparison.compare import Differences
 from heavytop.comparison.findings import Change, folded, line, statistics
 from heavytop.comparison.rows import Finding
-from heavytop.comparison.work_precision import ERRORS, leads, panels, seconds_text
+from heavytop.comparison.work_precision import ERRORS, leads, panels
 from heavytop.document.document import (
     Card,
     Cell,
@@ -437,7 +437,7 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
         return None
     point, case, label = min(best, key=lambda each: each[0].log10)
     said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {seconds_text(point.seconds)}.")
+    return Headline(f"{said}, in {point.takes()}.")
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:
