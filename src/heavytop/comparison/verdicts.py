@@ -24,6 +24,7 @@ from heavytop.precision import exact, log10
 from heavytop.records import (
     CONTRADICTION,
     FAILED,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNMEASURED,
@@ -266,6 +267,8 @@ def _apart(old: float, new: float, allowed: float) -> Judged:
 SUCCESS = "success"
 _NO_INTEGRATORS = (OUT_OF_REACH, CONTRADICTION, UNSUPPORTED)
 """Outcomes that say nothing of what is measured: of its reference, or of what it declares that it cannot do."""
+_TOO_LONG = {OUT_OF_TIME, NOT_ASKED}
+"""Outcomes of an integrator that does not end; how many workers there are decides which of its rows are asked."""
 
 
 def ended(row: Row, which: str) -> str:
@@ -288,12 +291,14 @@ def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
         if row.outcome in _NO_INTEGRATORS:
             return Verdict.INCOMPARABLE, ended(row, which)
     if before == SUCCESS:
-        return Verdict.WORSE, ended(new, "candidate")
+        return (Verdict.INCOMPARABLE if after == NOT_ASKED else Verdict.WORSE), ended(new, "candidate")
     if after == SUCCESS:
         return Verdict.BETTER, f"it reaches its horizon, and {ended(old, 'baseline')}"
+    if {before, after} <= _TOO_LONG:
+        return Verdict.SAME, "out of time in both reports"
     if before != after:
         return Verdict.INCOMPARABLE, f"{ended(old, 'baseline')}, {ended(new, 'candidate')}"
-    if before in (FAILED, OUT_OF_TIME):
+    if before == FAILED:
         return Verdict.SAME, "failed in both reports"
     return _reached(old, new, duration)
 
