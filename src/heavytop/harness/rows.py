@@ -13,7 +13,16 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 
 from heavytop.cases import Case
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
+from heavytop.errors import (
+    Contradiction,
+    HeavyTopError,
+    InputError,
+    NotAsked,
+    OutOfReach,
+    OutOfTime,
+    PeerFailed,
+    Unsupported,
+)
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
@@ -28,6 +37,7 @@ from heavytop.records import (
     EXACT,
     FAILED,
     FINEST,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNSUPPORTED,
@@ -224,6 +234,7 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
     PeerFailed: FAILED,
     Unsupported: UNSUPPORTED,
     OutOfTime: OUT_OF_TIME,
+    NotAsked: NOT_ASKED,
 }
 
 

@@ -30,7 +30,7 @@ from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
 from heavytop.precision import Array, OrderedRing, Precision, decimal_text, exact
-from heavytop.records import Law, Metric, Quantity, Series
+from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -253,6 +253,7 @@ def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list
         runs.append(run(len(runs) + 1))
     spent = [each.seconds["run"] for each in runs]
     figures = {"run": median(spent), "least": min(spent), "repeats": float(len(spent))}
+    figures |= next(({key: each.seconds[key]} for each in runs if (key := UNRESOLVED_SECONDS) in each.seconds), {})
     if how.band and len(spent) > 1 and min(spent) > 0:
         low, high = numpy.quantile(numpy.log10(spent), [0.025, 0.975])
         figures["band"] = round(float(high - low) / 2, 4)

@@ -238,9 +238,9 @@ def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
     cells = []
     for line in lines:
         best = line.best
-        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", line.takes(best.seconds)]
         at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
-        found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+        found += ["-" if seconds is None else line.takes(seconds) for seconds in at]
         cells.append([line.label, *found, str(len(line.failures) or "")])
     columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "aborted"]
     return Cells(title, columns, cells)

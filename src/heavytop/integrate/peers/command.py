@@ -20,7 +20,7 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from pathlib import Path
 from threading import Lock
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -31,6 +31,8 @@ from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.processes import stopwatch
+from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
@@ -57,6 +59,8 @@ _MOST_OVERHEAD = 1e-3
 """Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
 _LEAST_SHARE = 0.1
 """Of the seconds of a request, which remain at least: less than its noise is not measured."""
+_RESOLUTION = 1e-4
+"""Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _OF_STATES = b"0123456789+-.eE \tsta"
 """The characters of lines of states in decimal."""
@@ -188,7 +192,7 @@ class CommandIntegrator:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
-        spent = {"compile": 0.0, "run": seconds}
+        spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
         own = reply.counts.get("seconds")
         return Trajectory(
             problem,
@@ -487,9 +491,9 @@ class Session:
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
-        began = perf_counter()
+        seconds = stopwatch(self.process.pid)
         self._exchange(text, reply, "done")
-        reply.wall = perf_counter() - began
+        reply.wall = seconds()
         return reply
 
     def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.features.work_precision.curves import ERRORS, leads, panels, seconds_text
+from heavytop.features.work_precision.curves import ERRORS, leads, panels
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
@@ -437,7 +437,7 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
         return None
     point, case, label = min(best, key=lambda each: each[0].log10)
     said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {seconds_text(point.seconds)}.")
+    return Headline(f"{said}, in {point.takes()}.")
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:
