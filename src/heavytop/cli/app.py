@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.output import printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ExitCode, InputError, quoted
 
 app = typer.Typer(
     help="Measure how wrong computed and claimed motions of a heavy top are, against references that are proven.",
@@ -192,4 +192,4 @@ def docs(
         show_on_terminal(Markdown(page(topic)))
     else:
         print(page(topic), end="")
-    return 0
+    return ExitCode.GOOD

@@ -15,7 +15,7 @@ import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode, InputError
 from heavytop.files import replace
 
 if TYPE_CHECKING:
@@ -315,7 +315,7 @@ def propagate(
         return motion_text(motion, shown)
 
     asked.write(motion.to_json, table, text, asked.events(_PROPAGATE_SECONDS, precision=precision, **settings))
-    return 0 if motion.complete else 3
+    return ExitCode.GOOD if motion.complete else ExitCode.INCOMPLETE
 
 
 @command
@@ -356,7 +356,7 @@ def reference(
         return reference_text(found, shown)
 
     asked.write(lambda: found.document(asked.outputs), table, text, asked.events(_REFERENCE_SECONDS, digits=digits))
-    return 0
+    return ExitCode.GOOD
 
 
 def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:

@@ -13,7 +13,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode, InputError
 from heavytop.features.survey.gathered import DATA, FILE, command
 from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
@@ -219,9 +219,9 @@ class Differences:
         return "better" if Verdict.BETTER in seen else "same"
 
     @property
-    def exit_code(self) -> int:
-        """0, 1 or 3, as for every command."""
-        return {"worse": 1, "incomparable": 3}.get(self.verdict, 0)
+    def exit_code(self) -> ExitCode:
+        """The exit code of `compare` and `gate`."""
+        return {"worse": ExitCode.FINDING, "incomparable": ExitCode.INCOMPLETE}.get(self.verdict, ExitCode.GOOD)
 
     def to_json(self) -> dict[str, Any]:
         """The document of `compare --json`."""
