@@ -249,7 +249,11 @@ class _Asked:
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
-    """The command with the times and the options that say which motion before its own, and the others behind."""
+    """The command with the times and the options that say which motion before its own, and the others behind.
+
+    Typer takes options from the signature of a function alone, and reads neither TypedDict nor Unpack: without one made
+    here, the 25 shared options would stand in both commands.
+    """
 
     @wraps(function)
     def with_options(times: str, **options: Any) -> int:
@@ -337,12 +341,13 @@ def reference(
     up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
     with M = IΩ; γ points up.
     """
-    from heavytop.api.motions import known
+    from heavytop.api.motions import watched_reference
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        given = asked.top, asked.start, asked.times, digits, asked.system
-        found = known(*given, told, derivatives, watch.find, effort)
+        where = asked.top, asked.start, asked.times, digits, watch.find
+        options = {"system": asked.system, "attitude": told, "derivatives": derivatives, "effort": effort}
+        found = watched_reference(*where, **options)
         found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:

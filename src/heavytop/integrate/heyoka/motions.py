@@ -83,9 +83,7 @@ class Stepper:
             distance = -distance
         if self._one_by_one or not self._largest_step or distance < 2 * self._largest_step:
             return 1
-        count = min(
-            distance / self._largest_step, CHUNK_SECONDS / self._seconds_per_step, _GROWTH * max(self.steps, 1)
-        )
+        count = min(distance / self._largest_step, CHUNK_SECONDS / self._seconds_per_step, _GROWTH * max(self.steps, 1))
         if self.step_limit is not None:
             count = min(count, self.step_limit - self.steps)
         return int(count)
