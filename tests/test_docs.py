@@ -17,11 +17,11 @@ import typer
 
 import heavytop as ht
 from heavytop.cli import app
-from heavytop.comparison import noise
+from heavytop.features.kinds import KINDS
+from heavytop.harness import plan
 from heavytop.integrate.registry import commands_in
-from heavytop.kinds import KINDS
-from heavytop.render.terminal import brief
-from heavytop.suite import plan
+from heavytop.report.compare import noise
+from heavytop.report.render.terminal import brief
 from support import from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 
@@ -268,7 +268,7 @@ def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
 
 def test_every_public_name_is_in_the_reference_once() -> None:
     told = re.findall(r"^\.\. (?:auto|py:)\w+:: (\w+)$", (DOCS / "api.md").read_text("utf-8"), re.M)
-    of_plug_ins = {"double_peer", "check_integrator", "Given", "Solved"}
+    of_plug_ins = {"double_peer", "check_integrator", "Request", "Solution"}
     assert sorted(told) == sorted([*ht.__all__, *of_plug_ins, *ht.plot.__all__])
 
 

@@ -13,8 +13,8 @@ import pytest
 import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError
-from heavytop.kinds import KINDS
-from heavytop.suite.plan import read
+from heavytop.features.kinds import KINDS
+from heavytop.harness.plan import read
 from support.midpoint import MIDPOINT
 from support.reports import rows
 
@@ -52,8 +52,8 @@ IN_SOLVE = {
     "sys.exit(0)": "called sys.exit(0)",
     "numpy.zeros(10**14)": "raised MemoryError",
     "return solve(given)": "raised RecursionError",
-    "yield [0.0] * 6": "returned a generator instead of Solved",
-    "return right(given).states": "returned a list instead of Solved",
+    "yield [0.0] * 6": "returned a generator instead of Solution",
+    "return right(given).states": "returned a list instead of Solution",
     "return Solved((x for x in right(given).states), 2.0, 5)": "returned states of object",
     "return Solved([[0.0] * 5] * 2, 2.0, 5)": "of the shape (2, 5) for 2 times",
     "return Solved(numpy.zeros((6, 2)), 2.0, 5)": "of the shape (6, 2) for 2 times",

@@ -12,7 +12,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import exact, number, real
 from heavytop.top.amplification import FOLLOWED, _path, amplification, loss, rate
@@ -95,7 +95,7 @@ def problem_of(p: Parameters, state: list[Fraction]) -> Problem:
 
 
 def follow_all(problem: Problem, times: list[Fraction]) -> list[list[Fraction]]:
-    run = follow(problem, [number(time, FINE) for time in times])
+    run = integrate_to_samples(problem, [number(time, FINE) for time in times])
     return [[exact(value) for value in state] for state in run.states]
 
 
@@ -132,7 +132,7 @@ def near_a_separatrix(seed: int) -> tuple[HeavyTop, State]:
     return HeavyTop(inertia, 0, (0, 0, 0)), State(omega, ("2/7", "3/7", "6/7"))
 
 
-@pytest.mark.parametrize("seed", (1, 2))
+@pytest.mark.parametrize("seed", [1, 2])
 def test_where_all_digits_are_said_to_be_lost_no_integrator_has_one_right(seed: int) -> None:
     top, start = near_a_separatrix(seed)
     p, until = HEAVY_TOP.parameters(top, start), Fraction(4)

@@ -1,0 +1,200 @@
+"""Arguments of the public functions, checked: each comes back as what the inner rooms take, or is an InputError."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+from heavytop.errors import InputError, quoted
+from heavytop.precision import (
+    DOUBLE,
+    Given,
+    Precision,
+    as_integer,
+    cache_last_call,
+    dot,
+    exact,
+    ordered,
+    parse,
+    physical,
+    require,
+    shown,
+    usable_tolerance,
+    vector,
+)
+from heavytop.top.bodies import Body
+from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
+
+Number: TypeAlias = Given
+"""A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""
+Numbers: TypeAlias = Iterable[Any]
+"""A list, a tuple or an array of :data:`Number`; type checkers take lists of several kinds for lists of anything."""
+
+SLACK_BITS = 8
+"""|γ|² and |ξ|² may be off 1, and ξ·γ off 0, by so many bits of the rounding of what was given as floats."""
+_MOST = 10**18
+"""A count beyond it is no limit."""
+_TYPES = "Give heavytop.HeavyTop(inertia, weight, centre) and heavytop.State(omega, gamma)."
+_Kind = TypeVar("_Kind", HeavyTop, State)
+
+
+def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
+    """``value``, which must be of that kind."""
+    if not isinstance(value, kind):
+        raise InputError(f"{what} = {quoted(value)} is not a {kind.__name__}.", _TYPES)
+    return value
+
+
+def motion(
+    top: object, start: object, precision: Precision = DOUBLE, *, of_any_size: bool = False
+) -> tuple[HeavyTop | Body, State]:
+    """A top, or a body, and a start that it can have.
+
+    of_any_size: for what computes with exact numbers alone, which no format bounds.
+    Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
+    ``precision`` explains.
+    """
+    return _checked(top, start, precision, of_any_size)
+
+
+@cache_last_call
+def _checked(top: object, start: object, precision: Precision, of_any_size: bool) -> tuple[HeavyTop | Body, State]:
+    body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
+    state = is_a(start, State, "start")
+    if not of_any_size:
+        require_physical(body.top if isinstance(body, Body) else body, state)
+    return body, state.require_unit_gamma(slack_of(precision))
+
+
+def slack_of(precision: Precision) -> Fraction:
+    """What rounding of the data may make of 1 or 0: that of double at least, whatever the format of the run."""
+    return max(precision.eps, DOUBLE.eps) * (1 << SLACK_BITS)
+
+
+def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
+    """The system, or the one of that name; for None heavy_gyrostat where a top has a rotor, else heavy_top.
+
+    Raises InputError for a system that does not know the rotor of a top.
+    """
+    if not (value is None or isinstance(value, str) or any(value is known for known in SYSTEMS)):
+        raise InputError(f"system = {quoted(value)} is none.", f"Give {WHICH_SYSTEM}, as text.")
+    return system_of(value, *tops)
+
+
+def precision(value: Precision | str) -> Precision:
+    """The format, or the one of that name; raises InputError for one that is not there, on this platform or at all."""
+    if not isinstance(value, Precision):
+        return require(parse(value))
+    found = require(parse(value.name))
+    if found != value:
+        raise InputError(f"Unknown precision {quoted(value)}.", "Use DOUBLE, EXTENDED, QUAD or real(BITS).")
+    return found
+
+
+def any_times(values: Numbers) -> list[Fraction]:
+    """Exact times in any order, at least one."""
+    found = [physical(exact(value), "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")]
+    if not found:
+        raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
+    return found
+
+
+def attitude(xi: Numbers | None, start: State, form: Precision) -> tuple[Fraction, ...] | None:
+    """ξ: a unit vector ⟂ γ but for rounding; raises InputError for any other."""
+    if xi is None:
+        return None
+    found = vector(xi, "xi")
+    slack = slack_of(form)
+    for value, what in ((dot(found, found) - 1, "|xi|^2 - 1"), (dot(found, start.gamma), "xi·gamma")):
+        if abs(value) > slack:
+            size = float(value) if abs(value) < 10**300 else float("inf")
+            raise InputError(
+                f"{what} = {size:.6g}.", "Give a unit vector perpendicular to gamma: xi is the space axis x."
+            )
+    return found
+
+
+def tolerance(value: Number | None, form: Precision) -> Fraction | None:
+    """An exact tolerance from the eps of the format to 1, or None for eps."""
+    return None if value is None else usable_tolerance(value, form)
+
+
+def count(value: int | None, what: str) -> int | None:
+    """A positive integer, or None."""
+    if value is None:
+        return None
+    found = as_integer(value, what)
+    if found < 1:
+        raise InputError(f"{what} = {quoted(found)} allows nothing.", "Give 1 or more, or None for no limit.")
+    return min(found, _MOST)
+
+
+def steps(value: int | None) -> int | None:
+    """A limit of steps, or None."""
+    found = None if value is None else as_integer(value, "step_limit")
+    if found is not None and found < 1:
+        raise InputError(f"step_limit = {quoted(found)} allows no step.", "Give 1 or more.")
+    return None if found is None else min(found, _MOST)
+
+
+def limit(value: Number | None, what: str) -> str | None:
+    """A number of a policy as text, or None."""
+    if value is None:
+        return None
+    found = physical(exact(value), what)
+    return shown(found) if found == 0 or abs(found) > Fraction(1, 10**150) else "0"
+
+
+def flag(value: bool | None, what: str) -> bool | None:
+    """A bool, or None."""
+    if value is not None and not isinstance(value, bool):
+        raise InputError(f"{what} = {quoted(value)} is not a bool.", "Give True or False.")
+    return value
+
+
+_Call = TypeVar("_Call", bound=Callable[..., object])
+
+
+def callback(value: _Call | None, what: str) -> _Call | None:
+    """Something to call, or None."""
+    if value is not None and not callable(value):
+        raise InputError(f"{what} = {quoted(value)} cannot be called.", "Give a function, or None.")
+    return value
+
+
+def path(value: str | os.PathLike[str], what: str) -> Path:
+    """A path."""
+    try:
+        found = Path(value)
+        found.exists()
+        if "\0" in str(found):
+            raise ValueError
+    except (OSError, TypeError, ValueError):  # no path, or one that no file can have
+        raise InputError(f"{what} = {quoted(value)} is not a path.", "Give text or a pathlib.Path.") from None
+    return found
+
+
+def text(value: object, what: str) -> str:
+    """Text."""
+    if not isinstance(value, str):
+        raise InputError(f"{what} = {quoted(value)} is not text.", "Give a str.")
+    return value
+
+
+def listed(values: object, kind: type[_Kind], what: str) -> Sequence[_Kind]:
+    """One start or another thing, or several, as a sequence."""
+    if isinstance(values, kind):
+        return [values]
+    return [is_a(value, kind, f"{what}[{i}]") for i, value in enumerate(ordered(values, what, _TYPES))]
+
+
+def bodies(values: object, what: str) -> Sequence[HeavyTop | Body]:
+    """One top or body, or several, as a sequence."""
+    if isinstance(values, HeavyTop | Body):
+        return [values]
+    listed = ordered(values, what, _TYPES)
+    return [v if isinstance(v, Body) else is_a(v, HeavyTop, f"{what}[{i}]") for i, v in enumerate(listed)]

@@ -1,0 +1,429 @@
+"""The contract of an integrator, gone through: what it must answer to odd and to plain requests, in plain sentences.
+
+Nothing is scored here: that an answer is right to 5 % is all that is asked of its accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+from typing import Any, Literal
+
+import msgspec
+
+from heavytop.cases import CASES
+from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
+from heavytop.integrate import registry
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.peers.command import Command, ProgramRequest, Session, begin_row, close_all, session
+from heavytop.integrate.peers.contract import said
+from heavytop.integrate.registry import IntegratorSource
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
+from heavytop.processes import GuardedProcess
+from heavytop.top.attitude import perpendicular
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.equations import system as system_named
+from heavytop.top.heavy_top import HeavyTop, State
+
+_PATIENCE = 60
+"""Seconds of one request, at most; a shorter timeout of the integrator's own counts."""
+_FAREWELL = 2.0
+_OFF = 0.05
+"""An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
+_ATTITUDE_TIMES = (Fraction(1, 4), Fraction(1), Fraction(3, 2), Fraction(2))
+_AS_RIGHT = 100
+"""How many times as large the error of a motion back in time may be as that of its mirror image."""
+_RESTART = 1000
+"""eps by which a run that stops and goes on may differ."""
+_HUGE = 10**150
+_CASES = {"heavy_top": "generic", "gyrostat": "gyrostat", "heavy_gyrostat": "heavy-gyrostat"}
+
+Verdict = Literal["kept", "violated", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One part of the contract: its name, whether it is kept, and what was found, in a sentence."""
+
+    check: str
+    verdict: Verdict
+    text: str
+
+
+def check(which: str | IntegratorSource) -> list[Checked]:
+    """Every part of the contract of a third-party integrator, or one that is named.
+
+    A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
+    Raises InputError for an unknown integrator.
+    """
+    registry.require(which)
+    if isinstance(which, Command):
+        limit = min(which.seconds, _PATIENCE)
+        try:
+            return list(_Contract(msgspec.structs.replace(which, timeout=str(limit))).checks())
+        finally:
+            close_all()
+    process = GuardedProcess()
+    try:
+        return list(_in_child(process, which))
+    finally:
+        process.end()
+
+
+def _in_child(process: GuardedProcess, which: str | IntegratorSource) -> Iterator[Checked]:
+    """Each part in the process; where one does not come back, what was found before it stands."""
+    for place, (name, _) in enumerate(_Contract(which).parts()):
+        seconds = _PATIENCE_OF.get(name, _PATIENCE)
+        ended = True
+        try:
+            future = process.submit(_part, which, place)
+            # an interrupt that comes from the child was raised by the integrator
+            error = future.exception(timeout=seconds)
+            if error is None:
+                found, ended = future.result(), False
+            elif isinstance(error, HeavyTopError | BrokenProcessPool):
+                raise error
+            else:
+                cause = ": ".join(filter(None, (type(error).__name__, said(error))))
+                found = Checked(name, "violated", f"It left its process by {cause}.")
+        except TimeoutError:
+            process.kill()
+            text = f"It does not answer within {seconds} s; its process was ended."
+            found = Checked(name, "note" if name == _TOO_FAST else "violated", text)
+        except BrokenProcessPool:
+            found = Checked(name, "violated", "It ended its whole process.")
+        yield found
+        if found.verdict == "violated" and (ended or place < _FIRST):
+            yield _NOTHING_ELSE
+            return
+
+
+def _part(which: str | IntegratorSource, place: int) -> Checked:
+    """That part of the contract."""
+    begin_row()
+    return _judged(*_Contract(which).parts()[place])
+
+
+_NOTHING_ELSE = Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
+_FIRST = 2
+"""Parts that nothing works without."""
+_TOO_FAST = "huge"
+_PATIENCE_OF = {_TOO_FAST: 10}
+"""Seconds of single parts: the motion that is too fast to follow, where no program answers that it is."""
+
+
+class _Violated(Exception):
+    """What is wrong, as a sentence."""
+
+
+class _Note(Exception):
+    """What is worth saying and no violation."""
+
+
+class _Contract:
+    """The checks of one integrator, each a method that returns what it found or raises what is wrong."""
+
+    def __init__(self, which: str | IntegratorSource) -> None:
+        self.which = which
+        self.program = which if isinstance(which, Command) else None
+        names = [each for each in self.program.precisions if each != "real:BITS"] if self.program else []
+        self.precisions = [parse(each) for each in names] or [DOUBLE]
+        if self.program and "real:BITS" in self.program.precisions:
+            self.precisions = [*(self.precisions if names else []), real(237)]
+        self.precision = self.precisions[0]
+        self.systems = [each for each in (self.program.systems if self.program else ("heavy_top",)) if _case(each)]
+        self.backward_only = bool(self.program) and "forward" not in (self.program.directions if self.program else ())
+        case = CASES[_case(self.systems[0])] if self.systems else CASES["generic"]
+        self.top, self.start, self.system = case.top, case.start, case.system
+
+    def checks(self) -> Iterator[Checked]:
+        """Each part; where one of the first is violated by a program that does not start, no other is tried."""
+        for place, (name, part) in enumerate(self.parts()):
+            begin_row()
+            found = _judged(name, part)
+            yield found
+            if found.verdict == "violated" and place < _FIRST:
+                yield _NOTHING_ELSE
+                return
+
+    def parts(self) -> list[tuple[str, Callable[[], str]]]:
+        """The name of each part, and what tries it."""
+        parts: list[tuple[str, Callable[[], str]]] = [
+            ("start", self._starts),
+            ("one time", self._one_time),
+            ("times [0]", self._start_alone),
+            ("times [0, 1]", self._start_and_one),
+            ("many times", self._many),
+            ("digits", self._digits),
+            ("determinism", self._same_twice),
+            ("restart", self._restart),
+            ("backwards", self._backwards),
+            ("rest", self._rest),
+            ("steps", self._steps),
+            ("attitude", self._attitude),
+            *((f"format {each.name}", self._format(each)) for each in self.precisions[1:]),
+            *((f"system {each}", self._of_system(each)) for each in self.systems[1:]),
+        ]
+        if self.program:
+            parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
+        parts.append((_TOO_FAST, self._huge))
+        return parts + ([("quit", self._quit), ("end of input", self._end_of_input)] if self.program else [])
+
+    def _run(
+        self,
+        times: Sequence[int | Fraction],
+        start: State | None = None,
+        top: HeavyTop | None = None,
+        precision: Precision | None = None,
+        system: System | None = None,
+        **more: Any,
+    ) -> Trajectory:
+        sign = -1 if self.backward_only else 1
+        asked = [sign * Fraction(time) for time in times]
+        about = (top or self.top, start or self.start, asked, precision or self.precision)
+        run = registry.ready(self.which)(*about, system=system or self.system, **more)
+        if run.outcome is not Outcome.SUCCESS:
+            raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
+        return run
+
+    def _starts(self) -> str:
+        if self.program is None:
+            registry.peer(self.which)
+            return "It can be called."
+        with session(self.program) as program:
+            greeting = program.greeting
+        if len(greeting.split()) < 2:
+            raise _Note(f"It says ready {greeting}".rstrip() + " without a version: ready NAME VERSION.")
+        return f"It says that it is {greeting}."
+
+    def _one_time(self) -> str:
+        return self._right(self._run([1]), "At t = 1 it")
+
+    def _start_alone(self) -> str:
+        self._is_start(self._run([0]).states[0])
+        return "Asked for t = 0 it gives the start."
+
+    def _start_and_one(self) -> str:
+        run = self._run([0, 1])
+        self._is_start(run.states[0])
+        return self._right(run, "Asked for t = 0 and 1 it")
+
+    def _many(self) -> str:
+        return self._right(self._run([Fraction(i, 500) for i in range(1, 1001)]), "At 1000 times up to t = 2 it")
+
+    def _digits(self) -> str:
+        values = [exact(value) for state in self._run([1, 2, 3]).states for value in state]
+        for digits in range(1, self.precision.digits - 1):
+            if all(rounded(Fraction(decimal_text(v, digits)), self.precision) == v for v in values):
+                wanted = self.precision.digits
+                raise _Violated(f"Its numbers have {digits} significant digits: {self.precision.name} takes {wanted}.")
+        for bits in (24, 53, 64):
+            if bits < self.precision.bits and all(round_to(value, bits) == value for value in values):
+                raise _Violated(f"Its numbers have {bits} bits, those of {self.precision.name} {self.precision.bits}.")
+        return "Its numbers have all the digits of the format."
+
+    def _same_twice(self) -> str:
+        first, second = (self._run([1, 2]).texts() for _ in range(2))
+        if first != second:
+            raise _Violated("The same request twice gives two answers: it keeps something, or depends on the clock.")
+        return "The same request twice gives the same bits."
+
+    def _restart(self) -> str:
+        if self.system is GYROSTAT:
+            raise _Note(f"Not tried: a {self.system.name} does not start anew from rounded data.")
+        whole, half = self._run([2]), self._run([1])
+        values = [exact(value) for value in half.states[-1]]
+        again = self._run([1], State(values[:3], values[3:]), half.problem.top, system=self.system)
+        off = _distance(whole.states[-1], again.states[-1])
+        if off > _RESTART * self.precision.eps:
+            times = decimal_text(off / self.precision.eps, 2)
+            raise _Violated(f"A run to t = 2 and one that starts anew at t = 1 differ by {times} eps.")
+        return f"A run that starts anew at t = 1 ends as one that does not, within {_RESTART} eps."
+
+    def _backwards(self) -> str:
+        if self.program and set(self.program.directions) != {"forward", "backward"}:
+            return f"It declares {self.program.directions[0]} alone."
+        back = self._run([-1])
+        found = self._right(back, "At t = -1 it")
+        if self.system is HEAVY_TOP:
+            self._require_as_right(back)
+        return found
+
+    def _require_as_right(self, back: Trajectory) -> None:
+        """The heavy top is reversible: from (−Ω, γ) forwards is the same motion, and a method as right on it."""
+        ahead = self._run([1], State([-w for w in self.start.omega], self.start.gamma))
+        (known,) = propagate(self.top, self.start, list(back.times), DOUBLE, system=self.system).states
+        mirrored = [sign * exact(value) for sign, value in zip((-1, -1, -1, 1, 1, 1), ahead.states[-1], strict=True)]
+        off, other = _distance(back.states[-1], known), _distance(mirrored, known)
+        if off > _RESTART * self.precision.eps + _AS_RIGHT * other:
+            raise _Violated(
+                f"At t = -1 it is off by {decimal_text(off, 2)}, and from (−Ω, γ) forwards, which is the same motion, "
+                f"by {decimal_text(other, 2)}: its steps back in time are wrong."
+            )
+
+    def _rest(self) -> str:
+        top = HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))
+        run = self._run([1, 10], State((0, 0, 0), (0, 0, 1)), top, system=HEAVY_TOP)
+        off = max(_distance(state, (0, 0, 0, 0, 0, 1)) for state in run.states)
+        if off > _RESTART * self.precision.eps:
+            raise _Violated(f"A top at rest moves by {decimal_text(off, 2)} until t = 10.")
+        return "A top at rest stays at rest."
+
+    def _steps(self) -> str:
+        run = self._run([Fraction(1, 2), 2])
+        if run.flags.get("steps") == "not counted":
+            return "It does not count its steps, so single steps are not measured."
+        if run.steps == 0:
+            raise _Violated("It moves, and says that it took no step.")
+        step = run.flags.get("step")
+        if step is not None and self.program:
+            size = exact(step) if "x" not in step else Fraction(1, 100)
+            wanted = ceil(Fraction(1, 2) / size) + ceil(Fraction(3, 2) / size)
+            if abs(run.steps - wanted) > 2:
+                raise _Violated(f"It counts {run.steps} steps to t = 2, where steps of {step} are {wanted}.")
+        return f"It counts its steps: {run.steps} to t = 2."
+
+    def _format(self, precision: Precision) -> Callable[[], str]:
+        return lambda: self._right(self._run([1], precision=precision), f"In {precision.name} it")
+
+    def _of_system(self, name: str) -> Callable[[], str]:
+        case = CASES[_case(name)]
+        return lambda: self._right(
+            self._run([1], case.start, case.top, system=system_named(name)), f"As a {name} it", case
+        )
+
+    def _attitude(self) -> str:
+        if not ChosenIntegrator.of(self.which).carries_attitude:
+            return (
+                "It carries Ω and γ alone: it does not declare that it carries the attitude, and is not asked for it."
+            )
+        xi = perpendicular(self.start.gamma)
+        run = self._run(_ATTITUDE_TIMES, xi=xi)
+        known = propagate(self.top, self.start, list(run.times), DOUBLE, system=self.system, xi=xi)
+        for time, state, true in zip(run.times, run.states, known.states, strict=True):
+            off = _distance(state, true)
+            if off > _OFF:
+                raise _Violated(
+                    f"With the attitude its state at t = {decimal_text(time, 6)} is off by {decimal_text(off, 2)}."
+                )
+        return "It carries the attitude."
+
+    def _unknown_lines(self) -> str:
+        assert self.program is not None
+        request = _Extended(self._problem(), [exact(Fraction(1))], self._default(), self.program.hex)
+        try:
+            with session(self.program) as program:
+                reply = program.ask(request)
+                if reply.failure:
+                    raise PeerFailed(reply.failure)
+        except PeerFailed as error:
+            raise _Violated(f"It does not ignore a line that it does not know: {error.cause}.") from None
+        return "It ignores lines that it does not know."
+
+    def _two_at_once(self) -> str:
+        assert self.program is not None
+        alone = [list(state) for state in self._run([1, 2]).states]
+        sign = -1 if self.backward_only else 1
+        request = ProgramRequest(
+            self._problem(), [Fraction(sign), Fraction(2 * sign)], self._default(), self.program.hex
+        )
+        both = [Session(self.program) for _ in range(2)]
+        try:
+            with ThreadPoolExecutor(2) as threads:
+                found = list(threads.map(lambda each: each.ask(request), both))
+        finally:
+            for each in both:
+                each.close()
+        if any([list(state) for state in reply.states] != alone for reply in found):
+            raise _Violated("Two of its processes at once do not answer as one alone: they share something.")
+        return "Two of its processes at once answer as one alone."
+
+    def _huge(self) -> str:
+        start = State((_HUGE, 0, 0), (0, 0, 1))
+        try:
+            self._run([1], start, HeavyTop((3, 2, 1), 1, (0, 0, "1/2")), system=HEAVY_TOP)
+        except (_Violated, PeerFailed, InputError) as error:
+            if self.program and isinstance(error, PeerFailed) and not error.answered:
+                raise
+            raise _Note(f"At |Ω| = 1e150 it gives no finite state: {_cause(error)}") from None
+        return "At |Ω| = 1e150 it gives finite numbers."
+
+    def _quit(self) -> str:
+        return self._ended_by(b"quit\n", "quit")
+
+    def _end_of_input(self) -> str:
+        return self._ended_by(b"", "the end of its input")
+
+    def _ended_by(self, text: bytes, what: str) -> str:
+        assert self.program is not None
+        program = Session(self.program)
+        try:
+            ended = program.ends_after(text, _FAREWELL)
+        finally:
+            program.close()
+        if not ended:
+            raise _Violated(f"It does not end within {_FAREWELL:g} s of {what}; its process was killed.")
+        return f"It ends at {what}."
+
+    def _problem(self) -> Problem:
+        return Problem.of(self.top, self.start, self.precision, self.system)
+
+    def _default(self) -> Fraction | None:
+        assert self.program is not None
+        return self.program.load().default(self.precision)
+
+    def _is_start(self, state: Sequence[Any]) -> None:
+        if tuple(map(exact, state)) != self._problem().start.flat:
+            raise _Violated("At t = 0 it does not give the start that it was given, bit for bit.")
+
+    def _right(self, run: Trajectory, subject: str, case: Any = None) -> str:
+        top, start = (self.top, self.start) if case is None else (case.top, case.start)
+        known = propagate(top, start, list(run.times), DOUBLE, system=run.problem.system)
+        pairs = zip(run.times, run.states, known.states, strict=True)
+        time, off = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda each: each[1])
+        if off > _OFF:
+            raise _Violated(
+                f"{subject} is off by {decimal_text(off, 2)} at t = {decimal_text(time, 3)}: "
+                "look at the order of the components, at the signs and at how the parameters are read."
+            )
+        return f"{subject} is right to {decimal_text(off, 2)}." if off else f"{subject} is right to the last bit."
+
+
+class _Extended(ProgramRequest):
+    """A request with a line that no program knows."""
+
+    def text(self, label: int) -> bytes:
+        return super().text(label).replace(b"\ngo\n", b"\nunknown-to-version-1 1 2 3\ngo\n")
+
+
+def _case(system: str) -> str:
+    """The case in which a system is tried; "" for one that this program does not have."""
+    return _CASES.get(system, "")
+
+
+def _distance(state: Sequence[Any], other: Sequence[Any]) -> Fraction:
+    """The largest component of the difference, in units of the largest component."""
+    pairs = [(exact(a), exact(b)) for a, b in zip(state, other, strict=False)]
+    size = max(max(abs(b) for _, b in pairs), Fraction(1, 10**300))
+    return max(abs(a - b) for a, b in pairs) / size
+
+
+def _cause(error: Exception) -> str:
+    return error.cause if isinstance(error, HeavyTopError) else str(error)
+
+
+def _judged(name: str, part: Callable[[], str]) -> Checked:
+    try:
+        return Checked(name, "kept", part())
+    except _Note as note:
+        return Checked(name, "note", str(note))
+    except Unsupported as error:
+        return Checked(name, "note", error.cause)
+    except (_Violated, HeavyTopError) as error:
+        return Checked(name, "violated", f"{_cause(error).removesuffix('.')}.")

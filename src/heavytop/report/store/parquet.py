@@ -1,0 +1,129 @@
+"""Rows as Parquet, one line a metric: for pandas, duckdb and whatever else reads tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.files import atomic_write
+from heavytop.precision import exact
+from heavytop.records import SCHEMA, Row
+
+FILE = "rows.parquet"
+_GROUP = 1 << 15
+"""Lines in a row group, which is what is held in memory."""
+
+_OF_ROW = {
+    "measure": "string",
+    "case": "string",
+    "system": "string",
+    "integrator": "string",
+    "precision": "string",
+    "bits": "int32",
+    "outcome": "string",
+    "horizon": "string",
+    "time_reached": "string",
+    "steps": "int64",
+    "finite": "bool_",
+    "measured": "string",
+    "against": "string",
+    "starts": "int32",
+}
+_OF_METRIC = {"kind": "string", "value": "string", "log10": "float64", "bound": "string", "band": "float64"}
+_OF_LAW = {
+    "exponent": "float64",
+    "low": "float64",
+    "high": "float64",
+    "first": "string",
+    "last": "string",
+    "detects": "string",
+    "lost_at": "string",
+}
+_OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3, "rotor": 3}
+"""How many components each has; 0 for a number."""
+_DATA = [f"{name}{i}" for name, count in _OF_DATA.items() for i in (range(1, count + 1) if count else ("",))]
+COLUMNS = (
+    _OF_ROW
+    | {"metric": "string"}
+    | _OF_METRIC
+    | _OF_LAW
+    | dict.fromkeys(_DATA, "float64")
+    | {f"{name}_exact": "string" for name in _OF_DATA}
+)
+"""Column -> type.  Numbers that measure something are text, as in the report, with log10 beside them.
+
+inertia1 to rotor3 are the top and the start as floats, and inertia_exact to rotor_exact the same as exact text.
+A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row that has
+neither metric nor law is one line without them.
+"""
+
+
+def require_pyarrow() -> None:
+    """Raises InputError where pyarrow is not installed."""
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow.", "Install it with: pip install 'heavytop[parquet]'")
+
+
+def check_name(path: Path) -> None:
+    """Raises InputError unless the file may hold Parquet, and pyarrow is installed."""
+    require_pyarrow()
+    if path.suffix != ".parquet":
+        raise InputError(f"{path} is not named as Parquet.", "Give a file that ends in .parquet.")
+
+
+def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
+    """Write the file whole or not at all; of the rows only one row group is held.  The plan goes into its metadata.
+
+    Raises InputError where it cannot be written.
+    """
+    import pyarrow
+    from pyarrow.parquet import ParquetWriter
+
+    about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
+    schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
+    stream = lines(rows)
+    with atomic_write(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
+        while group := list(islice(stream, _GROUP)):
+            columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
+            writer.write_batch(pyarrow.record_batch(columns, schema=schema))
+
+
+def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
+    """One tuple a metric or growth law, in the order of :data:`COLUMNS`."""
+    no_metric, no_law = [None] * len(_OF_METRIC), [None] * len(_OF_LAW)
+    for row in rows:
+        *same, starts = (getattr(row, name) for name in _OF_ROW)
+        data = _data(row)
+        for name, metric in row.metrics.items():
+            yield *same, starts, name, *(getattr(metric, each) for each in _OF_METRIC), *no_law, *data
+        for name, law in row.laws.items():
+            as_metric = "law", law.growth, None, None, None
+            yield *same, law.starts, name, *as_metric, *(getattr(law, each) for each in _OF_LAW), *data
+        if not (row.metrics or row.laws):
+            yield *same, starts, None, *no_metric, *no_law, *data
+
+
+def _float(text: str) -> float:
+    """The nearest double of exact text, infinite beyond their range."""
+    number = exact(text)
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
+
+
+def _data(row: Row) -> list[float | str | None]:
+    """The top and the start as floats, infinite beyond their range, then as text; None for what there is not."""
+    floats: list[float | None] = []
+    texts: list[str | None] = []
+    for name, count in _OF_DATA.items():
+        found: Any = None if row.data is None else getattr(row.data, name)
+        parts = [] if not found else list(found) if count else [found]
+        floats += [_float(part) for part in parts] or [None] * max(count, 1)
+        texts.append(",".join(parts) or None)
+    return [*floats, *texts]
