@@ -20,6 +20,8 @@ from heavytop.suite import rows as suite_rows
 from heavytop.suite.checkpoint import Saved
 from support.reports import compare, read_plan, summary
 
+pytestmark = pytest.mark.slow
+
 PEER = '''
 from dataclasses import replace
 

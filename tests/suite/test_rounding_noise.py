@@ -13,6 +13,8 @@ from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
 from support.reports import compare, contradictions, expand, measure, plan_of, replace
 
+pytestmark = pytest.mark.slow
+
 PLAN = plan_of(
     {
         "name": "tiny",

@@ -31,6 +31,8 @@ from heavytop.suite.plan import read
 from heavytop.suite.rows import Task
 from support.reports import rows
 
+pytestmark = pytest.mark.slow
+
 PLAN = """name = "tiny"
 [[measure]]
 kind = "drift"
