@@ -7,9 +7,9 @@ from itertools import accumulate, pairwise
 import numpy
 import pytest
 
+from heavytop.api.faulty_integrators import FAULTS
 from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
-from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome

@@ -1,7 +1,7 @@
-"""Integrators that are deliberately wrong: heyoka with one planted fault each.
+"""Deliberately faulty integrators: heyoka with one planted fault each, plug-ins that `heavytop selftest` measures.
 
-They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.comparison.compare` tries the
-suite's detectors on them.  All are for the system `heavy_top` in double.
+They hide the fault: problem and flags that they return are the healthy ones, and so is their name.  A plan measures
+them as any integrator that is defined outside the registry.  All are for the system `heavy_top` in double.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _not_a_number(states: Sequence[Any]) -> list[Any]:
     return [*states[:-1], states[-1] * float("nan")]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fault:
     """heyoka in double, and what is wrong with it.
 
@@ -109,8 +109,10 @@ class Fault:
 
     @property
     def integrator(self) -> Integrator:
-        """As an integrator with its capabilities."""
-        return Integrator("heyoka", self.propagate, systems=(HEAVY_TOP.name,), control="", steps=self.first_steps)
+        """The plug-in with its capabilities."""
+        return Integrator(
+            "heyoka", self.propagate, systems=(HEAVY_TOP.name,), control="", steps=self.first_steps, streams=True
+        )
 
     def propagate(
         self,
@@ -120,15 +122,24 @@ class Fault:
         precision: Precision = DOUBLE,
         *,
         system: System = HEAVY_TOP,
-        observer: Observer,
+        xi: Sequence[Fraction] | None = None,
+        observer: Observer | None = None,
     ) -> Trajectory:
-        """As :func:`heavytop.integrate.heyoka.motions.propagate`."""
+        """As :func:`heavytop.integrate.heyoka.motions.propagate`; the states go to the observer alone, if there is one.
+
+        Raises InputError for another system, and where an attitude is asked for.
+        """
+        if xi is not None:
+            raise InputError("A planted fault has no attitude.", "Leave out the attitude.")
         reached = times[: int(len(times) * self.stops)]
         run = motions.propagate(self.top(top), start, reached, precision, **self._how(system))
-        for time, state in zip(run.times, self.states(run.states), strict=True):
-            observer(time, state)
+        states = self.states(run.states)
+        if observer is not None:
+            for time, state in zip(run.times, states, strict=True):
+                observer(time, state)
+            states = []
         outcome = run.outcome if self.stops == 1 or self.silent else Outcome.STEP_LIMIT
-        return self._disguised(replace(run, states=(), outcome=outcome), top, start)
+        return self._disguised(replace(run, states=states, outcome=outcome), top, start)
 
     def first_steps(
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
