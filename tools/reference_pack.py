@@ -18,13 +18,13 @@ import msgspec
 
 from heavytop.cases import CASES, Case, named_bodies
 from heavytop.files import replace
-from reference_table import cases as table_cases
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.reference import Ball, Reference, reference
 from heavytop.precision import exact, exact_text
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.heavy_top import State
+from reference_table import cases as table_cases
 
 VERSION = "1.1.0"
 """Of the format and the numbers: a changed number raises the second place, a changed key the first."""
