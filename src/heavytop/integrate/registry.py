@@ -159,8 +159,7 @@ def load(place: str | Callable[..., Any]) -> Any:
     return EntryPoint("", place, "").load() if isinstance(place, str) else place
 
 
-loaded = lru_cache(maxsize=64)(load)
-"""The same, looked up once: for this program's own."""
+loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
 
 
 def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
@@ -379,8 +378,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
         if own or (isinstance(which, str) and which not in known()):
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    declared = getattr(chosen, "declared", None)
-    declared = declared if isinstance(declared, Declared) else None
+    declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
     given: dict[str, Any] = dict([setting] if setting else [])
     if setting is not None or not own:
         with contained(name, " when its arguments were looked at"):
