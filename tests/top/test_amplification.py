@@ -52,6 +52,7 @@ def turning_over(part: str, until: str) -> tuple[HeavyTop, State, Fraction]:
     return HeavyTop(FLIPS, 0, (0, 0, 0)), State((10, 0, part), (0, "3/5", "4/5")), Fraction(until)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("top", "start", "horizon"),
     [
@@ -106,6 +107,7 @@ def largest_error(run: ht.Trajectory, known: ht.Reference) -> float:
     return max(abs(float(exact(a) - exact(b.value))) for a, b in pairs)
 
 
+@pytest.mark.slow
 def test_a_body_that_turns_over_twice_loses_every_digit_of_double_and_not_of_quad() -> None:
     top, start, horizon = turning_over("1e-10", "10")
     times = [horizon * k / 20 for k in range(1, 21)]
@@ -132,6 +134,7 @@ def near_a_separatrix(seed: int) -> tuple[HeavyTop, State]:
     return HeavyTop(inertia, 0, (0, 0, 0)), State(omega, ("2/7", "3/7", "6/7"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_where_all_digits_are_said_to_be_lost_no_integrator_has_one_right(seed: int) -> None:
     top, start = near_a_separatrix(seed)
@@ -179,6 +182,7 @@ def test_on_a_homoclinic_motion_it_goes_on_where_double_has_left_the_saddle() ->
     assert late - early == pytest.approx(75 * case.rate, rel=0.1)
 
 
+@pytest.mark.slow
 def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> None:
     case = CASES["euler"]
     short, long = (of(case.top, case.start, time) for time in (200, 400))
@@ -187,6 +191,7 @@ def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> 
     assert of(case.top, case.start, 10**6) == pytest.approx(10**6 / 400 * long, rel=0.3)
 
 
+@pytest.mark.slow
 def test_neither_units_nor_names_of_axes_matter() -> None:
     top, start = GENERIC.top, GENERIC.start
     plain = of(top, start, 20)
