@@ -272,6 +272,7 @@ def test_an_unknown_option_is_refused_as_python_refuses_it() -> None:
         ht.ensemble([TOP], START, [1], xi=None)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     ("name", "argument"), [(name, argument) for name, (_, arguments) in GOOD.items() for argument in arguments]
@@ -293,6 +294,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
         answered(function, arguments | {argument: odd})
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HeavyTop", "State", "propagate", "ensemble", "reference", "score", "compare"])
 def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
@@ -310,6 +312,7 @@ def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
 NUMBERS = [value for value in ODD if not isinstance(value, list | tuple | dict | set)]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_one_odd_component_is_answered_or_refused_in_words() -> None:
     for odd in NUMBERS:
