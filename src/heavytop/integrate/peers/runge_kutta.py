@@ -49,8 +49,9 @@ class Tableau:
         lengths, wanted = [len(row) for row in self.a], list(range(1, len(self.b)))
         if lengths != wanted:
             raise InputError(f"The rows of a have the lengths {lengths}.", f"Give {wanted}: as many stages as weights.")
-        if abs(sum(self.b) - 1) > len(self.b) * 2.0**-52:
-            raise InputError(f"The weights add up to {float(sum(self.b))}.", "Give weights b that add up to 1.")
+        total = sum(map(float, self.b))
+        if abs(total - 1) > len(self.b) * 2.0**-52:
+            raise InputError(f"The weights add up to {total}.", "Give weights b that add up to 1.")
 
     def peer(self, name: str) -> Callable[..., Trajectory]:
         """The method as a peer, which carries the attitude."""
