@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _BITS = 64
 _LARGEST_FILE = 50_000_000
+_MOST_SLACK = Fraction(1, 200)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
 _SIX_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _FORMATS = "Give a URDF, MJCF or SDF file, USD as text (.usda), or TOML with mass, centre and inertia."
@@ -36,7 +37,8 @@ class BodyInFile:
     """A link or body of a file, in its own axes and units of kg and metres.
 
     centre: of mass.  six: I11, I22, I33, I12, I13, I23 about the centre of mass, or the origin where ``at_pivot``.
-    joint: where a ball joint holds it, or None.  slack: half a unit in the last digit of the tensor's numbers, at most.
+    joint: where a ball joint holds it, or None.  slack: rounding of the printed digits,
+    of an entry of the second moments.
     geometry, geometry_axes: tensor about the centre of mass of the one shape that the file gives it, as a uniform body,
     and the rotation of its axes; None where it gives none, several, or a mesh.
     """
@@ -121,10 +123,11 @@ def _xml(path: Path, content: bytes) -> Iterator[BodyInFile]:
 
 
 class _Numbers:
-    """Numbers of one file's element, with the slack of those that were read."""
+    """Numbers of one element of a file, with the unit in the last digit of each decimal."""
 
     def __init__(self, where: str) -> None:
-        self.where, self.slack = where, Fraction(0)
+        self.where = where
+        self.units: list[Fraction] = []
 
     def read(self, text: str | None, what: str, default: str | None = None) -> list[Fraction]:
         """The numbers of ``text``, separated by spaces or commas."""
@@ -140,8 +143,8 @@ class _Numbers:
         value = exact(text)
         _, _, decimals = text.lower().partition("e")[0].partition(".")
         exponent = int(text.lower().partition("e")[2] or 0)
-        if value.denominator != 1 or decimals:
-            self.slack = max(self.slack, Fraction(10) ** (exponent - len(decimals)))
+        if decimals or exponent < 0:
+            self.units.append(Fraction(10) ** (exponent - len(decimals)))
         return value
 
     def three(self, text: str | None, what: str, default: str | None = None) -> Vector:
@@ -159,13 +162,16 @@ class _Numbers:
         return values
 
     def tensor(self, texts: Sequence[str | None], what: Sequence[str]) -> tuple[Six, Fraction]:
-        """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four of them."""
-        self.slack = Fraction(0)
+        """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four halves of a unit.
+
+        Zeros at the end may have been left out, so that the finest number says the unit; at most a part of the largest.
+        """
+        self.units = []
         a, b, c, d, e, f = (
             self._of(text, name, 1, None if index < 3 else "0")[0]
             for index, (text, name) in enumerate(zip(texts, what, strict=True))
         )
-        return (a, b, c, d, e, f), 2 * self.slack
+        return (a, b, c, d, e, f), min(2 * min(self.units, default=Fraction(0)), _MOST_SLACK * max(map(abs, (a, b, c))))
 
 
 def _rotation(attitude: Attitude) -> Tensor:

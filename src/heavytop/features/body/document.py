@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.precision import Vector, decimal_text, exact_text
+from heavytop.precision import Vector, decimal_text
 from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
 from heavytop.top.body_files import BodyInFile
 from heavytop.top.inertia_slips import Given, Slip, realisable, six_of, slips
