@@ -54,12 +54,12 @@ class BodyInFile:
     geometry_axes: Tensor | None = None
     si: bool = True
 
-    def about(self, pivot: Vector | None) -> inertia_slips.Given:
+    def about(self, pivot: Vector | None) -> inertia_slips.MassProperties:
         """Its mass properties, with the centre of mass from the pivot: the ball joint, or the origin, where None."""
         origin = pivot or self.joint or _ZERO
         x, y, z = (value - start for value, start in zip(self.centre, origin, strict=True))
         extra = (self.slack, self.si, self.geometry, self.geometry_axes)
-        return inertia_slips.Given(self.six, self.mass, (x, y, z), self.at_pivot, *extra)
+        return inertia_slips.MassProperties(self.six, self.mass, (x, y, z), self.at_pivot, *extra)
 
 
 def read_body(path: Path, link: str | None = None) -> BodyInFile:

@@ -36,7 +36,7 @@ _SHOWN_BITS = 56
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class MassProperties:
     """Mass properties as they were written down.
 
     six: the tensor in the order of :data:`Six`, about the centre of mass, or about the pivot where ``at_pivot``.
@@ -126,7 +126,7 @@ def _is_rod(central: Tensor, slack: Fraction) -> bool:
     return not _semidefinite(central, -least)
 
 
-def slips(given: Given) -> list[Slip]:
+def slips(given: MassProperties) -> list[Slip]:
     """The slips of which one makes the tensor that of a body, the likeliest first; [] where nothing is suspect.
 
     A realisable tensor is suspect where no material is so dense or so thin, where the centre of mass lies a hundred
@@ -140,7 +140,7 @@ def slips(given: Given) -> list[Slip]:
     return [*_against_geometry(given), *_of_units(given), *_of_products(given)][:3]
 
 
-def _rod(given: Given) -> Slip:
+def _rod(given: MassProperties) -> Slip:
     return Slip(
         "rod",
         "A principal moment is 0, as of a rod without thickness: the rotation about it has no equation. "
@@ -149,7 +149,7 @@ def _rod(given: Given) -> Slip:
     )
 
 
-def _mends(given: Given) -> Iterator[tuple[Slip, Given]]:
+def _mends(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """Each slip, with the mass properties that it would mean."""
     n = given.six
     for six, which in (
@@ -173,12 +173,12 @@ def _mends(given: Given) -> Iterator[tuple[Slip, Given]]:
         yield slip, replace(given, centre=(shrunk[0], shrunk[1], shrunk[2]))
 
 
-def _mend(given: Given, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, Given]:
+def _mend(given: MassProperties, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, MassProperties]:
     a, b, c, d, e, f = six
     return Slip(name, sentence, (a, b, c, d, e, f)), replace(given, six=(a, b, c, d, e, f))
 
 
-def _row_major(given: Given) -> Iterator[tuple[Slip, Given]]:
+def _row_major(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """The first six of the nine numbers of a matrix in the six places; its last one is not there."""
     n = given.six
     if n[1] != n[3]:
@@ -194,13 +194,13 @@ def _row_major(given: Given) -> Iterator[tuple[Slip, Given]]:
                 break
 
 
-def _size(given: Given) -> float:
+def _size(given: MassProperties) -> float:
     """Diagonal of the uniform box with these moments, √(12 tr S/m)."""
     trace = sum(second_moments(given.central)[i][i] for i in range(3))
     return math.sqrt(12 * trace / given.mass)
 
 
-def _scaled(given: Given, length: int, mass: int) -> Given:
+def _scaled(given: MassProperties, length: int, mass: int) -> MassProperties:
     """With lengths of the tensor and masses divided."""
     a, b, c, d, e, f = (value / mass / length**2 for value in given.six)
     return replace(given, six=(a, b, c, d, e, f), mass=given.mass / mass, slack=given.slack / mass / length**2)
@@ -213,7 +213,7 @@ _UNITS = (
 )
 
 
-def _of_units(given: Given) -> Iterator[Slip]:
+def _of_units(given: MassProperties) -> Iterator[Slip]:
     if not given.si or given.mass <= 0:
         return
     size = _size(given)
@@ -235,7 +235,7 @@ def _of_units(given: Given) -> Iterator[Slip]:
             yield Slip(name, sentence, mended.six)
 
 
-def _of_products(given: Given) -> Iterator[Slip]:
+def _of_products(given: MassProperties) -> Iterator[Slip]:
     """Whether the tensor without Steiner's part is that of a body, and all but diagonal where it was not."""
     if given.at_pivot or given.geometry is not None:
         return
@@ -248,7 +248,7 @@ def _of_products(given: Given) -> Iterator[Slip]:
         yield Slip("about_pivot", sentence, less)
 
 
-def _against_geometry(given: Given) -> Iterator[Slip]:
+def _against_geometry(given: MassProperties) -> Iterator[Slip]:
     """The slip by which the tensor becomes that of the shapes in the file."""
     shape = given.geometry
     if shape is None or _distance(given.central, shape) < _APART:
@@ -259,7 +259,7 @@ def _against_geometry(given: Given) -> Iterator[Slip]:
             return
 
 
-def _conjugated(given: Given) -> Iterator[tuple[Slip, Given]]:
+def _conjugated(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """The tensor of principal axes V written as Vᵀ D V."""
     if given.geometry_axes is None:
         return
@@ -269,12 +269,12 @@ def _conjugated(given: Given) -> Iterator[tuple[Slip, Given]]:
     yield _mend(given, "conjugate_axes", "The rotation of the principal axes is the inverse of what was meant.", six)
 
 
-def _about_pivot(given: Given) -> Iterator[tuple[Slip, Given]]:
+def _about_pivot(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     less = six_of(minus(rows(given.six), steiner(given.mass, given.centre)))
     yield _mend(given, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
 
 
-def _of_scale(given: Given) -> Iterator[tuple[Slip, Given]]:
+def _of_scale(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     for name, scale, unit in (
         ("millimetres", 10**6, "kg mm^2"),
         ("grams", 10**3, "g m^2"),

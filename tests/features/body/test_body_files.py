@@ -12,7 +12,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.top.body_files import read_body
-from heavytop.top.inertia_slips import Given, minus, realisable, rows, second_moments, six_of, slips, steiner
+from heavytop.top.inertia_slips import MassProperties, minus, realisable, rows, second_moments, six_of, slips, steiner
 from support.in_process import heavytop
 
 SIX = ("0.31", "0.28", "0.19", "0.05", "-0.02", "0.04")
@@ -152,7 +152,9 @@ def test_no_body_of_random_points_is_refused_and_no_material_is_too_dense() -> N
         tensor = rows((trace - s[0][0], trace - s[1][1], trace - s[2][2], -s[0][1], -s[0][2], -s[1][2]))
         assert second_moments(tensor)[1][2] == s[1][2]
         assert realisable(tensor)
-        assert slips(Given(six_of(tensor), Fraction(6), (Fraction(0), Fraction(0), Fraction(0)), si=True)) == []
+        assert (
+            slips(MassProperties(six_of(tensor), Fraction(6), (Fraction(0), Fraction(0), Fraction(0)), si=True)) == []
+        )
         largest = max(trace - s[i][i] for i in range(3))
         assert not realisable(minus(tensor, rows((largest, *[Fraction(0)] * 5))))
 

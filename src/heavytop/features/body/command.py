@@ -20,7 +20,9 @@ def body(
     gravity: Annotated[str, typer.Option(help="Acceleration of gravity, of the table that is printed.")] = "9.81",
     json: Json = False,
 ) -> int:
-    """Say whether the inertia tensor in a file is that of a body, and if not, which slip makes it one.
+    """Check the inertia tensor in a URDF, MJCF or SDF.
+
+    Says whether a body has it, and if not, which slip makes it one.
 
     Exit 0 for a body, 1 where there is none with this tensor or the tensor is suspect, 2 for a file that cannot be
     read.  Prints the body as a table for a plan.

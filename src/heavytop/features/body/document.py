@@ -11,7 +11,7 @@ from typing import Any
 from heavytop.precision import Vector, decimal_text
 from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
 from heavytop.top.body_files import BodyInFile
-from heavytop.top.inertia_slips import Given, Slip, realisable, six_of, slips
+from heavytop.top.inertia_slips import MassProperties, Slip, realisable, six_of, slips
 
 GRAVITY = "9.81"
 _NAMES = ("I11", "I22", "I33", "I12", "I13", "I23")
@@ -20,7 +20,7 @@ _BITS = 64
 
 
 @dataclass(frozen=True)
-class Assessment:
+class BodyAssessment:
     """A body in a file, judged.
 
     name: of the link.  given: its mass properties about the pivot.  realisable: whether a body has them.
@@ -28,7 +28,7 @@ class Assessment:
     """
 
     name: str
-    given: Given
+    given: MassProperties
     realisable: bool
     slips: tuple[Slip, ...]
     gravity: str = GRAVITY
@@ -113,10 +113,10 @@ class Assessment:
             yield from ("", self.toml, f"Its free tumble:\n  {self.command}")
 
 
-def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> Assessment:
+def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> BodyAssessment:
     """The assessment of a body about a pivot in the axes of its link; None: its ball joint, or the origin."""
     given = body.about(pivot)
-    return Assessment(body.name, given, realisable(given.central, given.slack), tuple(slips(given)), gravity)
+    return BodyAssessment(body.name, given, realisable(given.central, given.slack), tuple(slips(given)), gravity)
 
 
 def _reason(moments: Vector) -> str:
