@@ -85,7 +85,10 @@ def _no_link(path: Path, link: str, bodies: Sequence[BodyInFile]) -> list[BodyIn
 
 
 def _bodies(path: Path) -> Iterator[BodyInFile]:
-    content = read_whole(path)
+    try:
+        content = read_whole(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.", "Give a file that is there.") from None
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{path} has {len(content)} bytes.", f"A body is read from at most {_LARGEST_FILE}.")
     if content.startswith(b"PXR-USDC"):
