@@ -12,7 +12,7 @@ from heavytop.errors import InputError, quoted
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import exact, parse, time_text
+from heavytop.precision import exact, exact_text, parse, time_text
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.hunt.measured import Family
@@ -57,7 +57,14 @@ class HuntTable(PlanTable, tag=NAME):
         system = HEAVY_GYROSTAT.name if self.family == HEAVY_GYROSTAT.name else HEAVY_TOP.name
         key = RowKey(NAME, name, system, computed(self.integrator), parse(self.precision).name)
         options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
-        return [Task(key, "", self.integrator, options=options)]
+        request = {
+            "horizon": time_text(horizon),
+            "budget": str(self.budget),
+            "against": self.against,
+            "limit": exact_text(exact(self.limit)) if self.limit else "",
+            "found": self.found,
+        }
+        return [Task(key, "", self.integrator, options=options, request=request)]
 
 
 class HuntKind(Kind):

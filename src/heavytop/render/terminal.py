@@ -99,7 +99,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
 def _lines(parts: Iterable[RenderableType]) -> list[str]:
     """What a terminal of 80 columns shows, without colours."""
     console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
-    console.print(*parts, sep="\n", end="", highlight=False, markup=False)
+    console.print(Group(*parts), highlight=False, markup=False)
     assert isinstance(console.file, StringIO)
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
