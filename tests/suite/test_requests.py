@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 import pytest
 
-from heavytop.comparison.noise import Policy
-from heavytop.kinds import KINDS
-from heavytop.kinds.drift import DriftRun
-from heavytop.kinds.growth import GrowthRun
-from heavytop.kinds.work_precision import Curve
+from heavytop.features.drift.kind import DriftRun
+from heavytop.features.growth.kind import GrowthRun
+from heavytop.features.kinds import KINDS
+from heavytop.features.survey.gathered import gathered
+from heavytop.features.work_precision.kind import Curve
+from heavytop.harness.sweeps import Random, SweepGrid
 from heavytop.records import SCHEMA, Against, Report
-from heavytop.suite.survey.gathered import gathered
-from heavytop.suite.sweeps import Random, SweepGrid
+from heavytop.report.compare.noise import Policy
 from support.reports import compare, expand, measure, plan_of
 
 CHANGES_NOTHING = {("survey", "map"), ("work_precision", "timings")}
@@ -131,8 +131,8 @@ def base(kind: str) -> Report:
 @pytest.fixture(autouse=True)
 def _no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hunt that finds nothing and takes no time: its request is what is looked at."""
-    from heavytop.kinds import hunt
-    from heavytop.suite.hunt.search import Hunted
+    from heavytop.features.hunt import kind as hunt
+    from heavytop.features.hunt.search import Hunted
 
     monkeypatch.setattr(hunt, "kept", lambda path: [])
     monkeypatch.setattr(hunt, "hunt", lambda asked: Hunted(asked, (), (), 1, 1, 1.0, 1e-15, 0, 0))
