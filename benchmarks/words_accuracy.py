@@ -15,7 +15,7 @@ from random import Random
 from heavytop.cases import CASES
 from heavytop.exact.flint.balls import midpoint
 from heavytop.harness.case_text import Member, ensemble_of
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.truth import closed_form
 from heavytop.precision import Precision, exact, parse
@@ -40,7 +40,7 @@ def worst(name: str, count: int, times: list[Fraction], precision: Precision) ->
     """The largest error of a component over starts and times, in eps max(1, |value|)."""
     largest = 0.0
     for top, start in members(name, count):
-        run = propagate_words(top, start, times, precision, system=CASES[name].system)
+        run = propagate_multiword(top, start, times, precision, system=CASES[name].system)
         assert run.outcome is Outcome.SUCCESS, run.outcome
         truth = closed_form(run.problem)
         assert truth is not None, start

@@ -17,7 +17,7 @@ from random import Random
 from heavytop.errors import OutOfReach
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
@@ -82,7 +82,7 @@ def truth(problem: Problem, time: Fraction) -> tuple[list[tuple[Fraction, Fracti
         balls = Validated(problem.top, problem.start, effort=DEAREST).state(time, bits + 40)
         return [(midpoint(ball), radius(ball)) for ball in balls], "proven"
     except OutOfReach:
-        wide = propagate_words(problem.top, problem.start, [time], real(bits + 60)).states[0]
+        wide = propagate_multiword(problem.top, problem.start, [time], real(bits + 60)).states[0]
         return [(exact(value), Fraction(0)) for value in wide], "by 60 bits more"
 
 
@@ -99,7 +99,7 @@ def formats(first: int, runs: int) -> None:
         time = Fraction(10 / max(speed, (weight / least) ** 0.5)).limit_denominator(10**12)
         for precision in FORMATS:
             problem = Problem.of(top, start, precision)
-            run = propagate_words(top, start, [time], precision)
+            run = propagate_multiword(top, start, [time], precision)
             if run.outcome is not Outcome.SUCCESS:
                 counts[precision][run.outcome.value] += 1
                 continue

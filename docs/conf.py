@@ -80,7 +80,7 @@ nitpick_ignore_regex = [
 ]
 
 _MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
-_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Given", "Solved"}
+_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Request", "Solution"}
 """Classes whose objects a user makes."""
 
 

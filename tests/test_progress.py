@@ -196,7 +196,9 @@ def test_the_line_says_what_is_done_and_how_far(monkeypatch: pytest.MonkeyPatch,
         advance()
         time.sleep(0.4)
     (line,) = capsys.readouterr().err.splitlines()
-    assert re.fullmatch(r"heavytop: score: 1 s so far, comparison: 2/8 states, 25 %, (about \d+ s left|longer than expected)", line)
+    assert re.fullmatch(
+        r"heavytop: score: 1 s so far, comparison: 2/8 states, 25 %, (about \d+ s left|longer than expected)", line
+    )
     with told_when_slow("audit"), waiting("audit of x", 0.4):
         time.sleep(0.2)
     assert re.search(r"so far, audit of x, 1 s at most: [2-9]\d %", capsys.readouterr().err)

@@ -25,7 +25,7 @@ from heavytop.exact.closed_form import orientation, permuted, renamed_state, ren
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.peers.command import Request
+from heavytop.integrate.peers.command import ProgramRequest
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, cross, exact, parse
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
@@ -316,7 +316,7 @@ def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> Non
 
 def test_a_program_is_given_k_and_one_that_declares_the_heavy_top_alone_is_asked_nothing(tmp_path) -> None:
     problem = Problem.of(CASE.top, CASE.start, DOUBLE, HEAVY_GYROSTAT)
-    lines = Request(problem, [F(1)], None, False).text(1).decode().splitlines()
+    lines = ProgramRequest(problem, [F(1)], None, False).text(1).decode().splitlines()
     assert "system heavy_gyrostat" in lines
     assert "rotor 0.5 -0.33333333333333331 0.75" in lines
     file = tmp_path / "mine.toml"

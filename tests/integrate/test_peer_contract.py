@@ -208,7 +208,7 @@ FAILURES = {
     "double_flat": "of the shape (12,)",
     "double_ragged": "raised ValueError",
     "double_many": "of the shape (3, 6) for 2 times",
-    "double_dict": "returned a dict instead of Solved",
+    "double_dict": "returned a dict instead of Solution",
 }
 HARMLESS = ("honest", "chatty", "rude_to_the_process", "vandal", "double_vandal")
 
@@ -331,7 +331,7 @@ def test_an_interrupt_passes(package: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        contract.Contained("mine", interrupted, own=False)(CASE.top, CASE.start, TIMES, DOUBLE)
+        contract.CheckedPlugin("mine", interrupted, own=False)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 
 @NOISY

@@ -9,7 +9,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
-from heavytop.integrate.trajectory import Outcome, Place, Problem
+from heavytop.integrate.trajectory import Outcome, Problem, ResumePoint
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
@@ -219,7 +219,7 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
         top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
     times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
 
-    def run(place: Place | None = None):
+    def run(place: ResumePoint | None = None):
         states, places = [], []
         found = propagate(
             top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
@@ -232,7 +232,7 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
     summary, states, places = run()
     assert len(places) == len(times)
     for index, content in enumerate(places):
-        again, rest, later = run(Place.of(json.loads(json.dumps(content)), precision))
+        again, rest, later = run(ResumePoint.of(json.loads(json.dumps(content)), precision))
         assert again == summary
         assert rest == states[index + 1 :]
         assert later == places[index + 1 :]

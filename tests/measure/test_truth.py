@@ -13,7 +13,7 @@ from heavytop.exact.enclosure import run as validated
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth as truths
 from heavytop.measure.truth import ComputedReference, Truth, known_motion, of_rounded, truth
@@ -211,11 +211,11 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
 
     def counted(problem, targets, step_limit):
         nonlocal steps
-        run = follow(problem, targets, step_limit=step_limit)
+        run = integrate_to_samples(problem, targets, step_limit=step_limit)
         steps += run.steps
         return run
 
-    monkeypatch.setattr(truths, "follow", counted)
+    monkeypatch.setattr(truths, "integrate_to_samples", counted)
     answer = truth(chaotic(precision), [Fraction(horizon)])
     assert isinstance(answer, str)
     far = abs(horizon) > 10**20
@@ -231,7 +231,7 @@ def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypa
     monkeypatch.setattr(truths, "seconds_a_step", lambda bits: 1.0)
     monkeypatch.setattr(truths, "EFFORT", 40.0)
 
-    reached = follow(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
+    reached = integrate_to_samples(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
     for beyond, says in ((Fraction(0), "stopped at the step limit"), (Fraction(1, 2**20), "takes too long")):
         at = exact(number(2 * reached * (1 + beyond), real(84)))
         with pytest.raises(OutOfReach, match=says):

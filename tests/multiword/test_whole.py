@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
@@ -49,7 +49,7 @@ def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) 
 
 def test_more_bits_than_words_have_are_met_to_the_last() -> None:
     times = [Fraction(1, 3), Fraction(5, 4)]
-    run = propagate_words(TOP, START, times, MANY)
+    run = propagate_multiword(TOP, START, times, MANY)
     assert run.outcome is Outcome.SUCCESS
     assert run.flags["arithmetic"] == "whole numbers"
     proven = Validated(run.problem.top, run.problem.start)
@@ -77,7 +77,7 @@ def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
 
 
 def test_steps_can_be_limited() -> None:
-    run = propagate_words(TOP, START, [Fraction(50)], MANY, step_limit=1)
+    run = propagate_multiword(TOP, START, [Fraction(50)], MANY, step_limit=1)
     assert (run.outcome, run.steps) == (Outcome.STEP_LIMIT, 1)
 
 
@@ -85,7 +85,7 @@ def test_what_an_unstable_axis_amplifies_is_there_though_no_words_would_hold_it(
     """2^-1100 of another axis needs its own bits beside those of the format."""
     start = State((Fraction(1, 2**1100), 1, 0), ("5/8", "-3/8", "11/16"))
     free = HeavyTop((3, 2, 1), 0, (0, 0, 1))
-    run = propagate_words(free, start, [Fraction(1)], real(237))
+    run = propagate_multiword(free, start, [Fraction(1)], real(237))
     assert int(run.flags["bits"]) > 237 + 1100
     first = exact(run.states[0][0]) * 2**1100
     # ω1' = ω2 ω3/3 and ω3' = ω1 ω2 with ω2 = 1: cosh(t/√3)
@@ -93,8 +93,8 @@ def test_what_an_unstable_axis_amplifies_is_there_though_no_words_would_hold_it(
 
 
 def test_backwards_is_the_way_back() -> None:
-    there = propagate_words(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
+    there = propagate_multiword(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
     arrived = State([exact(v) for v in there[:3]], [exact(v) for v in there[3:]])
-    back = propagate_words(TOP, arrived, [Fraction(-3, 4)], real(1100)).states[0]
+    back = propagate_multiword(TOP, arrived, [Fraction(-3, 4)], real(1100)).states[0]
     for value, begun in zip(back, START.flat, strict=True):
         assert abs(exact(value) - begun) < Fraction(1, 2**1090)

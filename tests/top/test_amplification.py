@@ -9,7 +9,7 @@ from itertools import permutations
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import QUAD, exact, number
 from heavytop.top.amplification import FOLLOWED, _path, amplification, rate
@@ -60,7 +60,7 @@ def test_it_is_that_of_runs_from_changed_starts(name: str, horizon: int) -> None
 
 
 def follow_all(problem: Problem, times: list[Fraction]) -> list[list[Fraction]]:
-    run = follow(problem, [number(time, QUAD) for time in times])
+    run = integrate_to_samples(problem, [number(time, QUAD) for time in times])
     return [[exact(value) for value in state] for state in run.states]
 
 

@@ -13,7 +13,16 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 
 from heavytop.cases import Case
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
+from heavytop.errors import (
+    Contradiction,
+    HeavyTopError,
+    InputError,
+    NotAsked,
+    OutOfReach,
+    OutOfTime,
+    PeerFailed,
+    Unsupported,
+)
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
@@ -28,6 +37,7 @@ from heavytop.records import (
     EXACT,
     FAILED,
     FINEST,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNSUPPORTED,
@@ -228,6 +238,7 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
     PeerFailed: FAILED,
     Unsupported: UNSUPPORTED,
     OutOfTime: OUT_OF_TIME,
+    NotAsked: NOT_ASKED,
 }
 
 
@@ -301,7 +312,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None

@@ -30,7 +30,7 @@ from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, i
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
-from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
+from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import (
@@ -39,9 +39,9 @@ from heavytop.precision import (
     OrderedRing,
     Precision,
     Vector,
+    cache_last_call,
     decimal_text,
     exact,
-    last_call,
     log10,
     parse,
 )
@@ -179,9 +179,9 @@ INTEGRATORS = {
         _peer("heyoka:lanes", "heyoka_taylor:lanes"),
         Integrator(
             "multiword",
-            f"{_HERE}.multiword.motions:propagate_words",
+            f"{_HERE}.multiword.motions:propagate_multiword",
             _EVERY,
-            ensemble=f"{_HERE}.multiword.lanes:propagate_words_ensemble",
+            ensemble=f"{_HERE}.multiword.lanes:propagate_multiword_ensemble",
             attitude=True,
             streams=True,
         ),
@@ -391,7 +391,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
                 raise PeerFailed(f"{name} has no {control}")
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
-    return Contained(name, chosen, own, declared, given)
+    return CheckedPlugin(name, chosen, own, declared, given)
 
 
 def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
@@ -481,7 +481,7 @@ def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None
     return math.isqrt(square.numerator // square.denominator)
 
 
-@last_call
+@cache_last_call
 def _square_in_doubles(problem: Problem) -> float:
     """The square of the rate at which the motion changes; inf where doubles do not hold it."""
     try:
@@ -655,7 +655,7 @@ class Setup:
             return cls(body, start, None, system, precision, None)
         found = resolve(body, start, precision.bits + _SPARE_BITS)
         xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.turned:
+        if not found.is_rotated:
             return cls(found.top, found.start, xi, system, precision, None)
         if system is GYROSTAT:
             raise InputError(
@@ -676,11 +676,11 @@ class Setup:
         """What an ensemble is made of."""
         return Problem.of(self.top, self.start, self.precision, self.system)
 
-    def turned(self, state: Any) -> Any:
+    def in_body_axes(self, state: Any) -> Any:
         """A state of an observer in the axes given."""
         return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
 
-    def turned_exactly(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
+    def exactly_in_body_axes(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
         """Vectors in principal axes, in the axes given, in exact rationals."""
         if self.frame is None:
             return state
@@ -691,7 +691,7 @@ class Setup:
         """An observer that is given the states in the axes given."""
         if observer is None or self.frame is None or not callable(observer):
             return observer
-        return lambda time, state: observer(time, self.turned(state))
+        return lambda time, state: observer(time, self.in_body_axes(state))
 
     def given(self, run: Trajectory) -> Trajectory:
         """The run in the axes given."""

@@ -30,7 +30,7 @@ from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
 from heavytop.precision import Array, OrderedRing, Precision, decimal_text, exact
-from heavytop.records import Law, Metric, Quantity, Series
+from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -63,22 +63,22 @@ class ChosenIntegrator:
         return self.source or self.name
 
     @property
-    def can(self) -> Integrator:
+    def capabilities(self) -> Integrator:
         """What it can do."""
         return FAULTS[self.fault].integrator if self.fault else described(self.which)
 
     @property
     def supports_ensemble(self) -> bool:
         """Whether many motions go side by side, which makes each cheap."""
-        return bool(self.can.ensemble)
+        return bool(self.capabilities.ensemble)
 
     @property
     def carries_attitude(self) -> bool:
         """Whether it declares that ξ rides along; not one that cannot be used."""
         if isinstance(self.source, Command):
             return self.source.attitude
-        if self.can.own:
-            return self.can.attitude
+        if self.capabilities.own:
+            return self.capabilities.attitude
         try:
             peer: Any = registry.ready(self.which)
         except (InputError, PeerFailed):
@@ -96,29 +96,31 @@ class ChosenIntegrator:
         *,
         xi: Sequence[Fraction] | None = None,
         again: bool = True,
-        **going_on: Any,
+        **resume: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
-        package is made twice, to see whether it is the same.  going_on: place and mark as in
+        package is made twice, to see whether it is the same.  resume: place and mark as in
         :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
-            spoilt: Trajectory = load(self.can.propagate)(top, start, times, precision, system=system, observer=watch)
+            spoilt: Trajectory = load(self.capabilities.propagate)(
+                top, start, times, precision, system=system, observer=watch
+            )
             return spoilt
-        if self.can.streams:
+        if self.capabilities.streams:
             call = registry.propagator(self.name, {})
-            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **going_on)
+            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
             peer = registry.ready(self.which, self.setting)
             beside = {} if xi is None else {"xi": xi}
             run = peer(top, start, times, precision, system=system, **beside)
-            if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
+            if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
                 require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
         except Unsupported:
             raise
@@ -167,7 +169,9 @@ class ChosenIntegrator:
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
     ) -> tuple[Trajectory, list[TaylorStep]]:
         """As :func:`heavytop.integrate.heyoka.motions.first_steps`, where its steps are exposed."""
-        found: tuple[Trajectory, list[TaylorStep]] = load(self.can.steps)(top, start, until, precision, system=system)
+        found: tuple[Trajectory, list[TaylorStep]] = load(self.capabilities.steps)(
+            top, start, until, precision, system=system
+        )
         return found
 
 
@@ -249,6 +253,7 @@ def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list
         runs.append(run(len(runs) + 1))
     spent = [each.seconds["run"] for each in runs]
     figures = {"run": median(spent), "least": min(spent), "repeats": float(len(spent))}
+    figures |= next(({key: each.seconds[key]} for each in runs if (key := UNRESOLVED_SECONDS) in each.seconds), {})
     if how.band and len(spent) > 1 and min(spent) > 0:
         low, high = numpy.quantile(numpy.log10(spent), [0.025, 0.975])
         figures["band"] = round(float(high - low) / 2, 4)
