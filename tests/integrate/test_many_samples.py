@@ -57,6 +57,7 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
     assert all((a == b).all() for a, b in zip(many.states, states, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("times", [regular(800, 60), irregular(800, 60, 1)], ids=["regular", "irregular"])
 @pytest.mark.parametrize(
@@ -81,6 +82,7 @@ def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [QUAD, parse("real:150"), parse("real:200")], ids=lambda each: each.name)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
@@ -109,6 +111,7 @@ def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: p
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("case", ["lagrange", "ershkov-partial-6", "hess-pendulum"])
 def test_other_tops_and_systems_too(name: str, case: str) -> None:
@@ -117,6 +120,7 @@ def test_other_tops_and_systems_too(name: str, case: str) -> None:
     require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, given))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_dense_times_within_the_first_steps(name: str) -> None:
     times = [Fraction(k, 3000) for k in range(1, 3001)]
@@ -130,6 +134,7 @@ def test_a_time_where_a_step_ends_belongs_to_that_step() -> None:
     require_same(propagate(CASE.top, CASE.start, times, DOUBLE), one_by_one(propagate, times, DOUBLE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("limit", [1, 5, 90])
 def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> None:
@@ -139,6 +144,7 @@ def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> 
     require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, step_limit=limit))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
     times = regular(500, 20)
@@ -242,6 +248,7 @@ def test_many_samples_by_heyoka_have_the_bits_of_an_observed_run(last: int) -> N
     assert (found.steps, found.outcome) == (one_by_one.steps, one_by_one.outcome)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["extended", "double-double", "real:70"])
 def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     precision, times = parse(name), [-time for time in irregular(60, 9, 4)]

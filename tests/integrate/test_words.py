@@ -64,6 +64,7 @@ def _middle(ball) -> Fraction:
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("precision", "limit"),
     [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29"), (QUAD, "1e-31"), (real(237), "1e-58")],
@@ -77,6 +78,7 @@ def test_every_reference_state_is_met_in_every_format(given, precision: Precisio
     assert off <= Fraction(limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("precision", "horizon", "limit"),
     [(DOUBLE, 2000, 1), (EXTENDED, 1000, 1), (DOUBLE_DOUBLE, 20, 400), (QUAD, 500, 1), (real(500), 10, 1)],
@@ -99,6 +101,7 @@ def test_what_is_returned_is_the_true_motion_rounded(precision, horizon, limit, 
     assert worst(run) <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("top", "horizon"), [(TOP, 8), (GENERIC, 8)], ids=["kovalevskaya", "generic"])
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
 def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, horizon: int, sign: int) -> None:
@@ -107,6 +110,7 @@ def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, hor
         assert worst(propagate_multiword(top, START, times, precision)) <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 def test_samples_and_chunks_change_no_bit(precision, monkeypatch: pytest.MonkeyPatch) -> None:
     few = propagate_multiword(TOP, START, [10, 20], precision)
@@ -126,6 +130,7 @@ def test_there_and_back_again() -> None:
     assert max(abs(v - s) for v, s in zip(bits(back)[0], START.flat, strict=True)) < Fraction(1, 10**29)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
 def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
     top, start = (TOP, START) if system is HEAVY_TOP else (PAPER, PAPER_START)
@@ -138,6 +143,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
     assert max(abs(a - exact(b)) for a, b in zip(values, wide.states[0], strict=True)) < Fraction(1, 10**28)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize("exponent", [-30, 6, 60])
 def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
@@ -153,6 +159,7 @@ def test_units_of_time_and_weight_change_nothing_but_the_units(precision, expone
         assert off <= 60 * size * precision.eps
 
 
+@pytest.mark.slow
 def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() -> None:
     random = Random(150)
     for _ in range(12):
@@ -173,6 +180,7 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
             assert max(abs(a - b) for a, b in zip(found, known, strict=True)) <= size * Fraction(1, 10**27)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize(
     ("top", "start"),
@@ -212,6 +220,7 @@ def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
     assert len(run.states) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
 def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
@@ -283,6 +292,7 @@ def test_heyoka_refuses_double_double() -> None:
         propagate(TOP, START, [1], DOUBLE_DOUBLE)
 
 
+@pytest.mark.slow
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
     monkeypatch.setattr(double_double_run, "machine", once(steps.build))
@@ -302,6 +312,7 @@ def test_everything_that_changes_bits_is_in_the_flags() -> None:
 _TINY = Fraction(1, 2**90)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)], ids=lambda p: p.name)
 @pytest.mark.parametrize(
     ("weight", "arm", "gamma"),
@@ -326,6 +337,7 @@ def test_what_a_tiny_coefficient_makes_of_nothing_is_computed_as_finely_as_it_ne
         assert worst(run) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize(("about", "horizon"), [("1e-12", 20), ("1e-30", 60), ("1e-60", 110)])
 def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(

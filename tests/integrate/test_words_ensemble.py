@@ -39,6 +39,7 @@ def bits(run: Trajectory) -> list[list[Fraction]]:
     return [[exact(value) for value in state] for state in run.states]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
 def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
@@ -54,6 +55,7 @@ def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
         assert (run.steps == 0) == (alone.steps == 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", range(6, 14))
 def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
     """Loose ones ask for fewer orders in double-double than there can be."""
@@ -133,6 +135,7 @@ def test_an_observer_that_raises_ends_the_ensemble() -> None:
         propagate_multiword_ensemble(problems(), TIMES, observer=observer, threads=2)
 
 
+@pytest.mark.slow
 def test_other_formats_and_attitudes_have_the_bits_of_single_runs() -> None:
     start = State((1, "1/2", "1/3"), ("3/5", 0, "4/5"))
     xi = perpendicular(start.gamma)
@@ -143,6 +146,7 @@ def test_other_formats_and_attitudes_have_the_bits_of_single_runs() -> None:
             assert bits(run) == bits(alone)
 
 
+@pytest.mark.slow
 def test_the_gyrostat_goes_in_lanes_too() -> None:
     top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
     omega = [Fraction(n, 7) * 11 / i for n, i in zip((2, 3, 6), (3, 5, 7), strict=True)]

@@ -23,6 +23,7 @@ START = State(("1/8", "3/8", "7/8"), ("5/8", 0, "3/4"))
 MANY = real(1040)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("attitude", [False, True])
 @pytest.mark.parametrize("forwards", [True, False])
@@ -47,6 +48,7 @@ def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) 
         assert found == [(1 if forwards else -1) * rate for rate in rates(system, scaled.coefficients, state)]
 
 
+@pytest.mark.slow
 def test_more_bits_than_words_have_are_met_to_the_last() -> None:
     times = [Fraction(1, 3), Fraction(5, 4)]
     run = propagate_multiword(TOP, START, times, MANY)
@@ -58,6 +60,7 @@ def test_more_bits_than_words_have_are_met_to_the_last() -> None:
             assert abs(midpoint(ball) - exact(value)) <= MANY.eps
 
 
+@pytest.mark.slow
 def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
     whole = IntegerMotion(problem(1, attitude=True), 200, True)
     assert whole.advance(Fraction(3), 100) is Status.FINE
@@ -92,6 +95,7 @@ def test_what_an_unstable_axis_amplifies_is_there_though_no_words_would_hold_it(
     assert abs(float(first) - 1.1714) < 1e-3
 
 
+@pytest.mark.slow
 def test_backwards_is_the_way_back() -> None:
     there = propagate_multiword(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
     arrived = State([exact(v) for v in there[:3]], [exact(v) for v in there[3:]])

@@ -112,6 +112,7 @@ def test_a_solver_that_is_only_rude_leaves_nothing_behind(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_what_destroys_modules_is_a_failed_row_and_the_others_have_a_process_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "tears.py").write_text(HEAD + TEARS + "solve = right\n")
     (tmp_path / "mine.py").write_text(HEAD + "solve = right\n")

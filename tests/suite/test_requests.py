@@ -138,6 +138,7 @@ def _no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hunt, "hunt", lambda asked: Hunted(asked, (), (), 1, 1, 1.0, 1e-15, 0, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "change"), ALL, ids=lambda value: str(value)[:60])
 def test_another_request_is_incomparable(kind: str, change: dict[str, Any]) -> None:
     """Both ways round; unless the key is one that changes nothing."""
@@ -147,6 +148,7 @@ def test_another_request_is_incomparable(kind: str, change: dict[str, Any]) -> N
     assert verdicts == ({"same"} if nothing else {"incomparable"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BASES)
 def test_the_same_request_is_compared(kind: str) -> None:
     assert compare(base(kind), report(kind, BASES[kind]), Policy()).verdict == "same"
@@ -186,6 +188,7 @@ def test_the_same_data_written_otherwise_are_the_same() -> None:
     assert "3 random tops" in msgspec.convert(RANDOM, Random).exact_data
 
 
+@pytest.mark.slow
 def test_a_candidate_that_no_longer_says_its_request_is_incomparable() -> None:
     """And a baseline of before that rows said it is compared, unless its request is all that says which tops it has."""
     for kind in ("drift", "survey"):

@@ -67,7 +67,6 @@ class Task:
     options: what else the kind of measurement needs to know, and it alone.
     request: what decides the outcome beside key, case and times; it stands in the row.
     seed: which roundings; 0 for those of the data as given.
-    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
     source: of an integrator that is neither built in nor a package's.
     """
 
@@ -79,7 +78,6 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     options: Any = None
     seed: int = 0
-    fault: str = ""
     source: IntegratorSource | None = None
     request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
@@ -106,12 +104,12 @@ class Task:
     @property
     def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
+        return ChosenIntegrator(self.key.subject.name, source=self.source)
 
     @property
     def is_third_party(self) -> bool:
         """Whether code or a program of others computes the motion."""
-        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
+        return self.key.subject.what == "computed" and is_third_party(self.key.subject.name)
 
     @property
     def given(self) -> Case:

@@ -1,8 +1,7 @@
 """Integrators: what each is to this program and can do, found by name or source, and called with the options asked for.
 
-heyoka, multiword, the peers and the deliberately faulty ones (:mod:`heavytop.integrate.broken`) are instances of
-:class:`Integrator`, and so is what an entry point of another package names.  A new one of this program's is a line in
-:data:`INTEGRATORS`.
+heyoka, multiword and the peers are records of the table :data:`INTEGRATORS`, where a new one is a line; what an entry
+point of another package names is one too.  A record that is in no table is its own source.
 """
 
 from __future__ import annotations
@@ -122,6 +121,10 @@ class Integrator:
         missing = [name for name in _EVERY if name not in (self.formats or ())]
         return "" if len(missing) > 1 else "every format" + (f" but {missing[0]}" if missing else "")
 
+    def load(self) -> Callable[..., Any]:
+        """The function that propagates, imported."""
+        return load(self.propagate)  # type: ignore[no-any-return]
+
     def capabilities(self) -> dict[str, Any]:
         """As `list --json` shows them; None for what is not declared."""
         return {
@@ -145,9 +148,10 @@ def name_of(which: str | IntegratorSource) -> str:
 
 
 def described(which: str | IntegratorSource) -> Integrator:
-    """What is known of it, without looking for it: of one that is not this program's, nothing."""
-    own = INTEGRATORS.get(which) if isinstance(which, str) else None
-    return own or foreign(name_of(which))
+    """Capabilities, without a look at the integrator: a record's own; of another package's or a file's, nothing."""
+    if isinstance(which, str):
+        return INTEGRATORS.get(which) or foreign(which)
+    return which if isinstance(which, Integrator) else foreign(which.name)
 
 
 def load(place: str | Callable[..., Any]) -> Any:
@@ -155,8 +159,7 @@ def load(place: str | Callable[..., Any]) -> Any:
     return EntryPoint("", place, "").load() if isinstance(place, str) else place
 
 
-loaded = lru_cache(maxsize=64)(load)
-"""The same, looked up once: for this program's own."""
+loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
 
 
 def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
@@ -375,8 +378,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
         if own or (isinstance(which, str) and which not in known()):
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    declared = getattr(chosen, "declared", None)
-    declared = declared if isinstance(declared, Declared) else None
+    declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
     given: dict[str, Any] = dict([setting] if setting else [])
     if setting is not None or not own:
         with contained(name, " when its arguments were looked at"):

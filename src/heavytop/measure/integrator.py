@@ -16,7 +16,6 @@ from flint import arb
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import registry
-from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
@@ -41,14 +40,13 @@ _AGAIN_SECONDS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ChosenIntegrator:
-    """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka.
+    """The integrator of that name.
 
     setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
     source: where the integrator is defined, if it is neither built in nor a package's.
     """
 
     name: str = HEYOKA
-    fault: str = ""
     setting: tuple[str, Fraction] | None = None
     source: IntegratorSource | None = None
 
@@ -65,7 +63,7 @@ class ChosenIntegrator:
     @property
     def capabilities(self) -> Integrator:
         """What it can do."""
-        return FAULTS[self.fault].integrator if self.fault else described(self.which)
+        return described(self.which)
 
     @property
     def supports_ensemble(self) -> bool:
@@ -106,14 +104,8 @@ class ChosenIntegrator:
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
-        if self.fault:
-            watch = observer or (lambda time, state: None)
-            spoilt: Trajectory = load(self.capabilities.propagate)(
-                top, start, times, precision, system=system, observer=watch
-            )
-            return spoilt
         if self.capabilities.streams:
-            call = registry.propagator(self.name, {})
+            call = registry.propagator(self.which, {})
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
