@@ -11,6 +11,7 @@ from heavytop.features.local_error.measurement import Call
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE
 
+pytestmark = pytest.mark.slow
 CASE = CASES["generic"]
 INERTIA, MOMENT = ([float(value) for value in part] for part in (CASE.top.inertia, CASE.top.moment))
 TERMS = ["I2 Ω2 Ω3/I1", "I3 Ω2 Ω3/I1", "n3 γ2/I1", "n2 γ3/I1", "I3 Ω1 Ω3/I2", "I1 Ω1 Ω3/I2", "n1 γ3/I2", "n3 γ1/I2"]

@@ -123,6 +123,7 @@ def ran(folder: Path, more: str) -> Row:
     return measure(task)
 
 
+@pytest.mark.slow
 def test_a_plan_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
     monkeypatch.setattr(work_precision, "_FOR_COMPARISON", Repeats(11, 20, 0.0, 3, band=True))

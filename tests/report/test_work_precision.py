@@ -227,6 +227,7 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
     assert fastest([]) is None
 
 
+@pytest.mark.slow
 def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
     report = Report(SCHEMA, {}, {}, growth)

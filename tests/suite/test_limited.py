@@ -112,6 +112,7 @@ def ended(process: int) -> bool:
     return not there
 
 
+@pytest.mark.slow
 def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Path) -> None:
     names = ("mine.py:solve", "mine.py:stuck", "silent", "mine.py:leaves", "mine.py:interrupts")
     file = plan(tmp_path, *names)
@@ -132,6 +133,7 @@ def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Pa
     assert ended(int((tmp_path / "left").read_text()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
 def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> None:
     file = plan(tmp_path, "silent", "mine.py:stuck")
@@ -150,6 +152,7 @@ def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> N
     assert gone("sleep", "987")
 
 
+@pytest.mark.slow
 def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: Path) -> None:
     def measured(precision: str) -> ht.Report:
         tasks = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
@@ -187,6 +190,7 @@ def test_an_end_is_named_by_its_signal_or_its_exit_code() -> None:
     assert {code: how_it_ended(code) for code in said} == said
 
 
+@pytest.mark.slow
 def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: Path) -> None:
     task = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2][0]
     other = replace(task, key=read(str(plan(tmp_path, "mine.py:sleeps")), KINDS)[2][0].key)
@@ -209,6 +213,7 @@ def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: 
     assert RowLimits(7.0).seconds(task, 100.0) == 7
 
 
+@pytest.mark.slow
 def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
     file = plan(tmp_path, "mine.py:solve")
     for bad in (0, -1, "soon", "1e99"):
@@ -256,6 +261,7 @@ def solved(given):
     return Solved([given.start] * len(given.times), given.times[-1], 1)
 
 
+@pytest.mark.slow
 def test_a_callable_is_an_integrator_without_a_package(tmp_path: Path) -> None:
     top = ht.HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))
     start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

@@ -66,7 +66,6 @@ class Task:
     times: exact, of the sign of the direction; keep: those that go into the series.
     options: what else the kind of measurement needs to know, and it alone.
     seed: which roundings; 0 for those of the data as given.
-    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
     source: of an integrator that is neither built in nor a package's.
     """
 
@@ -78,7 +77,6 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     options: Any = None
     seed: int = 0
-    fault: str = ""
     source: IntegratorSource | None = None
 
     def of(self, case: Case) -> Task:
@@ -104,12 +102,12 @@ class Task:
     @property
     def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
+        return ChosenIntegrator(self.key.subject.name, source=self.source)
 
     @property
     def is_third_party(self) -> bool:
         """Whether code or a program of others computes the motion."""
-        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
+        return self.key.subject.what == "computed" and is_third_party(self.key.subject.name)
 
     @property
     def given(self) -> Case:
@@ -307,7 +305,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None

@@ -111,7 +111,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
             for precision, subject in points
         ]
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
@@ -134,7 +134,7 @@ class WorkPrecision(Kind):
 
     name = NAME
     table = WorkPrecisionTable
-    may_give_up = "work against precision"
+    may_end_early = "work against precision"
     place = 40
 
     def assumed_band(self, subject: Subject) -> float:
@@ -182,7 +182,7 @@ class WorkPrecision(Kind):
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
         end, how = task.times[-1:], _repeats(task)
         name = task.integrator.name
-        if not task.integrator.can.own and sampled.outcome is Outcome.SUCCESS:
+        if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
             counted = replace(alone, times=sampled.times, states=sampled.states)
             require_counts(name, counted, _setting(task.key.subject), error)

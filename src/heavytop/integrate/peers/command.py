@@ -150,7 +150,7 @@ class CommandIntegrator:
         value = self._setting(setting, precision)
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]
-        request = Request(problem, grid, value, command.hex)
+        request = ProgramRequest(problem, grid, value, command.hex)
         with session(command) as program:
             overhead = program.empty_request(problem)
             reply = program.ask(request)
@@ -181,7 +181,7 @@ class CommandIntegrator:
             return exact(number(DEFAULT_STEP, precision))
         return precision.eps if self.command.control else None
 
-    def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
+    def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
         flags = {command.control: number_text(request.setting, problem.precision)} if request.setting else {}
         steps = reply.counts.get("steps")
@@ -223,7 +223,7 @@ def numbers_texts(values: Sequence[Any], precision: Precision, hexadecimal: bool
     return [number_text(Fraction(value), precision, hexadecimal) for value in values]
 
 
-class Request:
+class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
     times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
@@ -282,7 +282,7 @@ def _times_written(times: list[Fraction], precision: Precision, hexadecimal: boo
 class Reply:
     """What a program answered: states of the format, counts, and what it says went wrong; wall: seconds here."""
 
-    def __init__(self, name: str, request: Request) -> None:
+    def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
         self.precision = request.problem.precision
         self.states: list[Any] = []
@@ -472,7 +472,7 @@ class Session:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first of a process is slow
-                wall = self.ask(Request(problem, [], None, self.command.hex)).wall
+                wall = self.ask(ProgramRequest(problem, [], None, self.command.hex)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
@@ -486,7 +486,7 @@ class Session:
         """Whether the program ended by itself after the last request of a row."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: Request) -> Reply:
+    def ask(self, request: ProgramRequest) -> Reply:
         """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout."""
         self.requests += 1
         reply = Reply(self.name, request)

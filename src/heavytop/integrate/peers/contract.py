@@ -186,7 +186,7 @@ def with_tolerance(run: Run) -> Callable[..., Trajectory]:
     return propagate
 
 
-class Contained:
+class CheckedPlugin:
     """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
 
     own: whether it is one of this program's: these say in words what they cannot be asked, end as ``non_finite``

@@ -42,7 +42,7 @@ def failed(row: Row, kinds: Kinds) -> bool:
     """
     if row.outcome == UNSUPPORTED:
         return False
-    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
+    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_end_early)
 
 
 def unsupported(rows: Iterable[Row]) -> str:
