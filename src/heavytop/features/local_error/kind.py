@@ -86,7 +86,7 @@ class LocalErrorKind(Kind):
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
-        return row if task.integrator.can.own else _with_fault(row, error)
+        return row if task.integrator.capabilities.own else _with_fault(row, error)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
