@@ -79,7 +79,7 @@ def _characteristic(matrix: Matrix) -> list[Fraction]:
         inner = [[v + found[-1] * (i == j) for j, v in enumerate(row)] for i, row in enumerate(power)]
         columns = [*zip(*inner, strict=True)]
         power = [[_inner(row, column) for column in columns] for row in matrix]
-        found.append(-sum(power[i][i] for i in range(size)) / n)
+        found.append(-sum((power[i][i] for i in range(size)), Fraction(0)) / n)
     return found
 
 
@@ -160,7 +160,7 @@ def _definite(p: Parameters, y: Sequence[Fraction]) -> bool:
 
 
 def _determinant(matrix: Matrix) -> Fraction:
-    return _characteristic(matrix)[-1] * (-1) ** len(matrix)
+    return _characteristic(matrix)[-1] * (-1 if len(matrix) % 2 else 1)
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:
