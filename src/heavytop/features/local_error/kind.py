@@ -16,6 +16,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
 from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Beside, Row, RowKey
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
@@ -100,7 +101,7 @@ class LocalErrorKind(Kind):
 
 
 def _cells(row: Row) -> list[Cell]:
-    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
+    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), OBSERVED_ORDER)
     return [
         clip(row.case + computed_by(row)),
         row.precision,
@@ -121,7 +122,7 @@ def _said(row: Row) -> str:
     """The largest error of a step, and the order beside the one that the integrator declares."""
     what, largest = clip(row.case + computed_by(row)), short(row.metrics[_LARGEST].value)
     text = f"{what} in {row.precision}: a step is off by {largest} eps"
-    order = row.metrics.get(local_error.ORDER.text)
+    order = row.metrics.get(OBSERVED_ORDER.text)
     if order is None:
         return f"{text} at most."
     if not row.order:
