@@ -15,6 +15,7 @@ class Feature:
     kinds: its kinds of measurement, classes of :class:`heavytop.kind.Kind`.
     commands: modules that add commands to the command line when they are imported.
     python: the names that :mod:`heavytop` has from it, by their modules.
+    motion: options of `propagate` and `reference`, a class of :class:`heavytop.cli.motions.MotionOptions`.
     explain: a function of a case, its run and the largest error of that, which says what explains the error.
     """
 
@@ -22,6 +23,7 @@ class Feature:
     kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     python: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    motion: str = ""
     explain: str = ""
 
     def load(self, name: str) -> Any:

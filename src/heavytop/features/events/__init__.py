@@ -4,5 +4,6 @@ from heavytop.feature import Feature
 
 FEATURE = Feature(
     __name__,
+    motion="options:EventOptions",
     python={"api": ("events", "poincare"), "functions": ("Events", "ReferenceEvents", "Section")},
 )

@@ -22,7 +22,7 @@ from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import exact, log10, parse
 from heavytop.records import Row
-from heavytop.report.document.motions import Allowance, WorseMotion, WorseMotions
+from heavytop.report.document.motions import LossLimits, WorseMotion, WorseMotions
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -34,7 +34,7 @@ _SAME = ("sweep", "integrator", "tolerance", "precision", "horizon")
 _TAIL = 0.025
 
 
-def worse_motions(old: Row, new: Row, files: tuple[Path, Path], limits: Allowance) -> WorseMotions | None:
+def worse_motions(old: Row, new: Row, files: tuple[Path, Path], limits: LossLimits) -> WorseMotions | None:
     """The motions of two rows of one survey, from the files of both reports; None where a file is missing.
 
     Raises InputError for a file that cannot be read.
@@ -73,7 +73,7 @@ def _records(file: Path, row: Row) -> dict[str, Any]:
     return found | {"outcome": table["outcome"].cast("string").to_numpy()}
 
 
-def _lost(before: dict[str, Any], after: dict[str, Any], limits: Allowance, row: Row) -> Any:
+def _lost(before: dict[str, Any], after: dict[str, Any], limits: LossLimits, row: Row) -> Any:
     """Decades by which the error of each motion grew beyond what is allowed; infinite where it fails now, 0 for none.
 
     A motion that failed before is never worse.

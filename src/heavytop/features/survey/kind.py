@@ -25,7 +25,7 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
 from heavytop.records import Against, Beside, Metric, Row, RowKey, Spread
 from heavytop.report.document.document import Block, Card, Chart, In, Note
-from heavytop.report.document.motions import Allowance, WorseMotions
+from heavytop.report.document.motions import LossLimits, WorseMotions
 
 NAME = "survey"
 _SWEEP = "sweep:"
@@ -113,7 +113,7 @@ class Survey(Kind):
         return msgspec.structs.replace(row, bits=precision.bits, chunk=chunk_bytes(everything))
 
     def join(
-        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], Allowance]
+        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
     ) -> WorseMotions | None:
         """By the records of survey.parquet, where both folders have it."""
         if not isinstance(new.spread, Spread):

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from heavytop.records import UNMEASURED, Beside, Metric, Quantity, Report, Row, Subject
 from heavytop.report.document.document import Block, Document, Headline, In
-from heavytop.report.document.motions import Allowance, WorseMotions
+from heavytop.report.document.motions import LossLimits, WorseMotions
 
 
 class ReportedKind(Protocol):
@@ -66,7 +66,7 @@ class ReportedKind(Protocol):
         return iter(())
 
     def join(
-        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], Allowance]
+        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
     ) -> WorseMotions | None:
         """The motions of a row of both reports that got worse, by records in their folders; None where it keeps none.
 

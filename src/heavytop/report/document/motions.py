@@ -10,7 +10,7 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.records import Identity
 
 
-class Allowance(Protocol):
+class LossLimits(Protocol):
     """What a policy allows of one metric, in decades: its floor in eps, loss, and the factor of its noise."""
 
     @property
