@@ -9,7 +9,7 @@ from itertools import permutations
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import QUAD, exact, number
 from heavytop.top.amplification import FOLLOWED, _path, amplification, rate
@@ -31,6 +31,7 @@ def hanging(sign: int, weight: object = 1) -> HeavyTop:
 STILL = State((0, 0, 0), (0, 0, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "horizon"), [("generic", 30), ("lagrange", 20), ("gyrostat", 15), ("kovalevskaya", -9)]
 )
@@ -60,7 +61,7 @@ def test_it_is_that_of_runs_from_changed_starts(name: str, horizon: int) -> None
 
 
 def follow_all(problem: Problem, times: list[Fraction]) -> list[list[Fraction]]:
-    run = follow(problem, [number(time, QUAD) for time in times])
+    run = integrate_to_samples(problem, [number(time, QUAD) for time in times])
     return [[exact(value) for value in state] for state in run.states]
 
 
@@ -84,6 +85,7 @@ def test_on_a_homoclinic_motion_it_goes_on_where_double_has_left_the_saddle() ->
     assert late - early == pytest.approx(75 * case.rate, rel=0.1)
 
 
+@pytest.mark.slow
 def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> None:
     case = CASES["euler"]
     short, long = (of(case.top, case.start, time) for time in (200, 400))
@@ -92,6 +94,7 @@ def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> 
     assert of(case.top, case.start, 10**6) == pytest.approx(10**6 / 400 * long, rel=0.3)
 
 
+@pytest.mark.slow
 def test_neither_units_nor_names_of_axes_matter() -> None:
     top, start = GENERIC.top, GENERIC.start
     plain = of(top, start, 20)

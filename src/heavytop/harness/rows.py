@@ -14,7 +14,16 @@ from typing import Any, Protocol
 import msgspec
 
 from heavytop.cases import Case
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
+from heavytop.errors import (
+    Contradiction,
+    HeavyTopError,
+    InputError,
+    NotAsked,
+    OutOfReach,
+    OutOfTime,
+    PeerFailed,
+    Unsupported,
+)
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
@@ -30,6 +39,7 @@ from heavytop.records import (
     EXACT,
     FAILED,
     FINEST,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNSUPPORTED,
@@ -58,7 +68,6 @@ class Task:
     times: exact, of the sign of the direction; keep: those that go into the series.
     options: what else the kind of measurement needs to know, and it alone.
     seed: which roundings; 0 for those of the data as given.
-    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
     source: of an integrator that is neither built in nor a package's.
     """
 
@@ -70,7 +79,6 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     options: Any = None
     seed: int = 0
-    fault: str = ""
     source: IntegratorSource | None = None
 
     def of(self, case: Case) -> Task:
@@ -96,12 +104,12 @@ class Task:
     @property
     def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
+        return ChosenIntegrator(self.key.subject.name, source=self.source)
 
     @property
     def is_third_party(self) -> bool:
         """Whether code or a program of others computes the motion."""
-        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
+        return self.key.subject.what == "computed" and is_third_party(self.key.subject.name)
 
     @property
     def given(self) -> Case:
@@ -226,6 +234,7 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
     PeerFailed: FAILED,
     Unsupported: UNSUPPORTED,
     OutOfTime: OUT_OF_TIME,
+    NotAsked: NOT_ASKED,
 }
 
 
@@ -297,7 +306,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """The cases that its tasks on a sweep are of: each, or others that hold many of them."""
         return cases
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None

@@ -18,10 +18,10 @@ from heavytop.precision import (
     DOUBLE,
     Precision,
     Vector,
+    cache_last_call,
     cross,
     decimal_text,
     exact,
-    last_call,
     native,
     native_text,
     number,
@@ -255,7 +255,7 @@ class Problem:
         return [number(exact(value), self.precision) for value in values]
 
 
-@last_call
+@cache_last_call
 def _rounded(
     top: HeavyTop, start: State, precision: Precision, system: System, xi: tuple[Fraction, ...] | None
 ) -> Problem:
@@ -268,7 +268,7 @@ def _rounded(
     return Problem(system, precision, parameters, rounded_start, None if xi is None else both(xi), (top, start))
 
 
-@last_call
+@cache_last_call
 def _rounded_parameters(top: HeavyTop, start: State | None, precision: Precision, system: System) -> Parameters:
     given = system.parameters(top, _ANY_START if start is None else start)
     return given.mapped(lambda value: rounded(Fraction(value), precision))
@@ -282,7 +282,7 @@ class OtherFlags(InputError):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ResumePoint:
     """Where a run is: all that it needs to go on with the same bits, in native numbers.
 
     samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
@@ -328,7 +328,7 @@ class Place:
         }
 
     @classmethod
-    def of(cls, content: dict[str, Any], precision: Precision) -> Place:
+    def of(cls, content: dict[str, Any], precision: Precision) -> ResumePoint:
         """The place with that :meth:`content`."""
         state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
         samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
@@ -387,7 +387,7 @@ class InSpace:
         return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
 
-class _MadeWhenAsked:
+class LazyStates:
     """States that a function makes when they are first asked for."""
 
     __slots__ = ("_make",)
@@ -406,7 +406,7 @@ class _MadeWhenAsked:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trajectory(_MadeWhenAsked, Tabular, InSpace):
+class Trajectory(LazyStates, Tabular, InSpace):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
@@ -568,11 +568,11 @@ class SampledRun(Protocol):
         """How it came to the time, given as the native number and exactly, and the native state there."""
         ...
 
-    def take_up(self, place: Place, covered: Any) -> None:
+    def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
         ...
 
-    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""
         ...
 
@@ -583,8 +583,8 @@ def sampled(
     flags: dict[str, str],
     began: float,
     observer: Observer | None,
-    place: Place | None,
-    mark: Callable[[Place], None] | None,
+    place: ResumePoint | None,
+    mark: Callable[[ResumePoint], None] | None,
 ) -> tuple[tuple[Fraction, ...], tuple[Any, ...], Outcome, float]:
     """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
 

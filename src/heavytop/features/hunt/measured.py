@@ -23,7 +23,7 @@ from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed
 from heavytop.exact.catalogue import matches
 from heavytop.harness.sweeps import Random
 from heavytop.integrate import registry
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.registry import is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -541,7 +541,7 @@ class Meter:
     def _finely(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
         times = [number(time, self._fine) for time in self.times]
         try:
-            runs = propagate_words_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
+            runs = propagate_multiword_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
         except OutOfReach:
             return [None] * len(problems)
         done = [run.outcome is Outcome.SUCCESS for run in runs]

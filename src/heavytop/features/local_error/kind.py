@@ -72,7 +72,7 @@ class LocalErrorKind(Kind):
         case, precision = task.given, task.precision
         given = case.top, case.start, task.times[-1], precision, case.system
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
-        if task.integrator.can.steps:
+        if task.integrator.capabilities.steps:
             run, taken = task.integrator.first_steps(*given)
             steps = zip(run.times, taken, strict=True)
         else:
@@ -80,7 +80,7 @@ class LocalErrorKind(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
-        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.can.own:
+        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.capabilities.own:
             require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")

@@ -79,7 +79,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         failed=len(failures),
         not_supported=unsupported(report.rows),
         lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
-        gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
+        gave_up=Counter(kind_of(row, kinds).may_end_early for row in report.rows if _gave_up(row, kinds)),
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
@@ -100,7 +100,7 @@ def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:
     """Whether a run ended early that may: a finding about its integrator, in its chart."""
-    return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
+    return bool(kind_of(row, kinds).may_end_early) and row.outcome not in ("success", *UNMEASURED)
 
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
