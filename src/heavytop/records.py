@@ -379,8 +379,8 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
     data: of the top and its start, before any rounding; null where no motion is measured.
-    amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
-    an estimate; null where no single motion is integrated.
+    amplification: the largest factor by which the motion itself has amplified a change of its state, whenever that was
+    made, up to the horizon, an estimate; null where no single motion is integrated.
     explained: what explains the states of a third-party integrator that are far off, where something does.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     worst: of a survey, first the worst; spread: its distributions.  chunk: Parquet bytes of a part of one; no report

@@ -17,7 +17,7 @@ from heavytop.features import FEATURES
 
 _ORDER = (
     *("run", "compare", "history", "show", "export"),
-    *("propagate", "reference", "score", "audit", "claims", "figures"),
+    *("propagate", "reference", "score", "audit", "claims", "figures", "body"),
     *("selftest", "check-integrator", "new", "hunt", "list", "docs"),
 )
 """The commands in the order of ``heavytop --help``; others come last."""

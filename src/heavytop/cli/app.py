@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -13,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.output import printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ImpossibleBody, InputError, quoted
 
 app = typer.Typer(
     help="Measure how wrong computed and claimed motions of a heavy top are, against references that are proven.",
@@ -87,7 +88,8 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
     def with_exit_code(*args: Any, **options: Any) -> None:
         from heavytop.cli.output import told_when_slow
 
-        with told_when_slow(name):
+        with told_when_slow(name), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImpossibleBody)  # the command says so itself
             code = function(*args, **options)
         raise typer.Exit(code)
 

@@ -22,6 +22,7 @@ NAMES = (
     "survey",
     "events",
     "derivatives",
+    "body",
 )
 """In the order of the summary of a run."""
 FEATURES: tuple[Feature, ...] = tuple(import_module(f"{__name__}.{name}").FEATURE for name in NAMES)

@@ -181,6 +181,8 @@ def _text(value: Any, digits: int) -> str:
 
 _FEW_DIGITS = 3.0
 """An amplification that costs fewer digits is not mentioned."""
+_BEYOND = 4
+"""Every digit is lost where a rounding has grown to so many bits more than the format has: most are smaller."""
 _SHOWN = 15
 """Digits of a number in a table for people; all of them are in :meth:`Trajectory.texts`."""
 
@@ -500,25 +502,42 @@ class Trajectory(LazyStates, Tabular, InSpace):
 
     @property
     def amplification(self) -> float:
-        """The largest factor by which the motion itself has amplified a change of its start up to ``time_reached``.
+        """The largest factor by which the motion itself has amplified a change of its state up to ``time_reached``,
+        whenever that was made.
 
         An estimate from the variational equation, computed when it is asked for.
         """
         from heavytop.top.amplification import amplification
 
+        return amplification(*self._followed)
+
+    @property
+    def digits_lost(self) -> tuple[float, bool]:
+        """Decimal digits that a state loses until ``time_reached`` where it is rounded to the format at the worst time
+        before; and whether that is followed so far, not a lower estimate.
+        """
+        from heavytop.top.amplification import digits_eaten, loss
+
+        factor, followed = loss(*self._followed)
+        return digits_eaten(factor), followed
+
+    @property
+    def _followed(self) -> tuple[System, Parameters, tuple[Fraction, ...], Fraction]:
         problem = self.problem
-        return amplification(problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached)
+        return problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached
 
     def amplification_text(self) -> str:
         """What the amplification costs, in a sentence; "" where it costs fewer than three digits."""
-        lost, digits = math.log10(self.amplification), round(self.problem.precision.bits * math.log10(2))
+        (lost, followed), precision = self.digits_lost, self.problem.precision
         if lost < _FEW_DIGITS:
             return ""
-        until = decimal_text(self.time_reached, 6)
-        if lost >= digits:
-            return f"the motion itself amplifies roundings: all {digits} digits are lost before t = {until}"
-        by = f"by 1e{lost:.0f} until t = {until}: {lost:.0f} of {digits} digits are lost"
-        return f"the motion itself amplifies roundings {by}"
+        digits, until = round(precision.bits * math.log10(2)), decimal_text(self.time_reached, 6)
+        state = f"the motion itself amplifies roundings: a state rounded to {precision.name} on the way has lost"
+        if lost >= (precision.bits + _BEYOND) * math.log10(2):
+            return f"{state} all {digits} digits before t = {until}"
+        return (
+            f"{state} {'' if followed else 'at least '}{min(int(lost), digits - 1)} of {digits} digits by t = {until}"
+        )
 
     def _repr_html_(self) -> str:
         states, carried = self.states, self.states.shape[1:] == (9,)

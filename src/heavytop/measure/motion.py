@@ -228,6 +228,7 @@ class Motion:
             "flags": run.flags,
             "seconds": run.seconds,
             "amplification": run.amplification if math.isfinite(run.amplification) else None,
+            "digits_lost": dict(zip(("value", "followed"), run.digits_lost, strict=True)),
             "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
         }
         if run.problem.xi is not None:

