@@ -194,7 +194,11 @@ def export(
 @command
 def run(
     plan: Annotated[
-        str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.", autocompletion=plans)
+        str,
+        typer.Option(
+            help="smoke, default, growth, long, peers, gate, bodies, claims, selftest, or a TOML file.",
+            autocompletion=plans,
+        ),
     ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
