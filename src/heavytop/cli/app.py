@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from heavytop.cli.output import printable
 from heavytop.errors import ImpossibleBody, InputError, quoted
@@ -81,6 +82,16 @@ def cases(begun: str) -> list[str]:
     return [name for name in CASES if name.startswith(begun)]
 
 
+class _Command(TyperCommand):
+    """A command whose help shows of a list of files the type of its entries."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        for parameter in self.params:
+            if parameter.nargs == -1:
+                parameter.display_type = lambda ctx: "<path>..."  # type: ignore[attr-defined]
+
+
 def command(function: Callable[..., int]) -> Callable[..., None]:
     """A command of the program that ends with the exit code which ``function`` returns."""
 
@@ -94,7 +105,7 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
         raise typer.Exit(code)
 
     name = function.__name__.rstrip("_").replace("_", "-")
-    return app.command(name=name)(with_exit_code)
+    return app.command(name=name, cls=_Command)(with_exit_code)
 
 
 def show_on_terminal(renderable: Any) -> None:

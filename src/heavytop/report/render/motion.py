@@ -334,6 +334,8 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
         drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
+    if (steady := run.stability) is not None:
+        parts += [Text(), Text(f"{steady.text(precision.bits).capitalize()}.")]
     if lost := run.amplification_text():
         parts += [Text(), Text(f"{lost[:1].upper()}{lost[1:]}.")]
     return Group(*parts, *_undefined(table))
@@ -344,6 +346,7 @@ def reference_text(found: Reference, table: MotionTable) -> RenderableType:
     parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
     if found.attitude_method not in (None, found.method):
         parts.append(Text(f"attitude: {found.attitude_method}"))
+    parts += [Text(found.stability.text())] if found.stability else []
     parts += _attitude_at_start(table)
     derivatives = [] if found.derivatives is None else derivative_lines(found.times, found.derivatives)
     return Group(*parts, *_at_each_time(table), *_undefined(table), *derivatives)
