@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import permutations
 from math import isqrt, lcm
+from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, quoted
@@ -264,6 +265,21 @@ class Body:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    @classmethod
+    def from_file(
+        cls, path: str | Path, link: str | None = None, pivot: Iterable[Any] | None = None, gravity: Given = "9.81"
+    ) -> Body:
+        """The body of a URDF, MJCF, SDF, USD (text) or TOML file, or its link of that name, in the axes of the link.
+
+        pivot: the fixed point there; without it the ball joint of the body, or the origin.
+        Raises InputError for a file that cannot be read, for several bodies without ``link``, and for a tensor that no
+        body has, with the slip that makes it one.
+        """
+        from heavytop.top.body_files import read_body
+
+        found = read_body(Path(path), link).about(None if pivot is None else vector(pivot, "pivot"))
+        return cls(found.mass, gravity, found.centre, found.six, PIVOT if found.at_pivot else CENTRE)
+
     def __repr__(self) -> str:
         texts = [[exact_text(value) for value in row] for row in self.tensor]
         extra = "" if self.rotor is None else f", rotor={_texts(self.rotor)}"
@@ -435,9 +451,19 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     Raises InputError for what is missing, contradicts another, or is no body or start.
     """
     given = {key: value for key, value in values.items() if value is not None and value != []}
+    if "file" in given:
+        return body_of(given), _start(given, normalize)
     for key in ("inertia", "centre"):
         _require(given, key)
     return _body(given), _start(given, normalize)
+
+
+def body_of(given: Mapping[str, Any]) -> Body:
+    """The body of a ``file``, and ``link``, with the gravity that stands beside it; raises InputError for more keys."""
+    twice = [key for key in BODY if key in given and key != "gravity"]
+    if twice:
+        raise InputError(f"file and {twice[0]} were given.", f"The file says {twice[0]}: leave it out.")
+    return Body.from_file(given["file"], given.get("link"), gravity=given.get("gravity", "9.81"))
 
 
 def _require(given: Mapping[str, Any], key: str) -> Any:
