@@ -22,6 +22,7 @@ from heavytop.precision import (
     rational_root,
     round_to,
     shown,
+    six_digits,
     vector,
 )
 from heavytop.top.attitude import Attitude, Rows, Three, multiplied, perpendicular, rotated, rotation_of, transposed
@@ -412,9 +413,20 @@ def _warnings_about_centre(body: Body) -> list[str]:
     whole = dot(vector(second[0], "row"), cross(vector(second[1], "row"), vector(second[2], "row")))
     if min(second[0][0], second[1][1], second[2][2], *pairs, whole) >= 0:
         return []
-    moments = ", ".join(shown(central[i][i]) for i in range(3))
+    moments = ", ".join(six_digits(value) for value in _principal_moments(central))
     meant = "" if body.about == CENTRE else f' If it was meant about it, give about = "{CENTRE}".'
-    return [f"The inertia tensor about the centre of mass, diagonal {moments}, is not that of a rigid body.{meant}"]
+    return [f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's.{meant}"]
+
+
+def _principal_moments(tensor: Tensor) -> list[Fraction]:
+    """In increasing order, to the digits of double; exact of a diagonal tensor."""
+    import numpy
+
+    if not any(tensor[i][j] for i, j in ((0, 1), (0, 2), (1, 2))):
+        return sorted(tensor[i][i] for i in range(3))
+    size = max(abs(value) for row in tensor for value in row)
+    values = numpy.linalg.eigvalsh([[float(value / size) for value in row] for row in tensor])
+    return [Fraction(value) * size for value in values.tolist()]
 
 
 def _require_positive(tensor: Tensor) -> None:
