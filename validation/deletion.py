@@ -2,10 +2,10 @@
 
     python -m validation.deletion [FEATURE ...] [--few] [--plant]
 
-Copies the checkout, removes the package of a feature, its line in the registry, its tables in the plans that ship and the
-tests that name it or what it adds.  In the copy every module is imported, the smoke plan is run, and the quick tests that
-are left pass; with --few those of the rooms that all share.  --plant lets a shared room import the feature first, which
-has to be found.  Exit 1 where one cannot be deleted.
+Copies the checkout, removes the package of a feature, its line in the registry, its tables in the plans that ship and
+the tests that name it or what it adds.  In the copy every module is imported, the smoke plan is run, and quick tests
+that are left pass; with --few some of the rooms that all share.  --plant lets a shared room import the feature first,
+which has to be found.  Exit 1 where one cannot be deleted.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def naming_tests(folder: Path, naming: re.Pattern[str]) -> Iterator[Path]:
 
 
 def without_kinds(plan: str, kinds: set[str]) -> str:
-    """The text of a plan without the tables of these kinds, and without the sweeps and tops that nothing else measures."""
+    """The text of a plan without the tables of these kinds, and the sweeps and tops that nothing else measures."""
     head, *tables = re.split(r"^(?=\[\[)", plan, flags=re.M)
     kept = [table for table in tables if (m := re.search(r'^kind = "(\w+)"', table, re.M)) is None or m[1] not in kinds]
     measured = "".join(table for table in kept if table.startswith("[[measure]]"))
