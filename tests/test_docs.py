@@ -283,6 +283,14 @@ def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
         assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
 
 
+def test_a_stranger_sees_a_result_in_the_first_lines_of_a_short_readme() -> None:
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    assert len(lines) <= 120
+    (result,) = [block for block in blocks(ROOT / "README.md") if block.language == "text"]
+    assert result.line <= 40
+    assert result.text in (DOCS / "score.md").read_text("utf-8"), "which runs the same commands, and compares"
+
+
 def test_the_page_of_gates_shows_the_example_as_it_is() -> None:
     shown = [block.text for block in blocks(DOCS / "gate.md")]
     for file in ("mine.py", "gate.toml"):
