@@ -51,7 +51,7 @@ def test_there_are_ten() -> None:
 
 
 def test_one_amplified_start_on_another_processor_is_no_alarm() -> None:
-    """Kovalevskaya's top in extended, 11.9 and 10.8 digits with the same drifts; an error of every kind as large is one."""
+    """Kovalevskaya's top in extended, 11.9 and 10.8 digits with the same drifts; with drifts as large it is one."""
     report_of = store.read(ROOT / "results" / "long")
     (old,) = (r for r in report_of.rows if (r.case, r.precision, r.key.kind) == ("kovalevskaya", "extended", "growth"))
 

@@ -14,21 +14,19 @@ import typer
 from heavytop.cli.app import (
     Json,
     absolute,
-    cases,
     command,
     plans,
     print_json,
     require_apart,
-    require_new,
     show_on_terminal,
     writing,
 )
 from heavytop.cli.output import Progress, counted, say, say_former
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode
 from heavytop.report.render import FORMATS
 
 if TYPE_CHECKING:
-    from heavytop.records import Report
+    pass
 
 _REPORT_SECONDS = 0.1
 """Expected of reading one."""
@@ -97,7 +95,7 @@ def history(
         print_json(found.to_json())
     else:
         show_on_terminal(history_text(found.names, found.tracks))
-    return 0
+    return ExitCode.GOOD
 
 
 def _write(files: list[tuple[Path, str]]) -> None:
@@ -130,7 +128,7 @@ def show(
     require_apart(files, report)
     if not files:
         _print(report, full, json)
-        return 0
+        return ExitCode.GOOD
     found = read_report(report)
     with ExitStack() as stack:
         stack.enter_context(writing())
@@ -143,7 +141,7 @@ def show(
             tables.write(parquet, found.rows, found.plan)
     for path in files:
         print(path)
-    return 0
+    return ExitCode.GOOD
 
 
 def _print(report: Path, full: bool, json: bool) -> None:
@@ -188,7 +186,7 @@ def export(
         print(text, end="")
     else:
         _write([(out, text)])
-    return 0
+    return ExitCode.GOOD
 
 
 # `run`.
@@ -247,7 +245,7 @@ def run(
         ended = asked.finished()
         print(ended.summary)
         print(f"\nReport: {directory / REPORT} (was finished already)")
-        return 0 if ended.good else 3
+        return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
     began = perf_counter()
     try:
         with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
@@ -256,13 +254,13 @@ def run(
         kept = f"finished rows are kept: --out {directory} --resume goes on"
         said = kept if (directory / ROWS).exists() else "no row was finished"
         say(f"interrupted; {said}")
-        return 143 if isinstance(stop, _Terminated) else 130
+        return ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED
     print(ended.summary)
     page = directory / PAGE
     print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
     print(f"Report: {directory / REPORT}")
     print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
-    return 0 if ended.good else 3
+    return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
 
 
 class _Terminated(KeyboardInterrupt):
@@ -283,72 +281,3 @@ def _stopped_by_signals() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-# `score`.
-
-
-_STATE_SECONDS = 1e-3
-"""Expected of comparing one state."""
-
-
-@command
-def score(
-    trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
-    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
-    out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
-    require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
-    normalize: Annotated[
-        bool,
-        typer.Option("--normalize", help="Take quaternions, matrices and gamma of any length."),
-    ] = False,
-    json: Json = False,
-) -> int:
-    """Say how many digits of your trajectory are right.
-
-    Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
-    first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
-    Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
-
-    Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
-    3 where it ended early, or that is not known.
-    """
-    from heavytop.features.score.api import read_trajectory, scored
-
-    if out is not None:
-        out = absolute(out)
-        require_new(out)
-    require_apart((html,), trajectory)
-    page = None if html is None else absolute(html)
-    given, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
-    for warning in given.warnings():
-        say(f"warning: {warning}")
-    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
-        found = scored(given, needed, advance)
-    if out is not None:
-        _write_report(found.report(), out)
-    if page is not None:
-        _write([(page, found.to_html())])
-    if json:
-        print_json(found.to_json())
-        return found.exit_code
-    from heavytop.features.score.text import requirement, score_text
-
-    show_on_terminal(score_text(found.assessment))
-    if html is not None:
-        print(f"\nPage: {html}")
-    if needed is not None:
-        print(f"\n{requirement(found.row, needed)}")
-    return found.exit_code
-
-
-def _write_report(report: Report, out: Path) -> None:
-    """The report that `compare` and `show` read."""
-    from heavytop.report.store import store
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        store.write(report, out)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
