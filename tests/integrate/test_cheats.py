@@ -1,7 +1,7 @@
 """Integrators of another package that cheat: what they say of themselves is measured, and their row fails with why.
 
 Their rows are measured in this process, as the process of a row measures them; that each has one of its own is tested
-in tests/suite/test_limited.py.
+in tests/harness/test_limited.py.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def slow(top, start, times, precision, *, system, tolerance=None):
 
 def _solve_slowly(given):
     sleep(0.02)
-    found = _solver(8)(replace(given, setting=1 / 32))
+    found = _solver(8)(replace(given, control=1 / 32))
     return Solved(found.states, found.reached, found.steps, None, 0.02)
 
 

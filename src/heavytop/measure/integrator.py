@@ -42,12 +42,12 @@ _AGAIN_SECONDS = 1.0
 class ChosenIntegrator:
     """The integrator of that name.
 
-    setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
+    control: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
     source: where the integrator is defined, if it is neither built in nor a package's.
     """
 
     name: str = HEYOKA
-    setting: tuple[str, Fraction] | None = None
+    control: tuple[str, Fraction] | None = None
     source: IntegratorSource | None = None
 
     @classmethod
@@ -109,7 +109,7 @@ class ChosenIntegrator:
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
-            peer = registry.ready(self.which, self.setting)
+            peer = registry.ready(self.which, self.control)
             beside = {} if xi is None else {"xi": xi}
             run = peer(top, start, times, precision, system=system, **beside)
             if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
@@ -143,7 +143,7 @@ class ChosenIntegrator:
             runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
             return runs
         if options.keys() == {"tolerance"}:
-            given = replace(self, setting=("tolerance", options["tolerance"]))
+            given = replace(self, control=("tolerance", options["tolerance"]))
             return given.propagate_many(problems, times, observer, finished, threads)
         if options:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
@@ -355,7 +355,7 @@ def _rested(integrate: Integrate, times: Sequence[Fraction], start: State) -> fl
     return float(integrate(times, start).seconds["run"])
 
 
-def require_counts(name: str, run: Trajectory, setting: tuple[str, Fraction] | None, error: Fraction | None) -> None:
+def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | None, error: Fraction | None) -> None:
     """Raises PeerFailed where a run to its end cannot have as few steps as it says, with the ``error`` that it has.
 
     Steps are no fewer than half of those that a step size asks for, and no more than the evaluations of the field.  One
@@ -364,11 +364,11 @@ def require_counts(name: str, run: Trajectory, setting: tuple[str, Fraction] | N
     """
     if NOT_COUNTED.items() <= run.flags.items():
         return
-    if reason := next(_impossible_counts(run, setting, error), ""):
+    if reason := next(_impossible_counts(run, control, error), ""):
         raise PeerFailed(f"{name} counts its steps wrongly: {reason}")
 
 
-def _impossible_counts(run: Trajectory, setting: tuple[str, Fraction] | None, error: Fraction | None) -> Iterator[str]:
+def _impossible_counts(run: Trajectory, control: tuple[str, Fraction] | None, error: Fraction | None) -> Iterator[str]:
     start, span = run.problem.start.flat, abs(run.times[-1])
     states = numpy.array([[float(exact(value)) for value in state] for state in (start, *run.states)])
     if not run.steps:
@@ -377,8 +377,8 @@ def _impossible_counts(run: Trajectory, setting: tuple[str, Fraction] | None, er
         return
     if run.evaluations is not None and run.evaluations < run.steps:
         yield f"{run.steps}, and {run.evaluations} evaluations of the field"
-    if setting is not None and setting[0] == "step" and 2 * run.steps < span / setting[1]:
-        yield f"{run.steps} over {decimal_text(span, 6)}, where each is {decimal_text(setting[1], 3)}"
+    if control is not None and control[0] == "step" and 2 * run.steps < span / control[1]:
+        yield f"{run.steps} over {decimal_text(span, 6)}, where each is {decimal_text(control[1], 3)}"
     if error is None or not run.order:
         return
     angle = _rate(run.problem, states) * float(span) / run.steps

@@ -165,12 +165,12 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = registry.control(integrator.which) == "step"
+    fixed = registry.control_name(integrator.which) == "step"
     length = until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
         tau = exact(number(n * length, precision))
-        asked = replace(integrator, setting=("step", tau)) if fixed else integrator
+        asked = replace(integrator, control=("step", tau)) if fixed else integrator
         return asked.propagate_many(problems, [tau])
 
     own = over(1)
