@@ -309,8 +309,8 @@ def test_what_several_pages_say_of_the_peers_is_what_the_report_says() -> None:
     }
     assert f"it is {low} to {high} times as fast" in pages["docs/choose.md"]
     assert re.search(rf"heyoka is {low} \([^)]+\) to {high} times \([^)]+\) as fast", pages["results/README.md"])
-    minutes = {re.search(r"plan peers\b[^;.]*?, (\w+) minutes", text)[1] for text in pages.values()}
-    minutes |= {re.search(r"peers (\w+),", typer.main.get_command(app).commands["run"].help)[1]}
+    minutes = {re.search(r"plan peers\b[^;]*?, (\w+) minutes", text)[1] for text in pages.values()}
+    minutes |= {re.search(r"peers\s+(\w+),", typer.main.get_command(app).commands["run"].help)[1]}
     assert len(minutes) == 1
 
 
