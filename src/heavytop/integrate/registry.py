@@ -294,6 +294,8 @@ def _require_possible(command: Command) -> None:
             parse(each)
     if not command.precisions:
         raise InputError("precisions is empty.")
+    if not all(map(any, command.declared.singular_at)):
+        raise InputError("singular_at holds the zero vector, which has no direction.")
 
 
 def seconds_of(value: Any, what: str) -> float:
@@ -375,8 +377,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
         if own or (isinstance(which, str) and which not in known()):
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    declared = getattr(chosen, "declared", None)
-    declared = declared if isinstance(declared, Declared) else None
+    declared = _of_peer(chosen)
     given: dict[str, Any] = dict([setting] if setting else [])
     if setting is not None or not own:
         with contained(name, " when its arguments were looked at"):
@@ -392,6 +393,21 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
     return Contained(name, chosen, own, declared, given)
+
+
+def _of_peer(peer: Peer) -> Declared | None:
+    declared = getattr(peer, "declared", None)
+    return declared if isinstance(declared, Declared) else None
+
+
+def declared(which: str | IntegratorSource) -> Declared:
+    """What an integrator declares of itself: nothing where it cannot be imported."""
+    if isinstance(which, Command):
+        return which.declared
+    try:
+        return _of_peer(peer(which)) or Declared()
+    except InputError:
+        return Declared()
 
 
 def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:

@@ -4,19 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from math import inf
 
 import msgspec
 
 from heavytop.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.document.document import Table as Cells
-from heavytop.errors import OutOfReach
-from heavytop.integrate.trajectory import Outcome, TaylorStep
+from heavytop.errors import OutOfReach, Unsupported
+from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
-from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.local_error import require_sum, single_calls
-from heavytop.precision import parse, time_text
-from heavytop.records import Against, Beside, Row, RowKey
+from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.local_error import (
+    ORDER,
+    ORDER_OF_RUNS,
+    error_at_end,
+    order_of_runs,
+    single_calls,
+    stepped,
+    unexplained,
+)
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact, parse, time_text
+from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import positive
 from heavytop.suite.rows import Find, PlanTable, Task, computed, computed_row
@@ -25,6 +36,8 @@ NAME = "local_error"
 _AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")
 
 
+ERROR = Quantity("error", statistic="final")
+"""Of the run of a method that keeps a memory, at its end, largest component."""
 _LARGEST = local_error.LOCAL_ERROR.over("max").text
 _UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
 
@@ -70,6 +83,8 @@ class LocalErrorKind(Kind):
         """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
         case, precision = task.given, task.precision
         given = case.top, case.start, task.times[-1], precision, case.system
+        if not task.integrator.one_step:
+            return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
         if task.integrator.can.steps:
             run, taken = task.integrator.first_steps(*given)
@@ -79,12 +94,15 @@ class LocalErrorKind(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
-        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.can.own:
-            require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
-        return msgspec.structs.replace(row, samples=error.running.count)
+        row = msgspec.structs.replace(row, samples=error.running.count)
+        if run.outcome is not Outcome.SUCCESS or task.integrator.can.own:
+            return row
+        text = unexplained(run, exact(step.length), error.largest, row.amplification or 1.0)
+        explained = Explained("steps", text) if text else msgspec.UNSET
+        return msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run), explained=explained)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
@@ -92,15 +110,38 @@ class LocalErrorKind(Kind):
         """
         told = _told(rows)
         if told:
-            yield Headline(_said(max(told, key=lambda row: row.metrics[_LARGEST])))
+            yield Headline(_said(max(told, key=_size)))
         yield from (Note(_said(row), shown=In.SHORT) for row in told)
-        columns = "case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"
+        columns = "case", "format", "steps", "largest", "rms", "order seen", "of runs", "declared", "outcome"
         title = "Single steps, each against the proven motion from where it starts"
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
 
 
+def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
+    """Of a method with a memory: the error at the end, and the order that whole runs show."""
+    if integrator.setting is None:
+        raise Unsupported(
+            f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
+            "single step.",
+            "Measure whole runs: work_precision.",
+        )
+    case = task.given
+    run = integrator.propagate(case.top, case.start, task.times, task.precision, case.system)
+    metrics = {}
+    if run.outcome is Outcome.SUCCESS:
+        metrics = by_name({ERROR: of_fraction(error_at_end(run))}) | _order_of_runs(task, run)
+    return computed_row(task, run, metrics, {}, _AGAINST)
+
+
+def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
+    """The order that whole runs show, of a method with fixed steps; none where they do not agree on one."""
+    integrator = stepped(task.integrator)
+    order = None if integrator.setting is None else order_of_runs(integrator, run)
+    return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
+
+
 def _cells(row: Row) -> list[Cell]:
-    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
+    quantities = local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), ORDER, ORDER_OF_RUNS
     return [
         clip(row.case + computed_by(row)),
         row.precision,
@@ -114,17 +155,45 @@ def _cells(row: Row) -> list[Cell]:
 def _told(rows: Sequence[Row]) -> list[Row]:
     """Those that have an error; of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
-    return [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
+    return [row for row in theirs or rows if any(_number(row, each) for each in (_LARGEST, ERROR.text))]
+
+
+def _size(row: Row) -> float:
+    """log10 of the largest error of a step."""
+    metric = row.metrics.get(_LARGEST)
+    return -inf if metric is None or metric.log10 is None else metric.log10
+
+
+def _number(row: Row, name: str) -> str:
+    """The metric in short; "" where there is none."""
+    metric = row.metrics.get(name)
+    return "" if metric is None or metric.value == "missing" else short(metric.value)
 
 
 def _said(row: Row) -> str:
-    """The largest error of a step, and the order beside the one that the integrator declares."""
-    what, largest = clip(row.case + computed_by(row)), short(row.metrics[_LARGEST].value)
-    text = f"{what} in {row.precision}: a step is off by {largest} eps"
-    order = row.metrics.get(local_error.ORDER.text)
-    if order is None:
-        return f"{text} at most."
-    if not row.order:
-        return f"{text} at most; its order is {order.value}."
-    declared = "as it says" if order.value == str(row.order) else f"not the {row.order} that it says"
-    return f"{text} at most; its order is {order.value}, {declared}."
+    """The largest error of a step, or of a run of what keeps a memory, and the order beside the declared one."""
+    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", _number(row, _LARGEST)
+    if largest:
+        text = f"{text}: a step is off by {largest} eps at most"
+    else:
+        text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
+    order = _order(row)
+    return f"{text}{'; ' if order else ''}{order}.{' ' + row.explained.text if row.explained else ''}"
+
+
+def _order(row: Row) -> str:
+    """The order that the method shows beside the one that it declares; "" for none.
+
+    Of a third-party integrator it is that of whole runs: one of single steps may be that of a starting method.
+    """
+    single, runs = (_number(row, each.text) for each in (ORDER, ORDER_OF_RUNS))
+    order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
+    if not order:
+        return ""
+    text = f"its order is {order}{'' if known else ' in single steps'}"
+    if order == str(row.order):
+        text += ", as it says"
+    elif row.order and known:
+        text += f", {'not' if int(order) < row.order else 'more than'} the {row.order} that it says"
+    hint = f" ({single} in single steps: declare one_step = false where it keeps a memory)"
+    return text + (hint if runs and single not in ("", runs) else "")

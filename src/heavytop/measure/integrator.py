@@ -76,7 +76,7 @@ class ChosenIntegrator:
     def carries_attitude(self) -> bool:
         """Whether it declares that ξ rides along; not one that cannot be used."""
         if isinstance(self.source, Command):
-            return self.source.attitude
+            return bool(self.source.attitude)
         if self.can.own:
             return self.can.attitude
         try:
@@ -84,6 +84,11 @@ class ChosenIntegrator:
         except (InputError, PeerFailed):
             return False
         return bool(peer.carries_attitude)
+
+    @property
+    def one_step(self) -> bool:
+        """Whether a step depends on the state where it begins alone: unless it declares that it has a memory."""
+        return self.can.own or registry.declared(self.which).one_step
 
     def propagate(
         self,

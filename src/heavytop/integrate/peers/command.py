@@ -28,9 +28,9 @@ import numpy
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.guard import Guard, how_it_ended
-from heavytop.integrate.peers.contract import Declared, said
+from heavytop.integrate.peers.contract import Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, vector
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
@@ -62,7 +62,7 @@ _OF_STATES = b"0123456789+-.eE \tsta"
 """The characters of lines of states in decimal."""
 _as_doubles = msgspec.json.Decoder(list[float]).decode
 """Reads a JSON list of numbers, each rounded correctly, in a tenth of the time that `float` takes."""
-_STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 9)}
+_STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 7, 9)}
 _PAIRS = {"steps": int, "evaluations": int, "seconds": float}
 
 
@@ -70,7 +70,8 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """A program that integrates, as the table `[[integrator]]` describes it.
 
     name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: what it is set by.
-    precisions, systems, directions, attitude: what it declares that it can do.  timeout: seconds of one request.
+    precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: what it declares that it can do, as
+    :class:`heavytop.integrate.peers.contract.Declared`.  timeout: seconds of one request.
     hex: whether it is given hexadecimal numbers.  folder: of the file; its working directory.
     """
 
@@ -83,7 +84,10 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     timeout: str | int | float = "600"
     systems: tuple[str, ...] = (HEAVY_TOP.name,)
     directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
-    attitude: bool = False
+    attitude: bool | Literal["quaternion"] = False
+    one_step: bool = True
+    fixed_grid: bool = False
+    singular_at: tuple[tuple[str | int | float, str | int | float, str | int | float], ...] = ()
     hex: bool = False
     folder: str = ""
 
@@ -100,7 +104,13 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     @property
     def declared(self) -> Declared:
         """What it can do."""
-        return Declared(self.systems, self.directions, self.precisions, self.attitude)
+        singular = tuple(vector(map(str, each), "singular_at") for each in self.singular_at)
+        able = self.systems, self.directions, self.precisions, self.attitude
+        return Declared(*able, self.one_step, self.fixed_grid, singular)
+
+    def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> Request:
+        """What it is asked for, in the form that it declares."""
+        return Request(problem, times, setting, self.hex, self.attitude == "quaternion")
 
     def load(self) -> CommandIntegrator:
         """What integrates with it; nothing is started yet."""
@@ -142,11 +152,14 @@ class CommandIntegrator:
         """
         command = self.command
         instants = check_times(times)
-        command.declared.require(command.name, system, instants[-1], precision, xi)
+        declared = command.declared
+        declared.require(command.name, start, system, instants[-1], precision, xi)
         value = self._setting(setting, precision)
+        if value is not None and command.control == "step":
+            value = exact(number(declared.step(command.name, value, instants), precision))
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]
-        request = Request(problem, grid, value, command.hex)
+        request = command.request(problem, grid, value)
         with session(command) as program:
             overhead = program.empty_request(problem)
             reply = program.ask(request)
@@ -188,13 +201,16 @@ class CommandIntegrator:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
+        states = tuple(reply.states)
+        if request.quaternion:
+            states = tuple(of_quaternion(command.name, problem, state) for state in states)
         spent = {"compile": 0.0, "run": seconds}
         own = reply.counts.get("seconds")
         return Trajectory(
             problem,
             command.name,
             tuple(request.times[:done]),
-            tuple(reply.states),
+            states,
             Outcome.FAILED if reply.failure else Outcome.SUCCESS,
             request.times[done - 1] if done else Fraction(0),
             int(steps or 0),
@@ -223,13 +239,21 @@ class Request:
     """A problem with its times, as a program is asked for it.
 
     times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
+    quaternion: whether the program computes with one: it is given that of the start, and answers (Ω, w, x, y, z).
+    width: of a state of the answer.
     """
 
     def __init__(
-        self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None, hexadecimal: bool
+        self,
+        problem: Problem,
+        times: Sequence[Fraction],
+        setting: Fraction | None,
+        hexadecimal: bool,
+        quaternion: bool = False,
     ) -> None:
         self.problem, self.times, self.setting, self.hex = problem, list(times), setting, hexadecimal
-        self.width = 6 if problem.xi is None else 9
+        self.quaternion = quaternion
+        self.width = 7 if quaternion else 6 if problem.xi is None else 9
         self.written = _times_written(self.times, problem.precision, hexadecimal)
 
     def text(self, label: int) -> bytes:
@@ -243,11 +267,15 @@ class Request:
             "moment": self._numbers(p.moment),
             "rotor": self._numbers(rotor),
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
+            "quaternion": self._quaternion() if self.quaternion else [],
             "precision": [precision.name],
             "setting": self._numbers([] if self.setting is None else [self.setting]),
             "times": [str(len(self.times)), *self.written.texts],
         }
         return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"
+
+    def _quaternion(self) -> list[str]:
+        return self._numbers([exact(number(value, self.problem.precision)) for value in quaternion(self.problem)])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
         return numbers_texts(values, self.problem.precision, self.hex)
@@ -468,7 +496,7 @@ class Session:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first of a process is slow
-                wall = self.ask(Request(problem, [], None, self.command.hex)).wall
+                wall = self.ask(self.command.request(problem, [], None)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
