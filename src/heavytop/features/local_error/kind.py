@@ -1,0 +1,199 @@
+"""Error of single steps before the horizon, and the order of the method as it shows in longer ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import inf
+
+import msgspec
+
+from heavytop.errors import OutOfReach, Unsupported
+from heavytop.features.local_error import measurement as local_error
+from heavytop.features.local_error.measurement import (
+    ORDER,
+    ORDER_OF_RUNS,
+    error_at_end,
+    order_of_runs,
+    single_calls,
+    stepped,
+    unexplained,
+)
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
+from heavytop.kind import Kind
+from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact, parse, time_text
+from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
+from heavytop.report.document.document import Table as Cells
+
+NAME = "local_error"
+_AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")
+
+
+ERROR = Quantity("error", statistic="final")
+"""Of the run of a method that keeps a memory, at its end, largest component."""
+_LARGEST = local_error.LOCAL_ERROR.over("max").text
+_UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
+
+
+class LocalErrorTable(PlanTable, tag=NAME):
+    """integrator: any that `heavytop list` shows; its steps, or calls over its mean step where it keeps them."""
+
+    cases: list[str]
+    precisions: list[str]
+    horizon: str
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = tuple(positive([self.horizon], "horizon"))
+        horizon, subject = time_text(times[-1]), computed(self.integrator)
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, parse(precision).name, horizon=horizon),
+                "",
+                self.integrator,
+                case,
+                times,
+            )
+            for case in map(find, self.cases)
+            for precision in self.precisions
+        ]
+
+
+class LocalErrorKind(Kind):
+    """Errors of steps in units of eps times the largest component of the state."""
+
+    name = NAME
+    table = LocalErrorTable
+    samples_are_steps = True
+    place = 80
+
+    def cost(self, task: Task) -> float:
+        """Each step is enclosed."""
+        return 1.0 + 0.2 * float(task.times[-1])
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
+        case, precision = task.given, task.precision
+        given = case.top, case.start, task.times[-1], precision, case.system
+        if not task.integrator.one_step:
+            return _of_runs(task, stepped(task.integrator))
+        steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
+        if task.integrator.can.steps:
+            run, taken = task.integrator.first_steps(*given)
+            steps = zip(run.times, taken, strict=True)
+        else:
+            run, steps = single_calls(task.integrator, *given)
+        error = local_error.LocalError(run.problem)
+        for time, step in steps:
+            error(time, step)
+        if run.outcome is Outcome.SUCCESS and not error.running.count:
+            raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
+        row = computed_row(task, run, error.metrics(), {}, _AGAINST)
+        row = msgspec.structs.replace(row, samples=error.running.count)
+        if run.outcome is not Outcome.SUCCESS or task.integrator.can.own:
+            return row
+        text = unexplained(run, exact(step.length), error.largest, row.amplification or 1.0)
+        explained = Explained("steps", text) if text else msgspec.UNSET
+        return msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run), explained=explained)
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
+        where there are any; then a line a row.
+        """
+        told = _told(rows)
+        if told:
+            yield Headline(_said(max(told, key=_size)))
+        yield from (Note(_said(row), shown=In.SHORT) for row in told)
+        columns = "case", "format", "steps", "largest", "rms", "order seen", "of runs", "declared", "outcome"
+        title = "Single steps, each against the proven motion from where it starts"
+        yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
+
+
+def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
+    """Of a method with a memory: the error at the end, and the order that whole runs show."""
+    if integrator.setting is None:
+        raise Unsupported(
+            f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
+            "single step.",
+            "Measure whole runs: work_precision.",
+        )
+    case = task.given
+    run = integrator.propagate(case.top, case.start, task.times, task.precision, case.system)
+    metrics = {}
+    if run.outcome is Outcome.SUCCESS:
+        metrics = by_name({ERROR: of_fraction(error_at_end(run))}) | _order_of_runs(task, run)
+    return computed_row(task, run, metrics, {}, _AGAINST)
+
+
+def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
+    """The order that whole runs show, of a method with fixed steps; none where they do not agree on one."""
+    integrator = stepped(task.integrator)
+    order = None if integrator.setting is None else order_of_runs(integrator, run)
+    return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
+
+
+def _cells(row: Row) -> list[Cell]:
+    quantities = local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), ORDER, ORDER_OF_RUNS
+    return [
+        clip(row.case + computed_by(row)),
+        row.precision,
+        str(row.samples if row.key.subject.name != HEYOKA else row.steps),
+        *(Value(row.metrics.get(quantity.text)) for quantity in quantities),
+        str(row.order) if row.order else "-",
+        row.outcome,
+    ]
+
+
+def _told(rows: Sequence[Row]) -> list[Row]:
+    """Those that have an error; of third-party integrators alone where there are any."""
+    theirs = [row for row in rows if row.key.subject.name != HEYOKA]
+    return [row for row in theirs or rows if any(_number(row, each) for each in (_LARGEST, ERROR.text))]
+
+
+def _size(row: Row) -> float:
+    """log10 of the largest error of a step."""
+    metric = row.metrics.get(_LARGEST)
+    return -inf if metric is None or metric.log10 is None else metric.log10
+
+
+def _number(row: Row, name: str) -> str:
+    """The metric in short; "" where there is none."""
+    metric = row.metrics.get(name)
+    return "" if metric is None or metric.value == "missing" else short(metric.value)
+
+
+def _said(row: Row) -> str:
+    """The largest error of a step, or of a run of what keeps a memory, and the order beside the declared one."""
+    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", _number(row, _LARGEST)
+    if largest:
+        text = f"{text}: a step is off by {largest} eps at most"
+    else:
+        text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
+    order = _order(row)
+    return f"{text}{'; ' if order else ''}{order}.{' ' + row.explained.text if row.explained else ''}"
+
+
+def _order(row: Row) -> str:
+    """The order that the method shows beside the one that it declares; "" for none.
+
+    Of a third-party integrator it is that of whole runs: one of single steps may be that of a starting method.
+    """
+    single, runs = (_number(row, each.text) for each in (ORDER, ORDER_OF_RUNS))
+    order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
+    if not order:
+        return ""
+    text = f"its order is {order}{'' if known else ' in single steps'}"
+    if order == str(row.order):
+        text += ", as it says"
+    elif row.order and known:
+        text += f", {'not' if int(order) < row.order else 'more than'} the {row.order} that it says"
+    hint = f" ({single} in single steps: declare one_step = false where it keeps a memory)"
+    return text + (hint if runs and single not in ("", runs) else "")
