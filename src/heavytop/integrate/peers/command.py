@@ -510,20 +510,22 @@ class Session:
         """Whether the program ended by itself after the last request of a row."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: Request) -> Reply:
-        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout."""
+    def ask(self, request: Request, seconds: float = inf) -> Reply:
+        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout, or
+        ``seconds`` where these are fewer.
+        """
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         began = perf_counter()
-        self._exchange(text, reply, "done")
+        self._exchange(text, reply, "done", seconds)
         reply.wall = perf_counter() - began
         return reply
 
-    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str) -> None:
+    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> None:
         """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then."""
-        began = monotonic()
-        deadline, awake_until = began + self.command.seconds, began + _AWAKE
+        began, seconds = monotonic(), min(seconds, self.command.seconds)
+        deadline, awake_until = began + seconds, began + _AWAKE
         waiting = self._write(memoryview(text))
         if waiting:
             self._poll.register(self._in, select.POLLOUT)
@@ -534,7 +536,7 @@ class Session:
                 return
             left = deadline - monotonic()
             if left <= 0:
-                raise self._failed(f"did not say {awaited} within {self.command.seconds:g} s")
+                raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
             now = monotonic()
             awake = not waiting and reply.due < _MANY and now < awake_until
             events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
@@ -568,9 +570,7 @@ class Session:
             try:
                 last = reply.take(line)
             except PeerFailed as error:
-                failure = self._failed(error.cause.removeprefix(f"{self.name} "))
-                failure.answered = error.answered
-                raise failure from None
+                raise self._failed(error.cause.removeprefix(f"{self.name} "), error.answered) from None
             if last:
                 if place < len(lines) or self._unread:
                     raise self._failed(f"wrote more after {said(repr(line.decode('utf-8', 'replace')))}")
@@ -612,13 +612,13 @@ class Session:
             return f"{'ended' if code >= 0 else 'was ended'} {how_it_ended(code)}"
         return "closed its output"
 
-    def _failed(self, what: str) -> PeerFailed:
+    def _failed(self, what: str, answered: bool = False) -> PeerFailed:
         """The failure, with the last that the program wrote on standard error."""
         for _ in range(4):
             self._read_errors()
         lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
         told = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
-        return PeerFailed(f"{self.name} {what}{told}")
+        return PeerFailed(f"{self.name} {what}{told}", answered=answered)
 
     def ends_after(self, text: bytes, seconds: float) -> bool:
         """Whether the program ends by itself within so many seconds of ``text`` and the end of its input."""

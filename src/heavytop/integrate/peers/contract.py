@@ -165,7 +165,7 @@ class Declared:
         xi: Sequence[Fraction] | None,
     ) -> None:
         """Raises Unsupported for a motion of ``system`` to the time ``end`` that is not among what is declared."""
-        if any(_along(start.gamma, direction) for direction in self.singular_at):
+        if self.is_singular(start.gamma):
             raise Unsupported(f"{name} declares that its coordinates are singular at this start.", "Give another γ.")
         if self.attitude == "quaternion" and abs(dot(start.gamma, start.gamma) - 1) > _OFF_SPHERE:
             raise Unsupported(f"{name} computes with a quaternion, and |γ| is not 1.", "Give a γ of length 1.")
@@ -182,6 +182,10 @@ class Declared:
             if declared is not None and not set(forms) & set(declared):
                 can = ", ".join(declared) or "none"
                 raise Unsupported(f"{name} declares that it cannot do {what} {value}.", f"It can do: {can}.")
+
+    def is_singular(self, gamma: Vector) -> bool:
+        """Whether its coordinates are singular at that γ."""
+        return any(_along(gamma, direction) for direction in self.singular_at)
 
     def step(self, name: str, step: Fraction, times: Sequence[Fraction]) -> Fraction:
         """The step to ask for: of a fixed grid the largest up to ``step`` of which all times are multiples.
