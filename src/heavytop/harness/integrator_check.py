@@ -439,8 +439,8 @@ class _Contract:
         return "Two of its processes at once answer as one alone."
 
     def _huge(self) -> str:
-        across = self.axis[1:] + self.axis[:1]  # a principal axis, at right angles to the vertical
-        start = State([_HUGE * abs(part) for part in across], self.axis)
+        across = (0, _HUGE, 0) if self.axis[0] else (_HUGE, 0, 0)
+        start = State(across, self.axis)
         top = HeavyTop((3, 2, 1), 1, [part / 2 for part in self.axis])
         try:
             if self.program is None:

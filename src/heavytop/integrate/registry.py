@@ -294,6 +294,8 @@ def _require_possible(command: Command) -> None:
             parse(each)
     if not command.precisions:
         raise InputError("precisions is empty.")
+    if command.fixed_grid and command.control != "step":
+        raise InputError('fixed_grid declares that all steps are equal: it needs setting = "step".')
     if not all(map(any, command.declared.singular_at)):
         raise InputError("singular_at holds the zero vector, which has no direction.")
 

@@ -24,7 +24,8 @@ from heavytop.errors import PeerFailed, Unsupported
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.peers.command import DEFAULT_STEP, NOT_COUNTED
+from heavytop.integrate.peers.command import NOT_COUNTED
+from heavytop.integrate.peers.contract import DEFAULT_STEP
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball

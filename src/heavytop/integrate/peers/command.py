@@ -28,7 +28,7 @@ import numpy
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.guard import Guard, how_it_ended
-from heavytop.integrate.peers.contract import Declared, of_quaternion, quaternion, said
+from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, vector
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -36,7 +36,6 @@ from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
-DEFAULT_STEP = Fraction(1, 100)
 NOT_COUNTED = {"steps": "not counted"}
 """The flag of a run whose program did not say how many steps it took."""
 _MOST_LINE = 1 << 20

@@ -36,6 +36,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_SAID = 200
 _MOST_FLAGS = 20
+DEFAULT_STEP = Fraction(1, 100)
 _OFF_SPHERE = Fraction(1, 10**6)
 """By which |γ|² may differ from 1 where a quaternion stands for it, and radians between directions that are one."""
 _FINER = 16
@@ -271,7 +272,7 @@ class Contained:
         declared: Declared | None = None,
         setting: Mapping[str, Any] | None = None,
     ) -> None:
-        self.name, self.call, self.own, self.declared, self.setting = name, call, own, declared, setting or {}
+        self.name, self.call, self.own, self.declared, self.setting = name, call, own, declared, dict(setting or {})
 
     @property
     def carries_attitude(self) -> bool:
@@ -298,15 +299,17 @@ class Contained:
         Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
         """
         problem = Problem.of(top, start, precision, system, xi)
-        beside = setting if xi is None else {"xi": xi, **setting}
+        beside = self.setting | setting if xi is None else {"xi": xi, **self.setting, **setting}
         asked = [exact(number(time, precision)) for time in times]
         if self.declared is not None and asked:
             self.declared.require(self.name, start, system, asked[-1], precision, xi)
+            if self.declared.fixed_grid:
+                beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
         given: list[Any]
         own: dict[str, Any]
         try:
-            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **beside})))
+            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}

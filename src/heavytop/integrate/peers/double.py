@@ -14,7 +14,7 @@ import numpy
 
 from heavytop import precision as vectors
 from heavytop.errors import InputError, PeerFailed, quoted
-from heavytop.integrate.peers.contract import Declared, of_quaternion, quaternion, with_tolerance
+from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
@@ -133,12 +133,12 @@ def double_peer(
     singular = tuple(vectors.vector(each, "singular_at") for each in singular_at)
     if attitude not in (False, True, "quaternion"):
         raise InputError(f"attitude = {quoted(attitude)} declares nothing.", 'Give True, False or "quaternion".')
+    if fixed_grid and knob != "step":
+        raise InputError("fixed_grid declares that all steps are equal.", 'Give knob = "step" too.')
     able = (_declared(systems), _declared(directions), _declared(precisions))
     declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
-        if knob == "step" and setting > 0:
-            setting = declared.step(name, setting, times)
         given = _given(name, knob, problem, times, setting)
         if declared.attitude == "quaternion":
             q = problem.native(quaternion(problem))
@@ -156,7 +156,7 @@ def double_peer(
         precision: Precision = DOUBLE,
         *,
         system: System = HEAVY_TOP,
-        step: Fraction = Fraction(1, 100),
+        step: Fraction = DEFAULT_STEP,
         xi: tuple[Fraction, ...] | None = None,
     ) -> Trajectory:
         return integrate(Problem.of(top, start, precision, system, xi), times, step)
