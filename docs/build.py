@@ -28,7 +28,18 @@ OUT = DOCS / "_build" / "html"
 CLAIMS = DOCS / "_build" / "claims.md"
 COMMANDS = DOCS / "_build" / "commands.md"
 ROOT = DOCS.parent
-SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
+SPELLED = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs",
+    "results",
+    "examples",
+    "src",
+    "benchmarks",
+    "tools",
+    "validation",
+]
 
 PUBLIC = ("heavytop.plot.", "heavytop.integrate.peers.double.", "heavytop.api.integrators.check_integrator")
 """What the reference of Python shows beside the names of ``heavytop`` itself."""

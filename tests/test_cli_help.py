@@ -37,6 +37,7 @@ def test_nothing_is_cut_at_80_columns() -> None:
         assert COMMANDS[name].help.partition("\n\n")[0] in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name: str) -> None:
     lines = heavytop(name, "--help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
@@ -52,6 +53,7 @@ def test_what_takes_long_says_how_long(name: str, words: str) -> None:
     assert words in " ".join(COMMANDS[name].help.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", SHELLS)
 def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
     script = heavytop("--completion", shell)
@@ -68,6 +70,7 @@ def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
     assert "selftest" not in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "names"),
     [("run --plan g", {"growth", "gate"}), ("list --case eu", {"euler"}), ("score --case eu", {"euler"})],
@@ -77,6 +80,7 @@ def test_names_of_plans_and_cases_are_completed(line: str, names: set[str]) -> N
     assert set(done.stdout.split()) == names
 
 
+@pytest.mark.slow
 def test_bash_reads_its_script_and_another_shell_is_refused() -> None:
     script = heavytop("--completion", "bash").stdout
     checked = subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True, check=False)

@@ -136,6 +136,7 @@ def test_nothing_is_written_where_there_is_no_terminal(capfd: pytest.CaptureFixt
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
     master, slave = pty.openpty()
     line = [sys.executable, "-m", "heavytop", "reference", "--inertia", "3,5/2,3/2", "--weight", "3/2"]
@@ -159,6 +160,7 @@ def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
     assert b"left" in written
 
 
+@pytest.mark.slow
 def test_every_command_says_once_where_it_is_when_it_takes_long(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -186,6 +188,7 @@ def test_every_command_says_once_where_it_is_when_it_takes_long(
         assert each.callback.__code__ is app.registered_commands[0].callback.__code__
 
 
+@pytest.mark.slow
 def test_the_line_says_what_is_done_and_how_far(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.setattr(output, "SILENCE", 0.1)
     with told_when_slow("score"), counted("comparison", 8, "states", 1.0) as advance:
@@ -209,6 +212,7 @@ def test_the_line_says_what_is_done_and_how_far(monkeypatch: pytest.MonkeyPatch,
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_third_party_integrator_cannot_silence_it() -> None:
     """Its descriptors are shut while it runs: the line goes out all the same."""
     script = """if True:

@@ -97,3 +97,7 @@ class OutOfTime(HeavyTopError):
     """A third-party integrator that was stopped at the time limit of its row."""
 
     exit_code = 3
+
+
+class NotAsked(OutOfTime):
+    """A row of a third-party integrator that ran out of time in others."""

@@ -35,6 +35,7 @@ def independent(body: Any, start: Any, time: Fraction) -> list[Fraction]:
     return integrate(body.tensor, body.moment, body.rotor or (0, 0, 0), rows, start.omega, time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "start", "time"),
     [
@@ -137,6 +138,7 @@ def test_a_moment_far_below_the_rounding_is_an_answer_or_a_refusal() -> None:
         _ = ht.Body(1, 1, (0, 0, 1), thin(Fraction(1, 10**320)), "pivot").top
 
 
+@pytest.mark.slow
 def test_axes_under_every_renaming_give_the_same_motion() -> None:
     """The body with its axes permuted (and one reversed, where that keeps them right-handed) moves as before."""
     start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion("1/2", "1/2", "-1/2", "1/2"))
@@ -185,6 +187,7 @@ def test_an_enclosure_that_ignores_the_rounding_misses_the_true_motion() -> None
     assert all(abs(midpoint(t) - x) <= widest for t, x in zip(true, found, strict=True))
 
 
+@pytest.mark.slow
 def test_a_run_of_a_body_comes_back_in_its_axes() -> None:
     start = ht.State((1, 2, -3), attitude=ht.Attitude.euler("ZYX", "30deg", "0.2", "1"))
     for form, eps in ((ht.DOUBLE, 1e-13), (ht.QUAD, 1e-31)):
@@ -238,6 +241,7 @@ def test_what_is_no_body_or_start_is_refused(make: Any, message: str) -> None:
         make()
 
 
+@pytest.mark.slow
 def test_a_time_beyond_the_enclosure_is_out_of_reach_by_name() -> None:
     start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
     with pytest.raises(OutOfReach):

@@ -30,6 +30,7 @@ from heavytop.records import Row, RowKey
 from heavytop.top.attitude import perpendicular
 from support import methods_with_memory as memory
 
+pytestmark = pytest.mark.slow
 FOLDER = Path(__file__).parents[1] / "support"
 CASE = CASES["lagrange"]
 KEPT_APART = ("leapfrog", "extrapolation", "corrected", "ab4")

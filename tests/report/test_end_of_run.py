@@ -19,6 +19,7 @@ def said(*rows) -> list[str]:
     return brief(Report(SCHEMA, {"name": "p"}, {}, []), iter(rows), KINDS).splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "growth", "long", "peers"])
 def test_every_plan_ends_in_few_lines_that_are_not_cut(name: str) -> None:
     report = store.read(RESULTS / name, KINDS)
@@ -64,6 +65,7 @@ def test_of_steps_that_were_not_measured_nothing_is_said() -> None:
     assert not any("a step is off" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_many_rows_are_counted() -> None:
     lines = said(*(row(case=f"top-{i}") for i in range(MOST_ROWS + 1)))
     assert lines[1] == f"drift in double: {MOST_ROWS + 1} success"

@@ -22,6 +22,8 @@ from support import in_process
 from support.report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 from support.reports import compare, html, replace, store
 
+pytestmark = pytest.mark.slow
+
 RESULTS = Path(__file__).parents[2] / "results" / "default"
 
 

@@ -39,6 +39,7 @@ def plan_of(tmp_path: Path, text: str):
     return expand(load(str(file))[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_the_plans_that_ship_expand(name: str) -> None:
     plan, digest = load(name)
@@ -48,6 +49,7 @@ def test_the_plans_that_ship_expand(name: str) -> None:
     assert len({task.label for task in tasks}) == len(tasks) > 5
 
 
+@pytest.mark.slow
 def test_the_default_plan_holds_what_it_promises() -> None:
     tasks = expand(load("default")[0])
     drifts = [t for t in tasks if t.key.kind == "drift"]
@@ -265,6 +267,7 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
         assert found == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tolerance", "integrator", "refused"),
     [("1e-20", "heyoka", True), ("1e-15", "heyoka", False), ("1e-16", "sundials:CVODE", False), ("0", "heyoka", True)],

@@ -121,7 +121,7 @@ def show(
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
     from heavytop.api.reports import read_report
-    from heavytop.files import whole
+    from heavytop.files import atomic_write
     from heavytop.report.store import parquet as tables
 
     if parquet is not None:
@@ -136,9 +136,9 @@ def show(
         stack.enter_context(writing())
         if html is not None:
             page = found.to_html().encode()
-            stack.enter_context(whole(html)).write(page)
+            stack.enter_context(atomic_write(html)).write(page)
         if markdown is not None:
-            stack.enter_context(whole(markdown)).write(found.to_markdown().encode())
+            stack.enter_context(atomic_write(markdown)).write(found.to_markdown().encode())
         if parquet is not None:
             tables.write(parquet, found.rows, found.plan)
     for path in files:

@@ -20,7 +20,7 @@ from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
+from heavytop.integrate.peers.command import Command, ProgramRequest, Session, begin_row, close_all, session
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -174,7 +174,7 @@ class _Contract:
     @cached_property
     def declared(self) -> Declared:
         """What it declares; asked for where it runs, as that imports it."""
-        return registry.declared(self.which)
+        return ChosenIntegrator.of(self.which).declared
 
     @cached_property
     def axis(self) -> Vector:
@@ -508,7 +508,7 @@ class _Contract:
         return f"{subject} is right to {decimal_text(off, 2)}." if off else f"{subject} is right to the last bit."
 
 
-class _Extended(Request):
+class _Extended(ProgramRequest):
     """A request with a line that no program knows."""
 
     def text(self, label: int) -> bytes:

@@ -110,7 +110,7 @@ def read(
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
     integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
-    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`beside` does.
+    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`with_integrator` does.
     """
     plan, digest = load(name, kinds)
     try:
@@ -118,7 +118,7 @@ def read(
         plan, defined = _by_name(plan, definitions(plan, folder), folder)
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
-            plan = beside(plan, integrator)
+            plan = with_integrator(plan, integrator)
         if not isinstance(integrator, str):
             defined = defined | {integrator.name: integrator}
         return plan, digest, expand(plan, seed, defined)
@@ -224,7 +224,7 @@ def _by_name(
     return msgspec.structs.replace(plan, measure=list(map(by_name, plan.measure))), known
 
 
-def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
+def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     """The plan with the same measurements of another integrator after heyoka's.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
@@ -234,7 +234,7 @@ def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     if not isinstance(integrator, str) and not is_third_party(integrator.name):
         raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
-    added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
+    added = [other for table in plan.measure if (other := table.with_integrator(integrator)) is not None]
     if not added:
         raise InputError(f"The plan {plan.name} does not measure {HEYOKA}.", "Use --plan gate.")
     return msgspec.structs.replace(plan, measure=[*plan.measure, *added])

@@ -15,11 +15,11 @@ from heavytop.precision import (
     MOST_MEMBERS,
     Given,
     Vector,
+    cache_last_call,
     decimal_text,
     dot,
     exact,
     exact_text,
-    last_call,
     ordered,
     physical,
     round_to,
@@ -114,7 +114,7 @@ def require_physical(top: HeavyTop, start: State) -> None:
             physical(value, what)
 
 
-@last_call
+@cache_last_call
 def _require_physical_top(top: HeavyTop) -> None:
     named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre, "rotor": top.rotor or ()}
     for what, values in named.items():

@@ -290,7 +290,7 @@ def _as_ratio(value: Any) -> Ratio:
     return value if isinstance(value, Ratio) else Ratio.of(value)
 
 
-def turned(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
+def in_body_axes(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
     """The function of the state in axes e of which the given ones are A e, the rows of A being ``axes``."""
     if not function.rational:
         return function

@@ -24,8 +24,8 @@ from heavytop.features.events.functions import (
     Events,
     arrays,
     composed,
+    in_body_axes,
     terms_of,
-    turned,
 )
 from heavytop.integrate.multiword.motions import native_state
 from heavytop.integrate.trajectory import Outcome
@@ -67,7 +67,7 @@ def locate(
     Raises InputError where a callable raises, or gives no finite number.
     """
     precision, forwards = run.problem.precision, run.until > 0
-    inner = function if axes is None else turned(function, axes)
+    inner = function if axes is None else in_body_axes(function, axes)
     found_in = _watched(run, reached)
     events = (
         _of_rational(inner, found_in, precision)

@@ -86,7 +86,7 @@ class LocalErrorKind(Kind):
         if not task.integrator.one_step:
             return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
-        if task.integrator.can.steps:
+        if task.integrator.capabilities.steps:
             run, taken = task.integrator.first_steps(*given)
             steps = zip(run.times, taken, strict=True)
         else:
@@ -98,7 +98,7 @@ class LocalErrorKind(Kind):
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
-        if run.outcome is not Outcome.SUCCESS or task.integrator.can.own:
+        if run.outcome is not Outcome.SUCCESS or task.integrator.capabilities.own:
             return row
         text = unexplained(run, exact(step.length), error.largest, row.amplification or 1.0)
         explained = Explained("steps", text) if text else msgspec.UNSET

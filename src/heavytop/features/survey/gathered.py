@@ -15,7 +15,7 @@ import numpy
 
 from heavytop.cases import Case
 from heavytop.features.survey.measured import Chunk
-from heavytop.files import whole
+from heavytop.files import atomic_write
 from heavytop.harness.case_text import forms
 from heavytop.harness.rows import Task, data_of
 from heavytop.integrate.trajectory import Outcome
@@ -84,7 +84,7 @@ def read_chunk(content: bytes) -> Any:
 def write(path: Path, chunks: Iterable[bytes]) -> None:
     """All chunks into one file, a row group each, one at a time in memory; whole or not at all."""
     schema = _schema()
-    with whole(path) as file, _writer(file, schema) as writer:
+    with atomic_write(path) as file, _writer(file, schema) as writer:
         for content in chunks:
             table = read_chunk(content).cast(schema)
             writer.write_table(table, row_group_size=max(1, table.num_rows))

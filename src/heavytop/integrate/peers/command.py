@@ -20,7 +20,7 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from pathlib import Path
 from threading import Lock
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -31,6 +31,8 @@ from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, vector
+from heavytop.processes import stopwatch
+from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
@@ -56,6 +58,8 @@ _MOST_OVERHEAD = 1e-3
 """Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
 _LEAST_SHARE = 0.1
 """Of the seconds of a request, which remain at least: less than its noise is not measured."""
+_RESOLUTION = 1e-4
+"""Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _OF_STATES = b"0123456789+-.eE \tsta"
 """The characters of lines of states in decimal."""
@@ -107,9 +111,9 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         able = self.systems, self.directions, self.precisions, self.attitude
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
-    def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> Request:
+    def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
         """What it is asked for, in the form that it declares."""
-        return Request(problem, times, setting, self.hex, self.attitude == "quaternion")
+        return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion")
 
     def load(self) -> CommandIntegrator:
         """What integrates with it; nothing is started yet."""
@@ -189,7 +193,7 @@ class CommandIntegrator:
             return exact(number(DEFAULT_STEP, precision))
         return precision.eps if self.command.control else None
 
-    def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
+    def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
         flags = {command.control: number_text(request.setting, problem.precision)} if request.setting else {}
         steps = reply.counts.get("steps")
@@ -203,7 +207,7 @@ class CommandIntegrator:
         states = tuple(reply.states)
         if request.quaternion:
             states = tuple(of_quaternion(command.name, problem, state) for state in states)
-        spent = {"compile": 0.0, "run": seconds}
+        spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
         own = reply.counts.get("seconds")
         return Trajectory(
             problem,
@@ -234,7 +238,7 @@ def numbers_texts(values: Sequence[Any], precision: Precision, hexadecimal: bool
     return [number_text(Fraction(value), precision, hexadecimal) for value in values]
 
 
-class Request:
+class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
     times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
@@ -305,7 +309,7 @@ def _times_written(times: list[Fraction], precision: Precision, hexadecimal: boo
 class Reply:
     """What a program answered: states of the format, counts, and what it says went wrong; wall: seconds here."""
 
-    def __init__(self, name: str, request: Request) -> None:
+    def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
         self.precision = request.problem.precision
         self.states: list[Any] = []
@@ -509,16 +513,16 @@ class Session:
         """Whether the program ended by itself after the last request of a row."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: Request, seconds: float = inf) -> Reply:
-        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout, or
-        ``seconds`` where these are fewer.
+    def ask(self, request: ProgramRequest, most: float = inf) -> Reply:
+        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout, or after
+        ``most`` seconds where these are fewer.
         """
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
-        began = perf_counter()
-        self._exchange(text, reply, "done", seconds)
-        reply.wall = perf_counter() - began
+        seconds = stopwatch(self.process.pid)
+        self._exchange(text, reply, "done", most)
+        reply.wall = seconds()
         return reply
 
     def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> None:

@@ -17,6 +17,7 @@ import msgspec
 
 from heavytop.features.local_error.measurement import ORDER
 from heavytop.features.work_precision.curves import ERRORS
+from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
@@ -149,13 +150,20 @@ class SettingPoint(NamedTuple):
 
 @dataclass(slots=True)
 class Changes:
-    """Gathers what a comparison finds, pair by pair."""
+    """Gathers what a comparison finds, pair by pair.
+
+    yardstick: what changed of heyoka where the baseline measures it beside a third-party integrator, which it is no
+    verdict on.
+    """
 
     rows: list[Change] = field(default_factory=list)
     points: dict[tuple[str, str, str], list[SettingPoint]] = field(default_factory=dict)
+    yardstick: list[Change] = field(default_factory=list)
+    _third_party: bool = False
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
+        self._third_party = self._third_party or (old is not None and _is_third_party(old))
         changed = [each for each in findings if each.verdict is not Verdict.SAME]
         if changed:
             changed.sort(key=lambda each: RANK.index(each.verdict))
@@ -191,6 +199,13 @@ class Changes:
             self.rows = [change for change in left if change.findings]
         return found
 
+    def take_yardstick(self) -> bool:
+        """Sets apart what changed of heyoka beside a third-party integrator; whether anything did."""
+        if self._third_party:
+            self.yardstick = [change for change in self.rows if change.findings[0].of_yardstick]
+            self.rows = [change for change in self.rows if not change.findings[0].of_yardstick]
+        return bool(self.yardstick)
+
     def coarser(self, change: Change) -> str:
         """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
         steps; else empty.
@@ -206,7 +221,9 @@ class Changes:
         if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
             return ""
         most = lost.pop(finest)
-        return "" if any(each > _LESS * most for each in lost.values()) else "lost less" if lost else "are the same"
+        if not most or any(each > _LESS * most for each in lost.values()):
+            return ""
+        return "lost less" if lost else "are the same"
 
     @property
     def worst_first(self) -> list[Change]:
@@ -230,7 +247,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     if not changes.rows:
         counted = same - sum(row.outcome in UNMEASURED for row in failed)
         numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
-        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
+        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     found = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
@@ -240,14 +257,27 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
             found += make(rows, verdicts)
     found += [sentence for moved, sentence in orders if moved > 0]
-    still = _still_failed(failed)
-    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still)]
+    still, beside = _still_failed(failed), _yardstick(changes)
+    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
     told = frozenset[Identity]().union(*(each.rows for each in found))
     rest = [change for change in changes.rows if change.identity not in told]
     end = f"{_count(len(rest), 'other row')} changed." if rest else "Nothing else changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
-    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end)]
+    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end, *beside)]
+
+
+def _yardstick(changes: Changes) -> list[str]:
+    """A sentence that heyoka changed, which stands beside for scale; none where it did not."""
+    if not changes.yardstick:
+        return []
+    first = min(changes.yardstick, key=lambda change: RANK.index(change.verdict))
+    rows = _count(len(changes.yardstick), "row")
+    return [f"heyoka, measured for scale and not judged, changed in {rows}{_on([first.identity])}: {line(first)}."]
+
+
+def _is_third_party(row: Row) -> bool:
+    return row.key.subject.what == "computed" and is_third_party(row.key.subject.name)
 
 
 def _still_failed(rows: Sequence[Row]) -> list[str]:
@@ -555,7 +585,8 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        coarser = {changes.coarser(c) for _, c, _ in cases} if Verdict.WORSE in verdicts else {""}
+        error = Verdict.WORSE in verdicts and change.decades(finding) is not None
+        coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
 

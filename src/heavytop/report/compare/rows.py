@@ -10,11 +10,24 @@ from typing import Any, Literal
 
 import msgspec
 
+from heavytop.integrate.registry import is_third_party
 from heavytop.measure.growth import BENT, CLASSES, Interval
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import NOISE, NOT_MEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.records import (
+    NOISE,
+    NOT_MEASURED,
+    UNRESOLVED_SECONDS,
+    UNSUPPORTED,
+    Identity,
+    Law,
+    Metric,
+    Quantity,
+    Row,
+    Series,
+)
 from heavytop.report.compare.noise import (
     BITS,
     Limits,
@@ -246,9 +259,17 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
         """The finding; where it is slight and its integrator gained more than that, the same."""
-        if not self.slight or self.method not in mended:
-            return self
+        return self.as_same() if self.slight and self.method in mended else self
+
+    def as_same(self) -> Finding:
+        """The finding, but that it is none."""
         return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
+
+    @property
+    def of_yardstick(self) -> bool:
+        """Whether it is about heyoka, which is measured beside an integrator for scale."""
+        name, _ = self.method
+        return name.partition(":")[0] == HEYOKA and not is_third_party(name)
 
     @property
     def timing(self) -> bool:
@@ -497,11 +518,16 @@ class RowComparison:
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
 
     def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
-        for name in sorted(old.seconds.keys() & new.seconds.keys()):
-            if not self.lookup.metric(rules, f"seconds {name}").ignore:
-                verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
-                before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                yield Finding(key, name, verdict, before, after, why, "seconds")
+        """The seconds of the integrator alone: of its fastest run where there are several, since other work only adds.
+
+        What compiling took, which caches decide, and a reference, counts and what a program says are not judged.
+        """
+        name = next((each for each in ("least", "run") if each in old.seconds and each in new.seconds), "")
+        if name and not self.lookup.metric(rules, "seconds run").ignore:
+            spent = [max(row.seconds[name], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
+            verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
+            before, after = (f"{seconds:.3g} s" for seconds in spent)
+            yield Finding(key, "run", verdict, before, after, why, "seconds")
 
     def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""

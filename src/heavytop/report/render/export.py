@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 from heavytop.display import printable
 from heavytop.errors import InputError, quoted
 from heavytop.measure.scalar import digits_kept
-from heavytop.records import UNSUPPORTED, Quantity, Report, Row
+from heavytop.records import UNRESOLVED_SECONDS, UNSUPPORTED, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import folded, line, statistics
 from heavytop.report.compare.verdicts import Verdict
@@ -83,7 +83,8 @@ def measures(row: Row) -> Iterator[Measure]:
         if law.exponent is not None:
             yield Measure(f"exponent of {name}", law.exponent, "exponent", law.low, law.high)
     if "run" in row.seconds:
-        yield Measure("seconds", row.seconds.get("least", row.seconds["run"]), "s")
+        seconds = max(row.seconds.get("least", row.seconds["run"]), row.seconds.get(UNRESOLVED_SECONDS, 0.0))
+        yield Measure("seconds", seconds, "s")
 
 
 def export(report: Report, to: str, kinds: Kinds) -> str:

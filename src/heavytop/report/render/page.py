@@ -13,7 +13,7 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.features.work_precision.curves import ERRORS, leads, panels, seconds_text
+from heavytop.features.work_precision.curves import ERRORS, leads, panels
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
@@ -81,7 +81,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         failed=len(failures),
         not_supported=unsupported(report.rows),
         lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
-        gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
+        gave_up=Counter(kind_of(row, kinds).may_end_early for row in report.rows if _gave_up(row, kinds)),
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
@@ -102,7 +102,7 @@ def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:
     """Whether a run ended early that may: a finding about its integrator, in its chart."""
-    return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
+    return bool(kind_of(row, kinds).may_end_early) and row.outcome not in ("success", *UNMEASURED)
 
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
@@ -437,7 +437,7 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
         return None
     point, case, label = min(best, key=lambda each: each[0].log10)
     said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {seconds_text(point.seconds)}.")
+    return Headline(f"{said}, in {point.takes()}.")
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:

@@ -17,7 +17,7 @@ from rich.text import Text
 from heavytop.display import printable
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT
-from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
+from heavytop.records import FAILED, NOT_ASKED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
 from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
 from heavytop.report.document.kind import Kinds, kind_of
 from heavytop.report.store.store import AnyReport
@@ -42,7 +42,7 @@ def failed(row: Row, kinds: Kinds) -> bool:
     """
     if row.outcome == UNSUPPORTED:
         return False
-    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
+    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_end_early)
 
 
 def unsupported(rows: Iterable[Row]) -> str:
@@ -55,7 +55,7 @@ def unsupported(rows: Iterable[Row]) -> str:
 
 def failure(row: Row) -> str:
     """A run that did not reach its horizon, and why."""
-    if row.outcome in (FAILED, OUT_OF_TIME):
+    if row.outcome in (FAILED, OUT_OF_TIME, NOT_ASKED):
         return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"

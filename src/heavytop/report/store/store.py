@@ -133,7 +133,7 @@ def read_brief(path: Path, kinds: Kinds) -> Brief:
     return Brief(*_read(path, _Parts), kinds)
 
 
-def whole(report: AnyReport) -> Report:
+def full_report(report: AnyReport) -> Report:
     """The report with all of its rows."""
     if isinstance(report, Report):
         return report
