@@ -204,9 +204,8 @@ class CommandIntegrator:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
-        states = tuple(reply.states)
-        if request.quaternion:
-            states = tuple(of_quaternion(command.name, problem, state) for state in states)
+        turned = (of_quaternion(command.name, problem, state) for state in reply.states)
+        states = tuple(turned if request.quaternion else reply.states)
         spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
         own = reply.counts.get("seconds")
         return Trajectory(
