@@ -9,6 +9,7 @@ import typer
 
 from heavytop.cli import app
 from heavytop.cli.app import SHELLS
+from heavytop.harness.plan import BUILT_IN
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 MOST = 55
@@ -43,6 +44,7 @@ def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name: str) -> 
     lines = heavytop(name, "--help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
     assert max(map(len, lines)) <= 80
     assert not any(line.rstrip().endswith("-") for line in lines)
+    assert not any("list[" in line for line in lines)
 
 
 LONG = {"run": "minutes", "selftest": "minute"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
@@ -87,3 +89,8 @@ def test_bash_reads_its_script_and_another_shell_is_refused() -> None:
     assert checked.returncode == 0, checked.stderr
     refused = heavytop("--completion", "tcsh")
     assert (refused.returncode, "bash, zsh, fish" in refused.stderr) == (2, True)
+
+
+def test_the_help_of_run_names_every_plan_that_ships() -> None:
+    help_of = {parameter.name: parameter.help for parameter in COMMANDS["run"].params}
+    assert help_of["plan"].startswith(", ".join(BUILT_IN) + ", or a TOML file")

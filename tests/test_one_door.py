@@ -250,6 +250,7 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
         ["new", "new", "--language", "latin"],
         lambda: new_integrator(Path("new"), "latin"),
     ),
+    "body of no file": (["body", "nowhere.urdf"], lambda: ht.Body.from_file("nowhere.urdf")),
     "list of no case": (["list", "--case", "nobody"], lambda: case("nobody")),
     "docs of nothing": (["docs", "nothing"], lambda: page("nothing")),
     "score to no digits": (

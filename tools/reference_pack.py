@@ -133,8 +133,8 @@ def write(out: Path, times: int = TIMES, digits: int = DIGITS) -> list[Path]:
         files.append(out / "csv" / f"{motion['name']}.csv")
         replace(files[-1], table(motion).encode())
     document = {"pack": "heavytop reference pack", "version": VERSION, "conventions": _CONVENTIONS, "motions": found}
-    for path, content in zip(files, (document, schema()), strict=False):
-        replace(path, msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
+    replace(files[0], msgspec.json.encode(document).replace(b'{"name":', b'\n{"name":') + b"\n")
+    replace(files[1], msgspec.json.format(msgspec.json.encode(schema()), indent=1) + b"\n")
     return files
 
 

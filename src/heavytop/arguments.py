@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ImpossibleBody, InputError, quoted
 from heavytop.precision import (
     DOUBLE,
     Given,
@@ -65,6 +66,8 @@ def motion(
 def _checked(top: object, start: object, precision: Precision, of_any_size: bool) -> tuple[HeavyTop | Body, State]:
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
+    for text in body.warnings():
+        warnings.warn(text, ImpossibleBody, stacklevel=4)
     if not of_any_size:
         require_physical(body.top if isinstance(body, Body) else body, state)
     return body, state.require_unit_gamma(slack_of(precision))

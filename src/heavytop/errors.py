@@ -51,6 +51,10 @@ class HeavyTopError(Exception):
         self.remedy = remedy
 
 
+class ImpossibleBody(UserWarning):
+    """A body whose moments of inertia no rigid body has, though the equations have solutions."""
+
+
 class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 

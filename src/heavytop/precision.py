@@ -224,6 +224,11 @@ def shown(value: Fraction) -> str:
     return str(value) if short else decimal_text(round_to(value, 64), 6)
 
 
+def six_digits(value: Fraction) -> str:
+    """A number for a sentence, to six digits without trailing zeros."""
+    return f"{float(decimal_text(value, 6)):.6g}"
+
+
 def time_text(time: Fraction) -> str:
     """A time in reports: exact where 20 digits suffice, else 20 digits."""
     text = decimal_text(time, 20)

@@ -379,6 +379,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
     data: of the top and its start, before any rounding; null where no motion is measured.
+    request: what the table of the plan asks that no other field says, such as the sweep of a survey.
     amplification: the largest factor by which the motion itself has amplified a change of its state, whenever that was
     made, up to the horizon, an estimate; null where no single motion is integrated.
     explained: what explains the states of a third-party integrator that are far off, where something does.
@@ -413,6 +414,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     seconds: dict[str, Seconds] = {}
     evaluations: Count | None = None
     data: Data | None = None
+    request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
     amplification: Annotated[float, msgspec.Meta(ge=1)] | None = None
     worst: tuple[Worst, ...] | msgspec.UnsetType = msgspec.UNSET
     spread: Spread | msgspec.UnsetType = msgspec.UNSET

@@ -440,4 +440,5 @@ def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: 
         "as_expected": "1",
     }
     headline, *_ = KINDS["audit"].document([row])
-    assert headline.text == "Library of 1 claims: 1 refuted; every verdict as expected."
+    assert headline.text == "Library of 1 claim: 1 refuted; every verdict as expected."
+    assert headline.word is None  # no green "holds" over what is refuted

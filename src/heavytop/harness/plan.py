@@ -56,13 +56,17 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """A top of the plan's own, or a body in any axes; numbers as exact text, or as they are written in TOML.
 
     With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
-    numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
-    ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle`` ("x,y,z:angle").
+    numbers of its tensor, about "pivot" or "centre of mass".  With ``file``, and ``link`` where it has several, the
+    body of a URDF, MJCF, SDF, USD or TOML file; a relative path is from the working directory.  The start has ``omega``
+    or ``omega_space``, and one of ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle``
+    ("x,y,z:angle").
     """
 
     name: str
-    inertia: list[str]
-    centre: list[str]
+    inertia: list[str] | None = None
+    centre: list[str] | None = None
+    file: str | None = None
+    link: str | None = None
     weight: str | None = None
     mass: str | None = None
     gravity: str | None = None

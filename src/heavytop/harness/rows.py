@@ -65,6 +65,7 @@ class Task:
     case: None where no motion is measured.
     times: exact, of the sign of the direction; keep: those that go into the series.
     options: what else the kind of measurement needs to know, and it alone.
+    request: what decides the outcome beside key, case and times; it stands in the row.
     seed: which roundings; 0 for those of the data as given.
     source: of an integrator that is neither built in nor a package's.
     """
@@ -78,6 +79,7 @@ class Task:
     options: Any = None
     seed: int = 0
     source: IntegratorSource | None = None
+    request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case of the same system."""
@@ -188,6 +190,7 @@ def exact_row(
         measured=measured,
         series=series or {},
         samples=len(task.times),
+        request=task.request,
     )
 
 
@@ -224,6 +227,7 @@ def computed_row(
         samples=len(run.times),
         seconds=run.seconds,
         amplification=_amplification(run.problem, horizon),
+        request=task.request,
     )
 
 
@@ -269,6 +273,7 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
         key=task.key,
         reference=Against("none", reason=reason.cause),
         measured="nothing",
+        request=task.request,
     )
 
 

@@ -24,6 +24,7 @@ from heavytop.precision import (
     physical,
     round_to,
     shown,
+    six_digits,
     vector,
 )
 from heavytop.top.attitude import Attitude, rotated, transposed
@@ -100,7 +101,7 @@ class HeavyTop:
             others = sum(self.inertia) - value
             if value > others:
                 found.append(
-                    f"I{axis + 1} = {shown(value)} exceeds the sum {shown(others)} of the other two: "
+                    f"I{axis + 1} = {six_digits(value)} exceeds the sum {six_digits(others)} of the other two: "
                     "no rigid body has such moments."
                 )
         return found

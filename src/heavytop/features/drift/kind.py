@@ -74,6 +74,7 @@ class DriftTable(PlanTable, tag=NAME):
                 case,
                 *times,
                 options=Extent(self.attitude, self.noise),
+                request={"attitude": str(self.attitude)},
             )
             for case in map(find, self.cases)
             for precision, horizon, times in runs

@@ -10,6 +10,7 @@ import msgspec
 
 from heavytop.errors import OutOfReach, Unsupported
 from heavytop.features.local_error import measurement as local_error
+from heavytop.features.local_error.field_faults import field_fault
 from heavytop.features.local_error.measurement import (
     ORDER,
     ORDER_OF_RUNS,
@@ -98,11 +99,15 @@ class LocalErrorKind(Kind):
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
-        if run.outcome is not Outcome.SUCCESS or task.integrator.capabilities.own:
+        if task.integrator.capabilities.own:
+            return row
+        if run.outcome is Outcome.SUCCESS:
+            row = msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run))
+        row = _with_fault(row, error)
+        if row.explained or run.outcome is not Outcome.SUCCESS:
             return row
         text = unexplained(run, exact(step.length), error.largest, row.amplification or 1.0)
-        explained = Explained("steps", text) if text else msgspec.UNSET
-        return msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run), explained=explained)
+        return msgspec.structs.replace(row, explained=Explained("steps", text)) if text else row
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
@@ -138,6 +143,15 @@ def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
     integrator = stepped(task.integrator)
     order = None if integrator.setting is None else order_of_runs(integrator, run)
     return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
+
+
+def _with_fault(row: Row, error: local_error.LocalError) -> Row:
+    """The row with the fault of the field that explains its steps, where these show no order, or less than declared."""
+    seen = row.metrics.get(ORDER_OF_RUNS.text) or row.metrics.get(ORDER.text)
+    if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
+        return row
+    found = field_fault(error.problem, error.calls, row.order or 0)
+    return msgspec.structs.replace(row, explained=found) if found else row
 
 
 def _cells(row: Row) -> list[Cell]:

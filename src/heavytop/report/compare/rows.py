@@ -59,7 +59,15 @@ from heavytop.report.compare.verdicts import (
     weaker,
 )
 from heavytop.report.document.kind import Kinds, kind_of
-from heavytop.report.store.checks import contradictions, inconsistent, interval_of, law_text, log_size, other_data
+from heavytop.report.store.checks import (
+    contradictions,
+    inconsistent,
+    interval_of,
+    law_text,
+    log_size,
+    other_data,
+    other_request,
+)
 
 # Laws of growth in a comparison: whether one can be, and one against another.
 
@@ -364,7 +372,7 @@ class RowComparison:
         """The verdict of rows of one motion of which one, or both, did not reach the horizon; None else."""
         if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
             return None
-        if None not in (old.data, new.data) and other_data(old.data, new.data):
+        if other_request(old, new) or (None not in (old.data, new.data) and other_data(old.data, new.data)):
             return None
         judged = judge_outcomes(old, new, self.lookup.metric((), "").duration)
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
@@ -547,7 +555,7 @@ class RowComparison:
             return f"{old.bits} bits against {new.bits}"
         if old.starts != new.starts:
             return f"{old.starts} starts against {new.starts}"
-        if reason := other_data(old.data, new.data):
+        if reason := other_data(old.data, new.data) or other_request(old, new):
             return reason
         if (old.steps == 0) != (new.steps == 0):
             return f"{old.steps} steps against {new.steps}"

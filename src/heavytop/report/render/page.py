@@ -13,6 +13,7 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
+from heavytop.display import plural
 from heavytop.features.work_precision.curves import ERRORS, leads, panels
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
@@ -74,7 +75,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         "report.html.j2",
         report=report,
         headlines=_headlines(found, kinds)
-        or [Headline(f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
+        or [Headline(f"{plural(len(report.rows), 'measurement')}, {len(failures)} of which failed.")],
         notes=[block for block in blocks if isinstance(block, Note)],
         cards=[block for block in blocks if isinstance(block, Card)],
         failures=failures[:MOST_FAILURES],
@@ -246,6 +247,7 @@ def render(template: str, **context: Any) -> str:
         "metric_cells": metric_cells,
         "change": line,
         "folded": quantities,
+        "plural": plural,
     }
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)
