@@ -12,7 +12,6 @@ from heavytop.errors import OutOfReach, Unsupported
 from heavytop.features.local_error import measurement as local_error
 from heavytop.features.local_error.field_faults import field_fault
 from heavytop.features.local_error.measurement import (
-    ORDER,
     ORDER_OF_RUNS,
     error_at_end,
     order_of_runs,
@@ -28,6 +27,7 @@ from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import exact, parse, time_text
 from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
@@ -147,7 +147,7 @@ def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
 
 def _with_fault(row: Row, error: local_error.LocalError) -> Row:
     """The row with the fault of the field that explains its steps, where these show no order, or less than declared."""
-    seen = row.metrics.get(ORDER_OF_RUNS.text) or row.metrics.get(ORDER.text)
+    seen = row.metrics.get(ORDER_OF_RUNS.text) or row.metrics.get(OBSERVED_ORDER.text)
     if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
         return row
     found = field_fault(error.problem, error.calls, row.order or 0)
@@ -155,7 +155,7 @@ def _with_fault(row: Row, error: local_error.LocalError) -> Row:
 
 
 def _cells(row: Row) -> list[Cell]:
-    quantities = local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), ORDER, ORDER_OF_RUNS
+    quantities = local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), OBSERVED_ORDER, ORDER_OF_RUNS
     return [
         clip(row.case + computed_by(row)),
         row.precision,
@@ -200,7 +200,7 @@ def _order(row: Row) -> str:
 
     Of a third-party integrator it is that of whole runs: one of single steps may be that of a starting method.
     """
-    single, runs = (_number(row, each.text) for each in (ORDER, ORDER_OF_RUNS))
+    single, runs = (_number(row, each.text) for each in (OBSERVED_ORDER, ORDER_OF_RUNS))
     order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
     if not order:
         return ""
