@@ -8,7 +8,7 @@ def _solve(given):
     field = given.field
     y, time, steps, states = given.start.tolist(), 0.0, 0, []
     for end in given.times.tolist():
-        count = max(1, round(abs(end - time) / given.setting))
+        count = max(1, round(abs(end - time) / given.control))
         h = (end - time) / count
         for _ in range(count):
             k1 = field(y)

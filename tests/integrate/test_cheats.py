@@ -62,7 +62,7 @@ def slow(top, start, times, precision, *, system, tolerance=None):
 
 def _solve_slowly(given):
     sleep(0.02)
-    found = _solver(8)(replace(given, setting=1 / 32))
+    found = _solver(8)(replace(given, control=1 / 32))
     return Solved(found.states, found.reached, found.steps, None, 0.02)
 
 

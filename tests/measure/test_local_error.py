@@ -156,7 +156,7 @@ def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
     for scale in (Fraction(1), Fraction(10) ** 30, Fraction(3, 10**20)):
         top = HeavyTop(case.top.inertia, scale**2 * case.top.weight, case.top.centre)
         start = State([scale * omega for omega in case.start.omega], case.start.gamma)
-        integrator = ChosenIntegrator("splitting:4", setting=("step", Fraction(1, 10) / scale))
+        integrator = ChosenIntegrator("splitting:4", control=("step", Fraction(1, 10) / scale))
         _, calls = single_calls(integrator, top, start, 2 / scale, DOUBLE, case.system)
         asked.append([tuple(call.further) for _, call in calls])
     assert asked == [[(2, 4, 8, 16)] * 16] * 3

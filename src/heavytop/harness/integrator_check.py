@@ -293,7 +293,7 @@ class _Contract:
         error = self._error(whole)
         if off > _BY_ITS_ERROR * error:
             raise _Violated(f"{differ}, {decimal_text(off / error if error else off, 2)} times the error of the first.")
-        if self.declared.one_step and registry.control(self.which) == "step":
+        if self.declared.one_step and registry.control_name(self.which) == "step":
             raise _Note(f"{differ}, which its error explains. Where it keeps a memory, declare one_step = false.")
         return f"{differ}, which its error explains."
 
@@ -354,7 +354,7 @@ class _Contract:
 
     def _between_steps(self) -> str:
         """Errors at times between steps, beside those at the ends of runs, and how they fall with the step."""
-        if (control := registry.control(self.which)) not in _SETTINGS:
+        if (control := registry.control_name(self.which)) not in _SETTINGS:
             raise _Note("Not tried: it is set by nothing.")
         coarse, fine = (self._between(control, value) for value in _SETTINGS[control])
         if fine.between <= max(_NOT_DENSE * fine.ends, _RESTART * self.precision.eps):

@@ -42,12 +42,12 @@ _AGAIN_SECONDS = 1.0
 class ChosenIntegrator:
     """The integrator of that name.
 
-    setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
+    control: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
     source: where the integrator is defined, if it is neither built in nor a package's.
     """
 
     name: str = HEYOKA
-    setting: tuple[str, Fraction] | None = None
+    control: tuple[str, Fraction] | None = None
     source: IntegratorSource | None = None
 
     @classmethod
@@ -124,7 +124,7 @@ class ChosenIntegrator:
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
-            peer = registry.ready(self.which, self.setting)
+            peer = registry.ready(self.which, self.control)
             beside = {} if xi is None else {"xi": xi}
             run = peer(top, start, times, precision, system=system, **beside)
             if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
@@ -158,7 +158,7 @@ class ChosenIntegrator:
             runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
             return runs
         if options.keys() == {"tolerance"}:
-            given = replace(self, setting=("tolerance", options["tolerance"]))
+            given = replace(self, control=("tolerance", options["tolerance"]))
             return given.propagate_many(problems, times, observer, finished, threads)
         if options:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
@@ -370,7 +370,7 @@ def _rested(integrate: Integrate, times: Sequence[Fraction], start: State) -> fl
     return float(integrate(times, start).seconds["run"])
 
 
-def require_counts(name: str, run: Trajectory, setting: tuple[str, Fraction] | None) -> None:
+def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | None) -> None:
     """Raises PeerFailed where a run to its end cannot have taken as few steps as it says.
 
     A motion takes a step at least, and steps are no fewer than half of those that a step size asks for.
@@ -381,10 +381,10 @@ def require_counts(name: str, run: Trajectory, setting: tuple[str, Fraction] | N
     start = run.problem.start.flat
     if not run.steps and any(tuple(map(exact, state))[:6] != start for state in run.states):
         raise PeerFailed(f"{name} counts its steps wrongly: it moved, and says that it took no step")
-    if setting is not None and setting[0] == "step" and 0 < 2 * run.steps < span / setting[1]:
+    if control is not None and control[0] == "step" and 0 < 2 * run.steps < span / control[1]:
         raise PeerFailed(
             f"{name} counts its steps wrongly: {run.steps} over {decimal_text(span, 6)}, where each is "
-            f"{decimal_text(setting[1], 3)}"
+            f"{decimal_text(control[1], 3)}"
         )
 
 

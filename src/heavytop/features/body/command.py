@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json
+from heavytop.errors import ExitCode
 
 
 @command
@@ -37,4 +38,4 @@ def body(
         print_json(assessment.document())
     else:
         print("\n".join(assessment.lines()))
-    return 0 if assessment.sound else 1
+    return ExitCode.GOOD if assessment.sound else ExitCode.FINDING

@@ -124,7 +124,7 @@ class LocalErrorKind(Kind):
 
 def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
     """Of a method with a memory: the error at the end, and the order that whole runs show."""
-    if integrator.setting is None:
+    if integrator.control is None:
         raise Unsupported(
             f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
             "single step.",
@@ -141,7 +141,7 @@ def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
 def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
     """The order that whole runs show, of a method with fixed steps; none where they do not agree on one."""
     integrator = stepped(task.integrator)
-    order = None if integrator.setting is None else order_of_runs(integrator, run)
+    order = None if integrator.control is None else order_of_runs(integrator, run)
     return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
 
 

@@ -167,12 +167,12 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = integrator.setting is not None
-    length = integrator.setting[1] if integrator.setting else until / max(whole.steps, 1)
+    fixed = integrator.control is not None
+    length = integrator.control[1] if integrator.control else until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
         tau = exact(number(n * length, precision))
-        asked = replace(integrator, setting=("step", tau)) if fixed else integrator
+        asked = replace(integrator, control=("step", tau)) if fixed else integrator
         return asked.propagate_many(problems, [tau])
 
     own = over(1)
@@ -195,9 +195,9 @@ def single_calls(
 
 def stepped(integrator: ChosenIntegrator) -> ChosenIntegrator:
     """With the step 1/100 where it has fixed steps and none is given."""
-    if integrator.setting is not None or registry.control(integrator.which) != "step":
+    if integrator.control is not None or registry.control_name(integrator.which) != "step":
         return integrator
-    return replace(integrator, setting=("step", DEFAULT_STEP))
+    return replace(integrator, control=("step", DEFAULT_STEP))
 
 
 def _require_count(integrator: ChosenIntegrator, run: Trajectory) -> None:
@@ -255,15 +255,15 @@ def order_of_runs(integrator: ChosenIntegrator, whole: Trajectory) -> float | No
     integrator: with the step h of the run ``whole``.  Where the errors at these steps are of rounding, coarser ones are
     taken.  None where no two orders in succession agree.
     """
-    assert integrator.setting is not None
-    step, p, until = integrator.setting[1], whole.problem, whole.times[-1]
+    assert integrator.control is not None
+    step, p, until = integrator.control[1], whole.problem, whole.times[-1]
     top, start = p.given or (p.top, p.start)
     size: Fraction = max(map(abs, p.start.flat))
 
     def error(place: int) -> Fraction | None:
         """At the step h 2^place; None where the run fails, or rounding may have made it."""
         taken = step * Fraction(2) ** place
-        asked = replace(integrator, setting=("step", taken))
+        asked = replace(integrator, control=("step", taken))
         try:
             run = asked.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
         except PeerFailed:

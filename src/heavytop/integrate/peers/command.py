@@ -145,11 +145,11 @@ class CommandIntegrator:
         *,
         system: System = HEAVY_TOP,
         xi: tuple[Fraction, ...] | None = None,
-        **setting: Fraction,
+        **control: Fraction,
     ) -> Trajectory:
         """The run; its seconds are those of the request here, less those of one without times.
 
-        Raises Unsupported for what the program declares that it cannot do, InputError for a setting that it does not
+        Raises Unsupported for what the program declares that it cannot do, InputError for a control that it does not
         have, PeerFailed for whatever else goes wrong.  A program that says ``failed`` is a Trajectory to there whose
         outcome is ``failed``.
         """
@@ -157,7 +157,7 @@ class CommandIntegrator:
         instants = check_times(times)
         declared = command.declared
         declared.require(command.name, start, system, instants[-1], precision, xi)
-        value = self._setting(setting, precision)
+        value = self._control(control, precision)
         if value is not None and command.control == "step":
             value = exact(number(declared.step(command.name, value, instants), precision))
         problem = Problem.of(top, start, precision, system, xi)
@@ -168,7 +168,7 @@ class CommandIntegrator:
             reply = program.ask(request)
         return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
 
-    def _setting(self, given: dict[str, Fraction], precision: Precision) -> Fraction | None:
+    def _control(self, given: dict[str, Fraction], precision: Precision) -> Fraction | None:
         control = self.command.control
         for name in given:
             if name != control:
@@ -188,18 +188,18 @@ class CommandIntegrator:
         return exact(number(value, precision))
 
     def default(self, precision: Precision) -> Fraction | None:
-        """The setting where none is asked for: the step 1/100 as a number of the format, or the eps of the format."""
+        """The control where none is asked for: the step 1/100 as a number of the format, or the eps of the format."""
         if self.command.control == "step":
             return exact(number(DEFAULT_STEP, precision))
         return precision.eps if self.command.control else None
 
     def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
-        flags = {command.control: number_text(request.setting, problem.precision)} if request.setting else {}
+        flags = {command.control: number_text(request.control, problem.precision)} if request.control else {}
         steps = reply.counts.get("steps")
         if steps is None and command.control == "step" and not reply.failure:
-            assert request.setting is not None
-            steps = sum(ceil(abs(b - a) / request.setting) for a, b in pairwise([Fraction(0), *request.times]))
+            assert request.control is not None
+            steps = sum(ceil(abs(b - a) / request.control) for a, b in pairwise([Fraction(0), *request.times]))
         if steps is None:
             flags |= NOT_COUNTED
         if reply.failure:
@@ -240,7 +240,7 @@ def numbers_texts(values: Sequence[Any], precision: Precision, hexadecimal: bool
 class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
-    times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
+    times: exact numbers of the format; none for a request that does nothing.  control: of the format, or None.
     quaternion: whether the program computes with one: it is given that of the start, and answers (Ω, w, x, y, z).
     width: of a state of the answer.
     """
@@ -249,11 +249,11 @@ class ProgramRequest:
         self,
         problem: Problem,
         times: Sequence[Fraction],
-        setting: Fraction | None,
+        control: Fraction | None,
         hexadecimal: bool,
         quaternion: bool = False,
     ) -> None:
-        self.problem, self.times, self.setting, self.hex = problem, list(times), setting, hexadecimal
+        self.problem, self.times, self.control, self.hex = problem, list(times), control, hexadecimal
         self.quaternion = quaternion
         self.width = 7 if quaternion else 6 if problem.xi is None else 9
         self.written = _times_written(self.times, problem.precision, hexadecimal)
@@ -271,7 +271,7 @@ class ProgramRequest:
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
             "quaternion": self._quaternion() if self.quaternion else [],
             "precision": [precision.name],
-            "setting": self._numbers([] if self.setting is None else [self.setting]),
+            "setting": self._numbers([] if self.control is None else [self.control]),
             "times": [str(len(self.times)), *self.written.texts],
         }
         return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"

@@ -266,7 +266,7 @@ class CheckedPlugin:
 
     own: whether it is one of this program's: these say in words what they cannot be asked, end as ``non_finite``
     where a state is not finite, which is a finding about them and no failure, and are believed their clock.
-    declared: what it says that it can do.  setting: what every call is given beside a problem, such as a tolerance.
+    declared: what it says that it can do.  options: what every call is given beside a problem, such as a tolerance.
     """
 
     def __init__(
@@ -275,9 +275,9 @@ class CheckedPlugin:
         call: Any,
         own: bool,
         declared: Declared | None = None,
-        setting: Mapping[str, Any] | None = None,
+        options: Mapping[str, Any] | None = None,
     ) -> None:
-        self.name, self.call, self.own, self.declared, self.setting = name, call, own, declared, dict(setting or {})
+        self.name, self.call, self.own, self.declared, self.options = name, call, own, declared, dict(options or {})
 
     @property
     def carries_attitude(self) -> bool:
@@ -296,7 +296,7 @@ class CheckedPlugin:
         *,
         system: System = HEAVY_TOP,
         xi: tuple[Fraction, ...] | None = None,
-        **setting: Any,
+        **options: Any,
     ) -> Trajectory:
         """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input.
 
@@ -304,7 +304,7 @@ class CheckedPlugin:
         Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
         """
         problem = Problem.of(top, start, precision, system, xi)
-        beside = self.setting | setting if xi is None else {"xi": xi, **self.setting, **setting}
+        beside = self.options | options if xi is None else {"xi": xi, **self.options, **options}
         asked = [exact(number(time, precision)) for time in times]
         if self.declared is not None and asked:
             self.declared.require(self.name, start, system, asked[-1], precision, xi)

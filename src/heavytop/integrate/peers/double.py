@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -34,7 +35,8 @@ class Request:
     start: shape (6,), or (9,) with ξ behind where the attitude is asked for, or (7,), Ω and a quaternion, where that is
     declared.  times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor: shape (7,)
     with λ, 0 for the heavy top, or (9,) with k for the heavy gyrostat.
-    setting: the tolerance, or the step of a method with fixed steps.  step_limit: steps after which an adaptive method
+    control: the tolerance, or the step of a method with fixed steps; ``setting`` is its former name.
+    step_limit: steps after which an adaptive method
     should give up, with the states so far and ``Outcome.STEP_LIMIT``.
     """
 
@@ -42,8 +44,13 @@ class Request:
     start: Doubles
     times: Doubles
     numbers: Doubles
-    setting: float
+    control: float
     step_limit: int = 10**7
+
+    @property
+    def setting(self) -> float:
+        """The control, by its former name."""
+        return self.control
 
     @property
     def parameters(self) -> Parameters:
@@ -98,7 +105,7 @@ def double_peer(
     name: str,
     order: int,
     solve: Solve,
-    knob: str = "tolerance",
+    control: str = "tolerance",
     *,
     systems: Sequence[str] | None = None,
     directions: Sequence[str] | None = None,
@@ -114,7 +121,7 @@ def double_peer(
         name: in rows and messages.
         order: of the method; 0 where it has none to declare.
         solve: takes a :class:`Request` and returns a :class:`Solution`.
-        knob: "tolerance", or "step" for a method with fixed steps.
+        control: "tolerance", or "step" for a method with fixed steps.
         systems, directions, precisions: what it declares that it can do, such as ["heavy_top"], ["forward"],
             ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
             declares nothing: a row that it cannot do is then ``failed``.
@@ -127,7 +134,7 @@ def double_peer(
 
     Returns:
         The peer, called as ``peer(top, start, times, precision, *, system, tolerance, xi)`` (or ``step``).  It raises
-        InputError for a format other than double, for times out of order and for a setting out of range.
+        InputError for a format other than double, for times out of order and for a control out of range.
 
     Raises:
         InputError: for declarations that are not lists of text.
@@ -135,20 +142,20 @@ def double_peer(
     singular = tuple(vectors.vector(each, "singular_at") for each in singular_at)
     if attitude not in (False, True, "quaternion"):
         raise InputError(f"attitude = {quoted(attitude)} declares nothing.", 'Give True, False or "quaternion".')
-    if fixed_grid and knob != "step":
-        raise InputError("fixed_grid declares that all steps are equal.", 'Give knob = "step" too.')
+    if fixed_grid and control != "step":
+        raise InputError("fixed_grid declares that all steps are equal.", 'Give control = "step" too.')
     able = (_declared(systems), _declared(directions), _declared(precisions))
     declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
-    def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
-        given = _given(name, knob, problem, times, setting)
+    def integrate(problem: Problem, times: Sequence[Fraction], value: Fraction) -> Trajectory:
+        given = _given(name, control, problem, times, value)
         if declared.attitude == "quaternion":
             q = problem.native(quaternion(problem))
             given = replace(given, start=numpy.array([*given.start[:3], *q], dtype=float))
         began = perf_counter()
         solved = _from_start(name, given, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
-        flags = {knob: repr(given.setting), "field": field_kind()}
+        flags = {control: repr(given.control), "field": field_kind()}
         return _judged(problem, name, order, given, solved, seconds, flags)
 
     def with_step(
@@ -166,9 +173,30 @@ def double_peer(
     def by_tolerance(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
         return integrate(problem, times, FINEST if tolerance is None else tolerance)
 
-    peer: Any = with_step if knob == "step" else with_tolerance(by_tolerance)
+    peer: Any = with_step if control == "step" else with_tolerance(by_tolerance)
     peer.integrator_name, peer.declared = name, declared
     return peer  # type: ignore[no-any-return]
+
+
+def fixed_steps(
+    request: Request,
+    y: Doubles,
+    advance: Callable[[Doubles, float, int], None],
+    state: Callable[[Doubles], Doubles] = numpy.copy,
+    compile: float = 0.0,
+) -> Solution:
+    """The solution by steps of one length between two times, no longer than the control of the request.
+
+    y: the beginning, which ``advance(y, h, count)`` moves by so many steps.  state: a copy of y as a state.
+    """
+    states, time, steps = [], 0.0, 0
+    for end in request.times:
+        more = math.ceil(abs(end - time) / request.control)
+        if more:
+            advance(y, (end - time) / more, more)
+        time, steps = end, steps + more
+        states.append(state(y))
+    return Solution(states, time, steps, None, compile)
 
 
 def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
@@ -177,16 +205,16 @@ def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(names)
 
 
-def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Request:
+def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
     if problem.precision != DOUBLE:
         raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
-    if setting <= 0 or (knob == "tolerance" and setting > 1):
-        limits = "between 0 and 1" if knob == "tolerance" else "above 0"
-        raise InputError(f"{name} cannot use the {knob} {decimal_text(setting, 6)}.", f"Give one {limits}.")
+    if value <= 0 or (control == "tolerance" and value > 1):
+        limits = "between 0 and 1" if control == "tolerance" else "above 0"
+        raise InputError(f"{name} cannot use the {control} {decimal_text(value, 6)}.", f"Give one {limits}.")
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
     numbers = numpy.array(problem.native(problem.parameters.numbers), dtype=float)
     start = numpy.array(problem.native((*problem.start.flat, *(problem.xi or ()))))
-    return Request(problem.system, start, grid, numbers, float(setting))
+    return Request(problem.system, start, grid, numbers, float(value))
 
 
 def _from_start(name: str, given: Request, solve: Solve) -> Solution:
