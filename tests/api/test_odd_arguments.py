@@ -288,7 +288,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
         if name == "run" and isinstance(odd, str) and odd == "smoke":
             continue  # a plan that is there
         if name == "claim_library" and (odd is None or (isinstance(odd, str) and odd == "heavy_top")):
-            continue  # most of it: tests/claims/test_library.py
+            continue  # most of it: tests/features/claims/test_library.py
         if argument in ("observer", "reached", "done", "advance") and callable(odd):
             continue  # what the caller's own function raises is the caller's
         answered(function, arguments | {argument: odd})

@@ -1,7 +1,7 @@
 """Integrators of another package that cheat: what they say of themselves is measured, and their row fails with why.
 
 Their rows are measured in this process, as the process of a row measures them; that each has one of its own is tested
-in tests/suite/test_limited.py.
+in tests/harness/test_limited.py.
 """
 
 from __future__ import annotations
