@@ -14,7 +14,7 @@ from sys import float_info
 import numpy
 
 from heavytop.diagnose import hypotheses
-from heavytop.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Examined, Units, examined
+from heavytop.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Examined, Frame, Units, examined
 from heavytop.measure.scalar import EXPLAINS, Rounding, explains, rounding
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
@@ -66,10 +66,11 @@ def diagnose(
     start: State,
     system: System,
     times: Sequence[Fraction],
-    states: Sequence[Sequence[Fraction]],
+    states: Sequence[Sequence[Fraction | None]],
     precision: Precision,
     relative_error: float | None,
     errors: Sequence[float] = (),
+    frame: Frame | None = None,
 ) -> list[Diagnosis]:
     """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
 
@@ -80,7 +81,7 @@ def diagnose(
     if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= _WORTH_ASKING:
         return _rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
-        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
+        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
         truth = None if given is None else given.supposed(given.times)
         if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
             return _rounded(written, relative_error)
@@ -140,12 +141,14 @@ def _still(
 
 def _moves(given: Examined, row: int) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
-    sizes = numpy.repeat([given.rate, 1.0], 3)
     true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
     pairs = [(here, given.follows(row))] + ([] if true is None else [(true[0], true[1])])
-    return any(
-        after is not None and float((numpy.abs(after - before) / sizes).max()) > _WRONG for before, after in pairs
-    )
+    return any(after is not None and _apart(given, after, before) > _WRONG for before, after in pairs)
+
+
+def _apart(given: Examined, one: Array, other: Array) -> float:
+    """How far two states are apart, relative to the size of Ω and of γ."""
+    return float((numpy.abs(one - other) / numpy.repeat([given.rate, 1.0], [3, len(one) - 3])).max())
 
 
 def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
@@ -185,8 +188,7 @@ def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors:
     expected = given.follows(last - 1)
     if expected is None:
         return False
-    off = numpy.abs(given.all_states[last] - expected) / numpy.repeat([given.rate, 1.0], 3)
-    return bool(off.max() >= errors[last] / 2)
+    return _apart(given, given.all_states[last], expected) >= errors[last] / 2
 
 
 def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
@@ -277,16 +279,17 @@ def _lost_row(every: Examined) -> Diagnosis | None:
 
 def _integrals_off(given: Examined, error: float) -> Diagnosis | None:
     """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
-    if len(given.rows) < 3:
+    if len(given.rows) < 3 or not given.is_whole:
         return None
     p = given.system.parameters(given.top, given.start)
     start = [float(value) for value in given.start.flat]
+    vectors = given.states.reshape(len(given.states), -1, 3) @ given.frame.axes
     numbers: dict[str, str] = {}
     for integral in holding(given.top, given.start, given.system):
         if integral.name not in (sizes := _sizes(given)):
             continue
         size, unit = sizes[integral.name]
-        values = numpy.array([float(integral.value(p, list(state))) for state in given.states])
+        values = numpy.array([float(integral.value(p, [*omega, *gamma])) for omega, gamma, *_ in vectors])
         at_start = float(integral.value(p, start))
         off, varies = abs(float(values.mean()) - at_start), float(values.max() - values.min())
         if not varies <= _OFF * size:

@@ -163,7 +163,8 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
 
     Twice atan2(s, c) with s = |R − S|/(2√2) and c² = 1 − s²: no digits are lost near 0.
     """
-    square = sum(((a - b) ** 2 for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)), arb(0)) / 8
+    off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
+    square = sum((each * each for each in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
     if square > _ONE:  # of what is no rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
