@@ -17,11 +17,11 @@ from time import perf_counter, process_time
 
 from heavytop.api.integrators import new_integrator
 from heavytop.cases import CASES
+from heavytop.harness.case_text import ensemble_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator, Request, Session
 from heavytop.integrate.registry import commands_in
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, exact, number
-from heavytop.suite.case_text import ensemble_of
 
 REQUESTS, STARTS = 10_000, 64
 STEP = exact(number(Fraction(1, 100), DOUBLE))

@@ -14,7 +14,7 @@ from random import Random
 import pytest
 
 from heavytop.records import SCHEMA, Against, Metric, Report, Row, RowKey, Subject
-from heavytop.store import store
+from heavytop.report.store import store
 
 ROWS = 100_000
 NAMES = ("drift_energy_max", "drift_energy_rms", "solution_error_omega_max", "solution_error_omega_final")

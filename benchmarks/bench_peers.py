@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
+from heavytop.features.kinds import KINDS
 from heavytop.integrate import registry
-from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE, exact
-from heavytop.store.store import read
+from heavytop.report.store.store import read
 
 REPORT = Path(__file__).parents[1] / "results" / "peers"
 OURS, THEIRS = ("heyoka", "heyoka:constants"), ("cyrk:DOP853", "cyrk:Vern8")

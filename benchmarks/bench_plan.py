@@ -12,10 +12,10 @@ from importlib import import_module
 from time import process_time
 from typing import Any
 
-from heavytop.kinds import KINDS
-from heavytop.suite import rows
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import read
+from heavytop.features.kinds import KINDS
+from heavytop.harness import rows
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
 
 PARTS = {
     "compiling": (

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from heavytop.errors import InputError
-from heavytop.suite.score import Assessment, assess
-from heavytop.trajectories.files import read
+from heavytop.features.score.measurement import Assessment, assess
+from heavytop.features.score.trajectories.files import read
 
 REAL = np.longdouble
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")

@@ -30,7 +30,7 @@ import heavytop as ht
 from heavytop.cases import CASES, Case, named_bodies
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import working_precision
-from heavytop.suite.case_text import ensemble_of, one_motion
+from heavytop.harness.case_text import ensemble_of, one_motion
 from heavytop.top.equations import GYROSTAT
 from support.derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
 

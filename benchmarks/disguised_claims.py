@@ -21,9 +21,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.guard import SECONDS
 from heavytop.errors import HeavyTopError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.guard import SECONDS
 from heavytop.top.equations import system
 
 

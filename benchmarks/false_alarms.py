@@ -17,16 +17,17 @@ from itertools import permutations
 
 import msgspec
 
-from heavytop.comparison.compare import compare
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.verdicts import Verdict
-from heavytop.document.document import row_name
-from heavytop.kinds import KINDS, work_precision
+from heavytop.features.kinds import KINDS
+from heavytop.features.work_precision import kind as work_precision
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import Plan, expand, load
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Series
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import Plan, expand, load
+from heavytop.report.compare.compare import compare
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.verdicts import Verdict
+from heavytop.report.document.document import row_name
 
 _WORDS = ("nan", "missing", UNRESOLVED)
 FACTORS = ("2", "5", "10", "30", "100", "1000")

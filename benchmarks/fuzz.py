@@ -39,9 +39,9 @@ import mpmath
 import numpy as np
 
 import heavytop as ht
-from heavytop.claims.audit import guard
 from heavytop.cli import run_command_line
 from heavytop.errors import HeavyTopError
+from heavytop.features.claims.audit import guard
 from heavytop.files import line
 from heavytop.integrate import registry
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 import heavytop as ht
+from heavytop.features.hunt.text import law_text, worst_lines
 from heavytop.precision import shown
-from heavytop.render.hunt import law_text, worst_lines
 
 HUNTS = (("heyoka", 2000, 100), ("multiword", 500, 100), ("scipy:DOP853", 200, 20), ("splitting:4", 200, 20))
 HEAD = """# The hardest tops

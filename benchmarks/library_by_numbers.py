@@ -1,9 +1,9 @@
 """The library of claims in numbers of its own: does what holds stay constant, and does what is refuted move?
 
-Nothing of `heavytop.claims` is used: the files are read here, their formulas evaluated in doubles, and the equations of
-motion written again.  A motion is put into them by differences; a first integral or relation is followed by SciPy's
-DOP853 from states at random on its conditions, which are found by least squares.  Published numbers are compared with
-the attitude that it gives, as far as its digits go.
+Nothing of `heavytop.features.claims` is used: the files are read here, their formulas evaluated in doubles, and the
+equations of motion written again.  A motion is put into them by differences; a first integral or relation is
+followed by SciPy's DOP853 from states at random on its conditions, which are found by least squares.  Published
+numbers are compared with the attitude that it gives, as far as its digits go.
 
     python benchmarks/library_by_numbers.py [--seed 1] [--starts 4]
 

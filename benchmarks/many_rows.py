@@ -16,13 +16,13 @@ from time import perf_counter
 def child(count: int) -> None:
     from msgspec.structs import replace
 
-    import heavytop.suite.run
+    import heavytop.harness.run
     from heavytop.api.run_folder import PlannedRun
     from heavytop.cases import CASES
-    from heavytop.kinds import KINDS
+    from heavytop.features.kinds import KINDS
+    from heavytop.harness.checkpoint import Saved
+    from heavytop.harness.rows import Task, computed
     from heavytop.records import RowKey
-    from heavytop.suite.checkpoint import Saved
-    from heavytop.suite.rows import Task, computed
 
     times = tuple(range(1, 11))
     names = [f"euler-{index}" for index in range(count)]
@@ -33,7 +33,7 @@ def child(count: int) -> None:
     def rows(tasks, *_) -> Iterator:
         return ((index, replace(row, case=task.title, key=task.key)) for index, task in enumerate(tasks))
 
-    heavytop.suite.run.rows = rows
+    heavytop.harness.run.rows = rows
     with tempfile.TemporaryDirectory() as folder:
         began = perf_counter()
         asked = PlannedRun({"name": "many"}, tasks, [], Path(folder) / "out", False, 1, None, 10.0, False)

@@ -25,8 +25,8 @@ from typing import Any
 
 import mpmath
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import system
 
 STATE = ("Omega1", "Omega2", "Omega3", "gamma1", "gamma2", "gamma3")

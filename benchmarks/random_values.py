@@ -16,7 +16,7 @@ from typing import Any
 
 import mpmath
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
 DIGITS = 40
 LIB = mpmath.mp.clone()

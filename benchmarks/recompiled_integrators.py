@@ -32,20 +32,21 @@ from typing import Any
 import numpy
 from scipy.integrate._ivp import dop853_coefficients as dop853
 
-from heavytop.comparison.compare import compare
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.rows import RowComparison
-from heavytop.document.document import row_name
 from heavytop.errors import Unsupported
+from heavytop.features.kinds import KINDS
+from heavytop.features.work_precision import kind as work_precision
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
+from heavytop.harness.rows import Task
 from heavytop.integrate.peers.double import Given, Solved, double_peer
 from heavytop.integrate.peers.source import PythonObject
 from heavytop.integrate.registry import IntegratorSource, commands_in
-from heavytop.kinds import KINDS, work_precision
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import read
-from heavytop.suite.rows import Task
+from heavytop.report.compare.compare import compare
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.rows import RowComparison
+from heavytop.report.document.document import row_name
 
 ROOT = Path(__file__).parent
 PLANS = ("gate", "smoke", "selftest", "peers", str(ROOT / "many_kinds.toml"))

@@ -21,8 +21,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
 CLAIMS = Path(__file__).with_suffix(".jsonl")
 

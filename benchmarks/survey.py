@@ -13,11 +13,11 @@ from pathlib import Path
 from time import process_time
 
 import heavytop as ht
+from heavytop.features.survey.gathered import FILE
+from heavytop.features.survey.measured import chunks, drawn
+from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.precision import DOUBLE
-from heavytop.suite.survey.gathered import FILE
-from heavytop.suite.survey.measured import chunks, drawn
-from heavytop.suite.sweeps import Random
 
 PLAN = """name = "many"
 [[sweep]]

@@ -16,8 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
 
-from heavytop.suite.checkpoint import FILE as ROWS
-from heavytop.suite.survey.gathered import FILE
+from heavytop.features.survey.gathered import FILE
+from heavytop.harness.checkpoint import FILE as ROWS
 from survey import PLAN
 
 COMMAND = [sys.executable, "-m", "heavytop", "run"]

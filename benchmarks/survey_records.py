@@ -13,14 +13,14 @@ import sys
 from fractions import Fraction
 from typing import Any, get_args, get_type_hints
 
+from heavytop.features.survey import measured as records
+from heavytop.features.survey.measured import chunks, drawn
+from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE
-from heavytop.suite.survey import measured as records
-from heavytop.suite.survey.measured import chunks, drawn
-from heavytop.suite.sweeps import Random
 
 TIMES = [Fraction(n) for n in range(1, 11)]
 FAMILIES = get_args(get_type_hints(Random)["family"])

@@ -14,11 +14,11 @@ from random import Random
 
 from heavytop.cases import CASES
 from heavytop.exact.flint.balls import midpoint
+from heavytop.harness.case_text import Member, ensemble_of
 from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.truth import closed_form
 from heavytop.precision import Precision, exact, parse
-from heavytop.suite.case_text import Member, ensemble_of
 from heavytop.top.heavy_top import State
 
 SAMPLES, FASTEST = 64, 10

@@ -17,6 +17,7 @@ import numpy
 
 from heavytop.cases import CASES
 from heavytop.exact.flint.balls import midpoint
+from heavytop.harness.case_text import ensemble_of
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.growth import Ensemble, law
 from heavytop.measure.truth import closed_form
@@ -24,7 +25,6 @@ from heavytop.multiword.fixed_point.arithmetic import grid_of
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.problem import Scaled
 from heavytop.precision import real
-from heavytop.suite.case_text import ensemble_of
 from heavytop.top.equations import Parameters
 
 SAMPLES, START_BITS, TRUE_BITS = 16, 53, 200

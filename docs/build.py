@@ -90,8 +90,8 @@ def write_claims() -> None:
     """The part of the page of audited claims that is made from the library."""
     import msgspec
 
-    from heavytop.render.claims_page import page
-    from heavytop.suite.claim_library import Library, document, is_current
+    from heavytop.features.claims.claim_library import Library, document, is_current
+    from heavytop.features.claims.page import page
 
     kept = ROOT / "results" / "claims" / "library.json"
     found = msgspec.json.decode(kept.read_bytes(), type=Library) if kept.exists() else None

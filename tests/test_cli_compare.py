@@ -157,7 +157,7 @@ def test_bad_input_is_refused_in_words(reports, monkeypatch, capsys, arguments: 
 def test_a_report_of_very_many_rows_is_shown_by_its_worst(reports, monkeypatch, capsys) -> None:
     file = store.write(report(*(row(case=f"top[{i}]") for i in range(30))), reports / "old")
     for most, count in ((30, 30), (29, 1)):
-        monkeypatch.setattr("heavytop.render.text.MOST_LISTED", most)
+        monkeypatch.setattr("heavytop.report.render.text.MOST_LISTED", most)
         assert heavytop(monkeypatch, "show", "old", "--full") == 0
         text = capsys.readouterr().out
         assert "30 measurements" in text

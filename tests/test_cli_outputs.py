@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 from heavytop.cli import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import InputError
-from heavytop.suite.score import assess
-from heavytop.trajectories.files import read
+from heavytop.features.score.measurement import assess
+from heavytop.features.score.trajectories.files import read
 from support import in_process
 
 SHOWN = "quaternion,matrix,euler:ZXZ,position,omega-space"

@@ -14,19 +14,19 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import heavytop as ht
-import heavytop.suite.score as score_module
+import heavytop.features.score.measurement as score_module
 from heavytop.cases import CASES
 from heavytop.cli import app
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
+from heavytop.features.score.measurement import assess
+from heavytop.features.score.text import guessed, requirement, score_report, score_text
+from heavytop.features.score.trajectories.files import read as read_file
+from heavytop.features.score.trajectories.observed import GivenTrajectory, of_arrays
+from heavytop.harness.plan import read
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
-from heavytop.render.page import report_page
-from heavytop.render.score import guessed, requirement, score_report, score_text
-from heavytop.suite.plan import read
-from heavytop.suite.score import assess
-from heavytop.trajectories.files import read as read_file
-from heavytop.trajectories.observed import GivenTrajectory, of_arrays
+from heavytop.report.render.page import report_page
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
@@ -70,7 +70,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
 
 @pytest.mark.parametrize("name", ["double-double", "real:600"])
 def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.score._EFFORT", 1e-6)
+    monkeypatch.setattr("heavytop.features.score.measurement._EFFORT", 1e-6)
     values = given().states
     rows = [list(state) for state in values]
     found = assess(of_arrays(CASE.top, CASE.start, CASE.system, TIMES, rows, ht.precision.parse(name), "a", "b"))
@@ -227,7 +227,7 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
     exec(data["python"], names)
     assert (names["top"], names["start"]) == (case.top, case.start)
     # CSV
-    from heavytop.trajectories.files import read as read_trajectory
+    from heavytop.features.score.trajectories.files import read as read_trajectory
 
     rows = [",".join([time, *state]) for time, state in zip(made["times"], made["states"], strict=True)]
     (tmp_path / "a.csv").write_text("\n".join([data["csv"], *rows]))

@@ -17,11 +17,11 @@ import typer
 
 import heavytop as ht
 from heavytop.cli import app
-from heavytop.comparison import noise
+from heavytop.features.kinds import KINDS
+from heavytop.harness import plan
 from heavytop.integrate.registry import commands_in
-from heavytop.kinds import KINDS
-from heavytop.render.terminal import brief
-from heavytop.suite import plan
+from heavytop.report.compare import noise
+from heavytop.report.render.terminal import brief
 from support import from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 

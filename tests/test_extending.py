@@ -9,9 +9,9 @@ from pkgutil import resolve_name
 import pytest
 
 from heavytop.exact import cases
+from heavytop.features.kinds import KINDS
 from heavytop.integrate.registry import INTEGRATORS
-from heavytop.kinds import KINDS
-from heavytop.render import FORMATS
+from heavytop.report.render import FORMATS
 from support import in_process
 
 DOCS = Path(__file__).parents[1] / "docs"

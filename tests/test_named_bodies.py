@@ -72,7 +72,7 @@ def test_its_equations_are_those_of_detest() -> None:
 
 @pytest.mark.parametrize("name", named_bodies())
 def test_a_named_body_says_its_source_and_its_toml_is_the_same_body(name: str) -> None:
-    from heavytop.suite.case_text import forms
+    from heavytop.harness.case_text import forms
 
     case = named_bodies()[name]
     assert case.source
@@ -88,7 +88,7 @@ def test_a_named_body_says_its_source_and_its_toml_is_the_same_body(name: str) -
 
 
 def test_data_of_a_named_body_are_decimals_where_these_end() -> None:
-    from heavytop.suite.case_text import case_data, forms
+    from heavytop.harness.case_text import case_data, forms
 
     body = named_bodies()["bruels-cardona-arnold"]
     data = case_data(body)

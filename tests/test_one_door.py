@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 import heavytop as ht
 from heavytop.api.integrators import case_document, check_integrator, listing, new_integrator
 from heavytop.api.pages import page
-from heavytop.api.scores import read_trajectory, scored
 from heavytop.cases import CASES, case
 from heavytop.cli import app
 from heavytop.errors import HeavyTopError
+from heavytop.features.score.api import read_trajectory, scored
 
 DATA = {
     "inertia": "3,2,1",

@@ -23,7 +23,7 @@ from heavytop.cli.output import Bar, Estimator, Progress, counted, duration, rea
 from heavytop.measure.motion import compute
 from heavytop.precision import DOUBLE
 from heavytop.records import SCHEMA, Report
-from heavytop.store import store
+from heavytop.report.store import store
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 

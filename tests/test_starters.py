@@ -13,14 +13,14 @@ import pytest
 from heavytop.api.integrators import LANGUAGES, new_integrator
 from heavytop.cases import CASES
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
+from heavytop.harness.integrator_check import check
+from heavytop.harness.plan import read
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.registry import commands_in
-from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
-from heavytop.suite.integrator_check import check
-from heavytop.suite.plan import read
 from heavytop.top.attitude import perpendicular
 from support import in_process
 

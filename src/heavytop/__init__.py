@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api import plot
-    from heavytop.api.claims import ClaimLibrary, audit, claim_library
-    from heavytop.api.derivatives import DerivativeScore, score_derivatives
-    from heavytop.api.events import events, poincare
-    from heavytop.api.hunt import Hunt, hunt
     from heavytop.api.motions import Integrator, Propagated, ensemble, propagate, reference
     from heavytop.api.reports import Comparison, History, Report, compare, history, read_report, run
     from heavytop.api.run_folder import read_survey
-    from heavytop.api.scores import Score, Summary, drift, score
-    from heavytop.claims.audit.judge import Audit
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
-    from heavytop.event_times.functions import Events, ReferenceEvents, Section
+    from heavytop.features.claims.api import ClaimLibrary, audit, claim_library
+    from heavytop.features.claims.audit.judge import Audit
+    from heavytop.features.derivatives.api import DerivativeScore, score_derivatives
+    from heavytop.features.events.api import events, poincare
+    from heavytop.features.events.functions import Events, ReferenceEvents, Section
+    from heavytop.features.hunt.api import Hunt, hunt
+    from heavytop.features.score.api import Score, Summary, drift, score
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES = {
-    "api.claims": ("Audit", "ClaimLibrary", "audit", "claim_library"),
-    "api.derivatives": ("DerivativeScore", "score_derivatives"),
-    "api.events": ("events", "poincare"),
-    "api.hunt": ("Hunt", "hunt"),
+    "features.claims.api": ("Audit", "ClaimLibrary", "audit", "claim_library"),
+    "features.derivatives.api": ("DerivativeScore", "score_derivatives"),
+    "features.events.api": ("events", "poincare"),
+    "features.hunt.api": ("Hunt", "hunt"),
     "api.motions": ("Integrator", "Propagated", "ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "History", "Report", "compare", "history", "read_report", "run"),
     "api.run_folder": ("read_survey",),
-    "api.scores": ("Score", "Summary", "drift", "score"),
+    "features.score.api": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
-    "event_times.functions": ("Events", "ReferenceEvents", "Section"),
+    "features.events.functions": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 
-from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import InputError
 from heavytop.exact.bodies import resolve
 from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import CENTRE, PIVOT, Body
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of

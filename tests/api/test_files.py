@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+from heavytop.features.score.trajectories.files import read
 from heavytop.records import SCHEMA, Report
-from heavytop.trajectories.files import read
 from support.reports import store
 
 MOTION = """{"inertia": ["2", "2", "1"], "weight": "1", "centre": [0, 0, 1], "omega": [0, 0, 1], "gamma": [0, 0, 1],

@@ -8,4 +8,4 @@ import pytest
 @pytest.fixture(autouse=True)
 def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tenth of a second in place of six: the verdict stands before it."""
-    monkeypatch.setattr("heavytop.claims.audit.audit._SEARCH", 0.1)
+    monkeypatch.setattr("heavytop.features.claims.audit.audit._SEARCH", 0.1)

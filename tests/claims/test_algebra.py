@@ -9,8 +9,8 @@ from itertools import permutations
 import pytest
 import sympy
 
-from heavytop.claims.algebra.evaluate import evaluate
-from heavytop.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Assumptions, Field
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
 TRUE = [

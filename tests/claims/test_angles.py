@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP
 
 

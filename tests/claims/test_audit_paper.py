@@ -8,12 +8,12 @@ from functools import cache
 import pytest
 import sympy
 
-from heavytop.claims.audit.audit import audit, only_branch
-from heavytop.claims.audit.judge import Audit, StatementVerdict, judge
-from heavytop.claims.library import ershkov, ershkov_general
-from heavytop.claims.library.ershkov_audit import GeneralClaim, PartialClaim
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
+from heavytop.features.claims.audit.audit import audit, only_branch
+from heavytop.features.claims.audit.judge import Audit, StatementVerdict, judge
+from heavytop.features.claims.library import ershkov, ershkov_general
+from heavytop.features.claims.library.ershkov_audit import GeneralClaim, PartialClaim
 from heavytop.top.equations import HEAVY_TOP
 
 

@@ -8,13 +8,13 @@ import pytest
 import sympy
 
 from claims.test_where import TOPS
-from heavytop.claims.algebra.fields import Field
-from heavytop.claims.algebra.prover import Region
-from heavytop.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.context import STATE, TIME
-from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.fields import Field
+from heavytop.features.claims.algebra.prover import Region
+from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.context import STATE, TIME
+from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import system
 
 ENERGY = "((2*Omega1^2 + 3*Omega2^2 + 4*Omega3^2)/2 + gamma1 + 2*gamma2 + 3*gamma3)"

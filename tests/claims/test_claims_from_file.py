@@ -9,13 +9,13 @@ from importlib.resources import files
 import pytest
 from typer.testing import CliRunner
 
-from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table
-from heavytop.claims.audit.guard import in_time
-from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit, audit_claim, claim_from_table
+from heavytop.features.claims.audit.guard import in_time
+from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 
-EXAMPLES = files("heavytop.claims") / "examples"
+EXAMPLES = files("heavytop.features.claims") / "examples"
 
 HOSTILE = [
     "__import__('os').system('true')",

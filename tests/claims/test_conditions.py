@@ -8,10 +8,10 @@ import pytest
 import sympy
 from typer.testing import CliRunner
 
-from heavytop.claims.algebra.conditions import written
-from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table
-from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.conditions import written
+from heavytop.features.claims.audit.audit import audit, audit_claim, claim_from_table
+from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import HEAVY_TOP
 
 
@@ -266,7 +266,7 @@ UPRIGHT = SPIN | {"kind": "motion", "motion": {"gamma": ["0", "0", "1"]}}
 @pytest.fixture
 def unhurried(monkeypatch):
     """As many seconds for assumptions that would decide as a busy machine takes."""
-    monkeypatch.setattr("heavytop.claims.audit.audit._SEARCH", 600.0)
+    monkeypatch.setattr("heavytop.features.claims.audit.audit._SEARCH", 600.0)
 
 
 def _verdict(table: dict, assume: list[str]) -> tuple[str, dict[str, str]]:

@@ -7,11 +7,11 @@ import mpmath
 import pytest
 import sympy
 
-from heavytop.claims.algebra.evaluate import evaluate
-from heavytop.claims.algebra.fields import Assumptions, Field
-from heavytop.claims.algebra.structure import cn, dn, sn
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.structure import cn, dn, sn
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
 T = sympy.Symbol("t", real=True)
 M = sympy.Symbol("m", real=True)

@@ -6,10 +6,10 @@ from random import Random
 import numpy
 import pytest
 
-from heavytop.claims.library import ershkov
-from heavytop.claims.library.ershkov import PartialCase
 from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
-from heavytop.measure.claim_error import evaluation_error, exact_claim, first_failure
+from heavytop.features.claims.claim_error import evaluation_error, exact_claim, first_failure
+from heavytop.features.claims.library import ershkov
+from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, number, real
 from support.helpers import positive
 

@@ -14,16 +14,16 @@ from importlib.resources import files
 
 import pytest
 
-from heavytop.claims.audit import guard
-from heavytop.claims.audit.audit import audit
 from heavytop.errors import HeavyTopError, InputError
+from heavytop.features.claims.audit import guard
+from heavytop.features.claims.audit.audit import audit
 
-EXAMPLE = str(files("heavytop.claims") / "examples" / "momentum-squared.toml")
+EXAMPLE = str(files("heavytop.features.claims") / "examples" / "momentum-squared.toml")
 
 
 def test_a_plain_script_without_a_main_guard_can_audit(tmp_path):
     script = tmp_path / "script.py"
-    script.write_text(f"from heavytop.claims.audit.audit import audit\nprint(audit({EXAMPLE!r}).verdict)\n")
+    script.write_text(f"from heavytop.features.claims.audit.audit import audit\nprint(audit({EXAMPLE!r}).verdict)\n")
     (tmp_path / "json.py").write_text("raise RuntimeError('a module of the working directory was imported')\n")
     done = subprocess.run([sys.executable, "-P", str(script)], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["refuted"]
@@ -101,7 +101,7 @@ def test_a_hard_limit_of_memory_below_its_own_is_kept(tmp_path):
     resource = pytest.importorskip("resource")
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30));"
-        "from heavytop.claims.audit.guard import limit_memory; limit_memory();"
+        "from heavytop.features.claims.audit.guard import limit_memory; limit_memory();"
         "print(resource.getrlimit(resource.RLIMIT_AS)[0] >> 30)"
     )
     assert resource

@@ -10,10 +10,10 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.claims.audit import audit as auditing
-from heavytop.claims.audit.audit import claim_from_table
-from heavytop.claims.library import entry as entries
-from heavytop.suite import claim_library
+from heavytop.features.claims import claim_library
+from heavytop.features.claims.audit import audit as auditing
+from heavytop.features.claims.audit.audit import claim_from_table
+from heavytop.features.claims.library import entry as entries
 from support import in_process
 
 HEAD: dict[str, Any] = {

@@ -5,9 +5,9 @@ import tomllib
 
 import pytest
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table, own_system
-from heavytop.claims.audit.judge import verdict_of
-from heavytop.claims.library.entry import FOLDER, library, split
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table, own_system
+from heavytop.features.claims.audit.judge import verdict_of
+from heavytop.features.claims.library.entry import FOLDER, library, split
 
 QUICK = (
     "area-integral", "energy", "energy-gamma-down", "free-body-delta", "gyrostat-area", "gyrostat-area-without-rotor",

@@ -7,15 +7,15 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.claims.algebra.arcs import Arcs
-from heavytop.claims.algebra.conditions import ConditionKind, Need
-from heavytop.claims.algebra.fields import Assumptions, Field
-from heavytop.claims.algebra.prover import Prover, Region
-from heavytop.claims.algebra.reader import assume
-from heavytop.claims.algebra.signs import Sign, used
-from heavytop.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.context import STATE
+from heavytop.features.claims.algebra.arcs import Arcs
+from heavytop.features.claims.algebra.conditions import ConditionKind, Need
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.prover import Prover, Region
+from heavytop.features.claims.algebra.reader import assume
+from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.context import STATE
 from heavytop.top.equations import HEAVY_TOP
 
 T = sympy.Symbol("t", real=True)

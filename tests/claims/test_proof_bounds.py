@@ -8,7 +8,7 @@ import pytest
 import sympy
 from flint import arb
 
-from heavytop.claims.algebra.conditions import (
+from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
     condition,
@@ -17,13 +17,13 @@ from heavytop.claims.algebra.conditions import (
     is_exactly_zero,
     written,
 )
-from heavytop.claims.algebra.fields import Assumptions, Field, Regularity
-from heavytop.claims.algebra.prover import Prover, Region
-from heavytop.claims.algebra.signs import Sign, used
-from heavytop.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
-from heavytop.claims.algebra.structure import sign_of as sign_by_structure
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.judge import judge
+from heavytop.features.claims.algebra.fields import Assumptions, Field, Regularity
+from heavytop.features.claims.algebra.prover import Prover, Region
+from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.judge import judge
 from heavytop.top.equations import system
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
@@ -381,7 +381,7 @@ def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> N
     gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
     statement = Statement("1", 1, "smooth", ALL, sympy.exp(gudermannian) - 1, "")
     for ball in (arb(0.5, 0.75), arb(-0.5, 0.75), arb(0, 1.25)):
-        monkeypatch.setattr("heavytop.claims.audit.judge.evaluate", lambda *_, ball=ball: ball)
+        monkeypatch.setattr("heavytop.features.claims.audit.judge.evaluate", lambda *_, ball=ball: ball)
         (row,) = judge([statement], setting)
         assert 1.25 <= float(row.residual.removeprefix("|residual| < ").removesuffix(" at the sample points")) < 1.27
 

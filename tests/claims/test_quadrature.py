@@ -9,11 +9,11 @@ from typing import Any
 import mpmath
 import pytest
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.judge import Audit
 
-EXAMPLE = files("heavytop.claims") / "examples" / "pendulum-quadrature.toml"
+EXAMPLE = files("heavytop.features.claims") / "examples" / "pendulum-quadrature.toml"
 
 
 def audited(table: dict[str, Any]) -> Audit:

@@ -9,12 +9,12 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.claims.algebra.conditions import is_exactly_zero
-from heavytop.claims.algebra.evaluate import evaluate
-from heavytop.claims.algebra.fields import Assumptions, Field
-from heavytop.claims.algebra.rational import forces_zero
-from heavytop.claims.algebra.signs import PLUS, UNKNOWN, Sign, sum_of
-from heavytop.claims.algebra.structure import sign_of
+from heavytop.features.claims.algebra.conditions import is_exactly_zero
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.rational import forces_zero
+from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sum_of
+from heavytop.features.claims.algebra.structure import sign_of
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
 X = sympy.Symbol("x", real=True)

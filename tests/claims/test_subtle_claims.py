@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
 LINES = (Path(__file__).parents[2] / "benchmarks" / "subtle_claims.jsonl").read_text("utf-8").splitlines()
 CLAIMS = [json.loads(line) for line in LINES]

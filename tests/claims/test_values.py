@@ -12,16 +12,16 @@ import mpmath
 import pytest
 from rich.console import Console
 
-from heavytop.claims.audit import audit as auditing
-from heavytop.claims.audit.audit import audit_claim, claim_from_table, read_claim
-from heavytop.claims.audit.judge import Audit, StatementVerdict
-from heavytop.claims.audit.values import PrintedNumber, ValueClaim
-from heavytop.claims.library import entry as entries
 from heavytop.errors import InputError
-from heavytop.kinds import KINDS
-from heavytop.kinds.audit import AuditTable
-from heavytop.render.claims import audit_text
-from heavytop.suite.checkpoint import Saved
+from heavytop.features.claims.audit import audit as auditing
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table, read_claim
+from heavytop.features.claims.audit.judge import Audit, StatementVerdict
+from heavytop.features.claims.audit.values import PrintedNumber, ValueClaim
+from heavytop.features.claims.kinds.audit import AuditTable
+from heavytop.features.claims.library import entry as entries
+from heavytop.features.claims.text import audit_text
+from heavytop.features.kinds import KINDS
+from heavytop.harness.checkpoint import Saved
 from heavytop.top.equations import system
 from support import in_process
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import sympy
 
-from heavytop.claims.algebra.conditions import solve_relations
-from heavytop.claims.algebra.fields import Assumptions, Field
-from heavytop.claims.algebra.prover import Region
-from heavytop.claims.algebra.signs import Sign, used
-from heavytop.claims.algebra.statement import ALL, Flow, Setting, Statement
-from heavytop.claims.audit.context import STATE
+from heavytop.features.claims.algebra.conditions import solve_relations
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.prover import Region
+from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.statement import ALL, Flow, Setting, Statement
+from heavytop.features.claims.audit.context import STATE
 
 T = sympy.Symbol("t", real=True)
 A, B, C, D, E = SYMBOLS = sympy.symbols("a b c d e", real=True)

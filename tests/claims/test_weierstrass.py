@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import sympy
 
-from heavytop.claims.algebra.evaluate import evaluate, wp, wpprime
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.evaluate import evaluate, wp, wpprime
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.judge import Audit
 
 U, G2, G3 = sympy.symbols("u g2 g3", real=True)
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.claims.algebra.conditions import conditions_for_zero, is_exactly_zero
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.audit.context import STATE
-from heavytop.claims.audit.user_claims import states_on
+from heavytop.features.claims.algebra.conditions import conditions_for_zero, is_exactly_zero
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.context import STATE
+from heavytop.features.claims.audit.user_claims import states_on
 from heavytop.top.equations import HEAVY_TOP
 
 AREA = "(4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3)"

@@ -9,8 +9,8 @@ import pytest
 from flint import arb, arb_poly
 
 import heavytop as ht
-from heavytop.event_times.proven import _WIDE, _Near, _Piece
 from heavytop.exact.flint.balls import ball, radius, working_precision
+from heavytop.features.events.proven import _WIDE, _Near, _Piece
 
 TOP, START = ht.HeavyTop((2, 3, 1), 1, (0, 0, 1)), ht.State((1, 0, 0), (0, "3/5", "4/5"))
 """A pendulum, which passes its lowest point, γ = (0, 0, −1), at t = 1.8143…"""

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+from heavytop.features.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, possible, turns
+from heavytop.features.hunt.search import digits, keep, kept
+from heavytop.features.kinds import KINDS
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import expand, load
 from heavytop.integrate.registry import INTEGRATORS, Integrator
-from heavytop.kinds import KINDS
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, possible, turns
-from heavytop.suite.hunt.search import digits, keep, kept
-from heavytop.suite.plan import expand, load
 from support.in_process import heavytop
 
 FAULTS = Path(__file__).parents[1] / "support" / "hunted_integrators.py"

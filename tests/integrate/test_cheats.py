@@ -13,10 +13,11 @@ from time import perf_counter
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.kinds import KINDS, work_precision
+from heavytop.features.kinds import KINDS
+from heavytop.features.work_precision import kind as work_precision
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.rows import measure
 from heavytop.records import Row
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.rows import measure
 from support.reports import expand, load
 
 MODULE = '''

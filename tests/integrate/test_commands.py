@@ -18,6 +18,7 @@ import pytest
 import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.harness.integrator_check import check
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import command as commands
@@ -25,7 +26,6 @@ from heavytop.integrate.peers.command import Command, Session, number_text
 from heavytop.integrate.registry import commands_in, named
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
-from heavytop.suite.integrator_check import check
 from heavytop.top.equations import GYROSTAT
 from heavytop.written_numbers import number as written
 
@@ -147,7 +147,7 @@ def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str
 
 @pytest.mark.parametrize("fault", DIAGNOSED)
 def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.integrator_check._FAREWELL", 0.2)
+    monkeypatch.setattr("heavytop.harness.integrator_check._FAREWELL", 0.2)
     found = {each.check: each.text for each in check(program(fault)) if each.verdict == "violated"}
     name, text = DIAGNOSED[fault]
     assert text in found.pop(name)

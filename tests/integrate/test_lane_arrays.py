@@ -6,6 +6,7 @@ import numpy
 import pytest
 
 from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka.engines import arrays
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
@@ -13,7 +14,6 @@ from heavytop.integrate.multiword.lanes import Numerators, double_double_states
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact
-from heavytop.suite.sweeps import Random
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 

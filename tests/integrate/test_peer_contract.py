@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError, PeerFailed
+from heavytop.features.work_precision import kind as work_precision
 from heavytop.integrate import registry
 from heavytop.integrate.peers import contract
-from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import Report
-from heavytop.render.export import comparison_junit
+from heavytop.report.compare.noise import Policy
+from heavytop.report.render.export import comparison_junit
 from support.helpers import run_peer, without_progress
 from support.reports import all_good, compare, expand, html, load, measure, plan_of
 

@@ -181,7 +181,7 @@ for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4
 
 def test_nothing_is_imported_before_it_is_used() -> None:
     code = (
-        "import sys, heavytop.kinds, heavytop.integrate.registry as p; p.known();"
+        "import sys, heavytop.features.kinds, heavytop.integrate.registry as p; p.known();"
         "print([m for m in ('numba', 'jax', 'scipy', 'CyRK', 'sksundae', 'heyoka', 'sympy') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -10,14 +10,14 @@ import pytest
 from rich.console import Console
 
 import heavytop as ht
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.verdicts import Verdict
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
+from heavytop.harness import rows as suite_rows
+from heavytop.harness.checkpoint import Saved
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
 from heavytop.records import NOT_CARRIED, SCHEMA, Report, Row
-from heavytop.suite import rows as suite_rows
-from heavytop.suite.checkpoint import Saved
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, read_plan, summary
 
 PEER = '''

@@ -116,8 +116,8 @@ def test_a_body_that_is_none_is_refused_by_the_name_of_its_top(
 
 
 def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
-    from heavytop.kinds import KINDS
-    from heavytop.suite.plan import expand, load
+    from heavytop.features.kinds import KINDS
+    from heavytop.harness.plan import expand, load
 
     table = TABLE.format(integrator="heyoka", precision="double", attitude="false")
     (tmp_path / "plan.toml").write_text(PLAN + table, "utf-8")

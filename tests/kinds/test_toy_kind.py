@@ -8,19 +8,20 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from heavytop.comparison.compare import compare
-from heavytop.comparison.noise import Policy
-from heavytop.document.document import Block, Chart, Headline, Section, Sources, Value
-from heavytop.document.document import Table as Cells
-from heavytop.kinds import KINDS, Kind
+from heavytop.features.kinds import KINDS
+from heavytop.harness.checkpoint import Checkpoint, Saved
+from heavytop.harness.plan import expand, load
+from heavytop.harness.rows import Find, PlanTable, Task, exact_row
+from heavytop.harness.run import run
+from heavytop.kind import Kind
 from heavytop.measure.scalar import of_fraction
 from heavytop.records import SCHEMA, Against, Beside, Quantity, Report, Row, RowKey, Subject, by_name
-from heavytop.render.page import report_page
-from heavytop.render.terminal import summary
-from heavytop.suite.checkpoint import Checkpoint, Saved
-from heavytop.suite.plan import expand, load
-from heavytop.suite.rows import Find, PlanTable, Task, exact_row
-from heavytop.suite.run import run
+from heavytop.report.compare.compare import compare
+from heavytop.report.compare.noise import Policy
+from heavytop.report.document.document import Block, Chart, Headline, Section, Sources, Value
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.render.page import report_page
+from heavytop.report.render.terminal import summary
 
 WEIGHT = Quantity("toy_weight")
 PLAN = """name = "toys"

@@ -5,13 +5,13 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
+from heavytop.features.claims.claim_error import CLAIM_XI, claim_attitude, exact_claim, model_error
+from heavytop.features.claims.kinds.claim_model import true_motion
+from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.integrate.trajectory import Problem
-from heavytop.kinds.claim_model import true_motion
-from heavytop.measure.claim_error import CLAIM_XI, claim_attitude, exact_claim, model_error
 from heavytop.measure.truth import ComputedReference, compute
 from support.helpers import VECTORS
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.diagnose.diagnosis import diagnose
-from heavytop.diagnose.samples import motion
+from heavytop.features.score.diagnose.diagnosis import diagnose
+from heavytop.features.score.diagnose.samples import motion
+from heavytop.features.score.text import diagnosis_text
 from heavytop.measure.scalar import rounding
 from heavytop.precision import DOUBLE, QUAD
-from heavytop.render.score import diagnosis_text
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
+from heavytop.features.score.measurement import score
+from heavytop.features.score.trajectories.observed import GivenTrajectory
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
 from heavytop.measure.truth import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.render import plots
-from heavytop.render.text import worst
-from heavytop.suite.score import score
-from heavytop.trajectories.observed import GivenTrajectory
+from heavytop.report.render import plots
+from heavytop.report.render.text import worst
 from support import in_process
 from support.report_helpers import error, row
 from support.reports import html, replace, summary

@@ -7,7 +7,7 @@ import numpy
 import pytest
 
 from heavytop.measure.growth import BENT, FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
-from heavytop.store.checks import inconsistent
+from heavytop.report.store.checks import inconsistent
 from support.synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 

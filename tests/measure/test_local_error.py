@@ -9,12 +9,12 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
+from heavytop.features.local_error.measurement import LocalError, single_calls
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.integrator import ChosenIntegrator
-from heavytop.measure.local_error import LocalError, single_calls
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
 from heavytop.top.heavy_top import HeavyTop, State
 

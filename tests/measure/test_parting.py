@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import pytest
 
-from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import OutOfReach
-from heavytop.measure import claim_error as module
-from heavytop.measure.claim_error import CLOSE, PARTED, divergence_time, exact_claim, true_solution
+from heavytop.features.claims import claim_error as module
+from heavytop.features.claims.claim_error import CLOSE, PARTED, divergence_time, exact_claim, true_solution
+from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.precision import exact
 from support.reports import expand, load, measure
 

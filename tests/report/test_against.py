@@ -11,15 +11,15 @@ import pytest
 
 import heavytop.exact
 from heavytop.cases import CASES
-from heavytop.claims.library.ershkov import PartialCase
-from heavytop.comparison.verdicts import weaker
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.features.claims.kinds.claim_model import true_motion
+from heavytop.features.claims.library.ershkov import PartialCase
 from heavytop.integrate.trajectory import Problem
-from heavytop.kinds.claim_model import true_motion
 from heavytop.measure.truth import Known, known_motion, of_rounded, reference
 from heavytop.precision import DOUBLE
 from heavytop.records import Against
+from heavytop.report.compare.verdicts import weaker
 from support.reports import expand, measure, plan_of
 
 ONE = Fraction(1)

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from heavytop.render.claims import _RESIDUAL, _in_lines
+from heavytop.features.claims.text import _RESIDUAL, _in_lines
 
 NAMES = ("alpha", "gamma1", "omega1'", "Omega3", "I1", "t", "exp", "3", "0.25", "gamma_squared_long")
 

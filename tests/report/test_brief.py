@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric
+from heavytop.report.compare.noise import Policy
 from support.reports import compare, store
 from support.small_reports import error, report, row
 

@@ -13,11 +13,11 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.claims.library.entry import Entry
-from heavytop.render.claims_page import page
-from heavytop.suite import claim_library
-from heavytop.suite.claim_library import Equation, Library, Published, is_current
+from heavytop.features.claims import claim_library
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.claim_library import Equation, Library, Published, is_current
+from heavytop.features.claims.library.entry import Entry
+from heavytop.features.claims.page import page
 
 ENTRY: dict[str, Any] = {
     "id": "spin",
@@ -128,7 +128,7 @@ def test_a_document_is_current_only_of_the_entries_as_they_stand(
 
 
 def test_the_results_are_of_the_entries_as_they_stand() -> None:
-    """Else: heavytop run --plan claims and python -m heavytop.suite.claim_library, as results/README.md says."""
+    """Else: remake them, as results/README.md says."""
     folder = Path(__file__).parents[2] / "results" / "claims"
     document = json.loads((folder / "library.json").read_bytes())
     assert msgspec.to_builtins(msgspec.convert(document, Library)) == document

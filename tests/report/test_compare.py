@@ -7,13 +7,13 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.comparison.noise import Policy, Rule, Timings
-from heavytop.comparison.verdicts import Verdict, judge_seconds
-from heavytop.document.document import short
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Data, Law, Metric, Row, Series
+from heavytop.report.compare.noise import Policy, Rule, Timings
+from heavytop.report.compare.verdicts import Verdict, judge_seconds
+from heavytop.report.document.document import short
 from support.reports import compare, replace, store
 from support.small_reports import error, report, row
 

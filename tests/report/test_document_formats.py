@@ -6,9 +6,9 @@ import json
 import re
 from pathlib import Path
 
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
 from heavytop.records import SCHEMA, Report
-from heavytop.render.export import to_json, to_markdown
+from heavytop.report.render.export import to_json, to_markdown
 from support import in_process
 from support.report_helpers import claim_rows
 from support.reports import store

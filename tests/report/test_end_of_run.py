@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
 from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
-from heavytop.render.terminal import LINES, MOST_ROWS, WIDTH, brief, fitted
-from heavytop.store import store
+from heavytop.report.render.terminal import LINES, MOST_ROWS, WIDTH, brief, fitted
+from heavytop.report.store import store
 from support.small_reports import error, row
 
 RESULTS = Path(__file__).parents[2] / "results"

@@ -13,12 +13,12 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-from heavytop.document.document import row_name
 from heavytop.errors import InputError
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
 from heavytop.records import Report
-from heavytop.render import FORMATS
-from heavytop.render.export import LOST, export
+from heavytop.report.document.document import row_name
+from heavytop.report.render import FORMATS
+from heavytop.report.render.export import LOST, export
 from support import in_process
 from support.reports import store
 

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import numpy
 import pytest
 
-from heavytop.claims.library.ershkov import PartialCase
-from heavytop.measure.claim_error import PAPER_FIGURES, drawings, exact_curves, true_curves
-from heavytop.render.figures import draw_figures
+from heavytop.features.claims.claim_error import PAPER_FIGURES, drawings, exact_curves, true_curves
+from heavytop.features.claims.figures import draw_figures
+from heavytop.features.claims.library.ershkov import PartialCase
 
 
 def case(ratio: int) -> PartialCase:

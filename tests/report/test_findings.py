@@ -2,11 +2,11 @@
 
 import pytest
 
-from heavytop.comparison.findings import MOST
-from heavytop.comparison.noise import Policy
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Explained, Law, Row, Subject
+from heavytop.report.compare.findings import MOST
+from heavytop.report.compare.noise import Policy
 from support.report_helpers import error
 from support.reports import compare, replace
 from support.small_reports import report, row

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.comparison.noise import Policy
-from heavytop.document.document import MOST_PLOTS, Card, Headline, In, Section, Word, points
-from heavytop.document.kind import document
-from heavytop.document.svg import apart, decades, finish, new_axes
 from heavytop.errors import InputError
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import RELATIVE
 from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
-from heavytop.render import plots
-from heavytop.render.page import MOST_ROWS, digits_headline, laws_headline
+from heavytop.report.compare.noise import Policy
+from heavytop.report.document.document import MOST_PLOTS, Card, Headline, In, Section, Word, points
+from heavytop.report.document.kind import document
+from heavytop.report.document.svg import apart, decades, finish, new_axes
+from heavytop.report.render import plots
+from heavytop.report.render.page import MOST_ROWS, digits_headline, laws_headline
 from support import in_process
 from support.report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 from support.reports import compare, html, replace, store

@@ -5,10 +5,10 @@ import math
 import numpy
 import pytest
 
-from heavytop.comparison.noise import Policy
-from heavytop.document.svg import quiet_style
+from heavytop.features.work_precision.charts import alike, method_growth, trend
 from heavytop.records import SCHEMA, Report, Series
-from heavytop.render.work_precision import alike, method_growth, trend
+from heavytop.report.compare.noise import Policy
+from heavytop.report.document.svg import quiet_style
 from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
 from support.reports import compare, comparison_page
 

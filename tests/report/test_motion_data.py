@@ -9,14 +9,14 @@ import msgspec
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
+from heavytop.features.score.measurement import score
+from heavytop.features.score.trajectories.observed import of_arrays
+from heavytop.harness.rows import data_of
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import Data, Law, Quantity, Row, Series
-from heavytop.suite.rows import data_of
-from heavytop.suite.score import score
-from heavytop.trajectories.observed import of_arrays
+from heavytop.report.compare.noise import Policy
 from support.reports import compare, expand, load, measure, replace, rows, store
 from support.small_reports import report, row
 

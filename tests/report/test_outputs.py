@@ -12,16 +12,16 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from heavytop.comparison.compare import Differences
-from heavytop.comparison.noise import Policy
-from heavytop.document.document import logarithm
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Law, Report, Series
-from heavytop.render.comparison import comparison
-from heavytop.render.export import comparison_junit, comparison_markdown
-from heavytop.render.history import _ticks, history_json, history_page, history_text
-from heavytop.render.text import table
+from heavytop.report.compare.compare import Differences
+from heavytop.report.compare.noise import Policy
+from heavytop.report.document.document import logarithm
+from heavytop.report.render.comparison import comparison
+from heavytop.report.render.export import comparison_junit, comparison_markdown
+from heavytop.report.render.history import _ticks, history_json, history_page, history_text
+from heavytop.report.render.text import table
 from support.reports import compare, comparison_page, history, replace, report_page, summary
 from support.small_reports import error, report, row
 

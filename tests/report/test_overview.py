@@ -5,7 +5,7 @@ from io import StringIO
 from rich.console import Console
 
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.render.text import worst
+from heavytop.report.render.text import worst
 from support.reports import Row
 
 

@@ -14,13 +14,13 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.comparison.noise import Policy
+from heavytop.features.score.measurement import Assessment, assess
+from heavytop.features.score.text import score_report
+from heavytop.features.score.trajectories.observed import of_arrays
 from heavytop.precision import DOUBLE
 from heavytop.records import Report, Row
-from heavytop.render.history import history_page
-from heavytop.render.score import score_report
-from heavytop.suite.score import Assessment, assess
-from heavytop.trajectories.observed import of_arrays
+from heavytop.report.compare.noise import Policy
+from heavytop.report.render.history import history_page
 from support.report_helpers import HOSTILE, error, full_report
 from support.reports import compare, history, html, replace, store
 

@@ -8,8 +8,8 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.records import Data, Law, Metric
-from heavytop.store import parquet
-from heavytop.store.parquet import COLUMNS, check_name, require_pyarrow, write
+from heavytop.report.store import parquet
+from heavytop.report.store.parquet import COLUMNS, check_name, require_pyarrow, write
 from support.reports import Row
 
 pytest.importorskip("pyarrow")

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.comparison.noise import Policy, adjusted, load
-from heavytop.comparison.verdicts import Verdict
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.records import Law, Row
+from heavytop.report.compare.noise import Policy, adjusted, load
+from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, replace
 from support.small_reports import error, report, row
 

@@ -8,7 +8,11 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.comparison.noise import (
+from heavytop.features.kinds import KINDS
+from heavytop.harness.rows import computed
+from heavytop.measure.rounding_noise import some_of
+from heavytop.records import Against, Data, Metric, Quantity, Row, Series
+from heavytop.report.compare.noise import (
     Policy,
     RoundingBound,
     Rule,
@@ -18,10 +22,6 @@ from heavytop.comparison.noise import (
     of_starts,
     reaches_further,
 )
-from heavytop.kinds import KINDS
-from heavytop.measure.rounding_noise import some_of
-from heavytop.records import Against, Data, Metric, Quantity, Row, Series
-from heavytop.suite.rows import computed
 from heavytop.top.amplification import amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support import degraded_integrators as degraded

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.comparison.noise import Policy, Rule, Timings
 from heavytop.errors import InputError
-from heavytop.kinds import work_precision
+from heavytop.features.work_precision import kind as work_precision
 from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
+from heavytop.report.compare.noise import Policy, Rule, Timings
 from support.reports import compare, expand, load, measure, replace, store
 from support.small_reports import report, row
 

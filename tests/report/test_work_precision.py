@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from heavytop.comparison.work_precision import WorkPrecisionLine, WorkPrecisionPoint, beside_ours, leads, panels
-from heavytop.document.document import Headline
-from heavytop.document.svg import quiet_style
 from heavytop.errors import InputError
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
+from heavytop.features.work_precision.charts import work_precision
+from heavytop.features.work_precision.curves import WorkPrecisionLine, WorkPrecisionPoint, beside_ours, leads, panels
 from heavytop.records import SCHEMA, Metric, Report, Series
-from heavytop.render.page import fastest
-from heavytop.render.plots import draw_report
-from heavytop.render.work_precision import work_precision
+from heavytop.report.document.document import Headline
+from heavytop.report.document.svg import quiet_style
+from heavytop.report.render.page import fastest
+from heavytop.report.render.plots import draw_report
 from support.reports import Row, summary
 
 KIND = ("svg", "pdf")

@@ -16,11 +16,11 @@ import pytest
 
 from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
 from heavytop.files import line
-from heavytop.kinds import KINDS
+from heavytop.harness import rows as one_row
+from heavytop.harness.checkpoint import Checkpoint, Saved, locked
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.suite import rows as one_row
-from heavytop.suite.checkpoint import Checkpoint, Saved, locked
 from support import in_process
 from support.reports import Row, expand, load, measure, replace, store
 
@@ -433,7 +433,7 @@ def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, m
     read: list[int] = []
     rows = Checkpoint.rows
     monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])
-    monkeypatch.setattr("heavytop.render.page.write_report", lambda report, path, kinds: path.touch())
+    monkeypatch.setattr("heavytop.report.render.page.write_report", lambda report, path, kinds: path.touch())
     opened: list[str] = []
     opens = io.open
 

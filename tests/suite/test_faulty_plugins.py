@@ -13,8 +13,8 @@ import pytest
 import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError
-from heavytop.kinds import KINDS
-from heavytop.suite.plan import read
+from heavytop.features.kinds import KINDS
+from heavytop.harness.plan import read
 from support.midpoint import MIDPOINT
 from support.reports import rows
 

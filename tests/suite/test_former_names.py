@@ -13,13 +13,13 @@ import pytest
 import heavytop as ht
 from heavytop import records
 from heavytop.api.run_folder import prepare
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.files import line, verified
+from heavytop.harness.plan import former
 from heavytop.integrate import registry
 from heavytop.integrate.registry import command_of, named
-from heavytop.store.store import DIGEST, FILE
-from heavytop.suite.plan import former
+from heavytop.report.compare.noise import Policy
+from heavytop.report.store.store import DIGEST, FILE
 from support import in_process
 from support.reports import compare, plan_of, read_plan, store
 

@@ -11,20 +11,20 @@ import pytest
 from rich.console import Console
 
 from heavytop.cases import CASES
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
+from heavytop.features.growth import kind as growth
+from heavytop.harness.case_text import ensemble_of
+from heavytop.harness.checkpoint import Saved
 from heavytop.integrate import registry
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
-from heavytop.kinds import growth
 from heavytop.measure import truth
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.truth import reference
 from heavytop.precision import DOUBLE, cross
 from heavytop.records import Report
-from heavytop.suite.case_text import ensemble_of
-from heavytop.suite.checkpoint import Saved
+from heavytop.report.compare.noise import Policy
 from heavytop.top.equations import GYROSTAT, holding
 from support.reports import compare, expand, load, measure, summary
 

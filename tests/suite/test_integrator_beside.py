@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.kinds import KINDS
-from heavytop.suite.plan import read
+from heavytop.features.kinds import KINDS
+from heavytop.harness.plan import read
 from support.reports import measure
 
 PLAN = """

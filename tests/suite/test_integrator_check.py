@@ -10,9 +10,9 @@ from time import monotonic, sleep
 
 import pytest
 
+from heavytop.harness import integrator_check
+from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
-from heavytop.suite import integrator_check
-from heavytop.suite.integrator_check import check
 
 INTEGRATOR = '''
 import os, time

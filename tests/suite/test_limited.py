@@ -15,12 +15,12 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended
-from heavytop.kinds import KINDS
-from heavytop.suite.limited import RowLimits
-from heavytop.suite.plan import read
+from heavytop.harness.limited import RowLimits
+from heavytop.harness.plan import read
+from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
 from support.midpoint import MIDPOINT
 from support.reports import all_good, compare, rows

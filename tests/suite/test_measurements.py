@@ -7,10 +7,10 @@ from fractions import Fraction
 import msgspec
 import pytest
 
+from heavytop.features.homoclinic.break_away_law import break_away_law
+from heavytop.harness.rows import Task
 from heavytop.integrate import registry
-from heavytop.kinds.break_away_law import break_away_law
 from heavytop.precision import time_text
-from heavytop.suite.rows import Task
 from support.reports import expand, load, measure
 
 TASKS = expand(load("default")[0])

@@ -16,11 +16,11 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError
-from heavytop.render.score import to_json
-from heavytop.suite.score import Assessment, assess
+from heavytop.features.score.measurement import Assessment, assess
+from heavytop.features.score.text import to_json
+from heavytop.features.score.trajectories.files import read
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
-from heavytop.trajectories.files import read
 
 FILE = Path(__file__).parents[2] / "benchmarks" / "conventions.py"
 SPEC = importlib.util.spec_from_file_location("conventions", FILE)

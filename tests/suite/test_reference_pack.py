@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from heavytop.harness import reference_pack
 from heavytop.precision import exact
-from heavytop.suite import reference_pack
 
 PACK = Path(__file__).parents[2] / "results" / "reference"
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -4,13 +4,13 @@ from dataclasses import replace as replace_dataclass
 
 import pytest
 
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.verdicts import Verdict
 from heavytop.errors import InputError
 from heavytop.integrate import registry
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, contradictions, expand, measure, plan_of, replace
 
 PLAN = plan_of(

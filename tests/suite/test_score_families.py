@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.diagnose.samples import motion, turning_rate
+from heavytop.features.score.diagnose.samples import motion, turning_rate
+from heavytop.features.score.measurement import Assessment, assess
+from heavytop.features.score.text import diagnosis_text, to_json
+from heavytop.features.score.trajectories.observed import of_arrays
 from heavytop.measure.reference import reference
 from heavytop.precision import DOUBLE, QUAD, Precision, decimal_text
-from heavytop.render.score import diagnosis_text, to_json
-from heavytop.suite.score import Assessment, assess
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.trajectories.observed import of_arrays
 
 TOP = HeavyTop((3, 2, 1), 1, (Fraction(1, 2), Fraction(1, 3), Fraction(1, 5)))
 START = State((Fraction(1, 10), Fraction(2, 5), Fraction(9, 10)), (Fraction(3, 5), 0, Fraction(4, 5)))

@@ -13,25 +13,25 @@ import numpy
 import pytest
 
 import heavytop as ht
-from heavytop.comparison import compare as comparing
-from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError
+from heavytop.features.kinds import KINDS
+from heavytop.features.survey import measured as records
+from heavytop.features.survey.gathered import gathered, read_chunk
+from heavytop.features.survey.measured import chunks, drawn
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
+from heavytop.harness.rows import failed
+from heavytop.harness.sweeps import Random, SweepGrid
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.multiword.lanes import Pairs
 from heavytop.integrate.trajectory import Problem
-from heavytop.kinds import KINDS
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Row
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import read
-from heavytop.suite.rows import failed
-from heavytop.suite.survey import measured as records
-from heavytop.suite.survey.gathered import gathered, read_chunk
-from heavytop.suite.survey.measured import chunks, drawn
-from heavytop.suite.sweeps import Random, SweepGrid
+from heavytop.report.compare import compare as comparing
+from heavytop.report.compare.noise import Policy
 from support.in_process import heavytop
 from support.reports import compare
 
@@ -124,7 +124,7 @@ def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 4)
+    monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", 4)
     run = heavytop("run", "--plan", plan(tmp_path, 9), "--out", tmp_path / "out", "--workers", 1)
     assert run.returncode == 0, run.stderr
     (row,) = json.loads((tmp_path / "out" / "report.json").read_text())["rows"]
@@ -145,7 +145,7 @@ def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: p
 def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 2)
+    monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", 2)
     tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
     rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
     lost = [failed(task, "heyoka aborted") for task in tasks]
@@ -164,7 +164,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
 
 def test_records_do_not_depend_on_where_chunks_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def recorded(count: int, size: int) -> list[list[dict[str, object]]]:
-        monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", size)
+        monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", size)
         rows = [KINDS["survey"].measure(task, Saved()) for task in read(str(plan(tmp_path, count)), KINDS)[2]]
         return [read_chunk(row.chunk).to_pylist() for row in rows]  # type: ignore[arg-type]
 
@@ -176,7 +176,7 @@ def test_records_do_not_depend_on_where_chunks_end(tmp_path: Path, monkeypatch: 
 
 
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 3)
+    monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", 3)
     file, whole, half = plan(tmp_path, 6), tmp_path / "whole", tmp_path / "half"
     ht.run(file, whole, workers=1)
     kind = KINDS["survey"]

@@ -9,9 +9,9 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
+from heavytop.harness.sweeps import Random
 from heavytop.precision import dot
-from heavytop.suite.sweeps import Random
 from support.reports import expand, load, rows
 
 GRID = """[[sweep]]

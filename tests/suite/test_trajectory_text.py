@@ -12,10 +12,10 @@ from flint import arb
 from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.features.score.trajectories.columns import header
+from heavytop.features.score.trajectories.files import TextTable, read, unread
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
-from heavytop.trajectories.columns import header
-from heavytop.trajectories.files import TextTable, read, unread
 from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError, OutOfReach
+from heavytop.harness.rows import unmeasured
 from heavytop.measure import truth
-from heavytop.suite.rows import unmeasured
+from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
 from support.in_process import heavytop
 from support.reports import all_good, compare, expand, load, replace, rows, store

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.work_precision import panels
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint
+from heavytop.features.work_precision import kind as work_precision
+from heavytop.features.work_precision.charts import trend
+from heavytop.features.work_precision.curves import panels
 from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
-from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
-from heavytop.render.work_precision import trend
+from heavytop.report.compare.noise import Policy
 from support.reports import compare, expand, load, measure
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'

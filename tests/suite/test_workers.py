@@ -19,16 +19,16 @@ import pytest
 from rich.console import Console
 
 from heavytop.errors import HeavyTopError, InputError
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
+from heavytop.harness import limited, run
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
+from heavytop.harness.rows import Task
 from heavytop.measure.scalar import digits_kept
 from heavytop.processes import ChildContext
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.render.terminal import brief, summary
-from heavytop.store.checks import contradictions
-from heavytop.suite import limited, run
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import read
-from heavytop.suite.rows import Task
+from heavytop.report.render.terminal import brief, summary
+from heavytop.report.store.checks import contradictions
 from support.reports import rows
 
 PLAN = """name = "tiny"
@@ -188,9 +188,9 @@ def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(
         "from multiprocessing import active_children\n"
-        "from heavytop.kinds import KINDS\n"
-        "from heavytop.suite.plan import expand, load\n"
-        "from heavytop.suite.run import rows\n"
+        "from heavytop.features.kinds import KINDS\n"
+        "from heavytop.harness.plan import expand, load\n"
+        "from heavytop.harness.run import rows\n"
         "if __name__ == '__main__':\n"
         f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r}, KINDS)[0])\n"
         "    stream = rows(tasks, KINDS, 2, None)\n"

@@ -19,13 +19,13 @@ from typing import Any
 import msgspec
 import numpy
 
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.verdicts import Verdict
+from heavytop.harness.rows import data_of
 from heavytop.integrate.peers.double import Given, Solved, double_peer
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Metric, Report, Row, Series
-from heavytop.suite.rows import data_of
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, expand, history, measure, plan_of
 
 NAME = "degraded:taylor"

@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
-from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text, exact, log10
 from heavytop.records import Against
+from heavytop.report.compare.noise import Policy
 from support.reports import compare, store
 
 Document = dict[str, Any]

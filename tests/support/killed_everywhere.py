@@ -10,13 +10,13 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-import heavytop.render.page
-import heavytop.suite.run
+import heavytop.harness.run
+import heavytop.report.render.page
 from heavytop.api import run_folder
+from heavytop.features.kinds import KINDS
 from heavytop.files import replace
-from heavytop.kinds import KINDS
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.plan import expand, load
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import expand, load
 
 warnings.simplefilter("ignore")  # of forks in a process with threads: those do nothing here
 PLAN, ROOT = sys.argv[1], Path(sys.argv[2])
@@ -33,9 +33,9 @@ def rows(tasks, kinds, workers, scheduler, done, saved, *_) -> Iterator:
             yield index, ROWS[task.label]
 
 
-heavytop.suite.run.rows = rows
+heavytop.harness.run.rows = rows
 run_folder.environment = lambda: SURROUNDINGS
-heavytop.render.page.write_report = lambda report, path, kinds: replace(path, repr(report.rows).encode())  # quick
+heavytop.report.render.page.write_report = lambda report, path, kinds: replace(path, repr(report.rows).encode())
 
 
 def run(out: Path, killed_at: int) -> int:

@@ -9,23 +9,23 @@ from typing import Any
 import msgspec
 
 from heavytop import records
-from heavytop.comparison import compare as _compare
-from heavytop.document.kind import kind_of
 from heavytop.errors import PeerFailed
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
+from heavytop.harness import plan as _plan
+from heavytop.harness import run as _workers
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.rows import Task
+from heavytop.harness.rows import failed as failed_row
 from heavytop.records import Against, Metric, Quantity, RowKey, Series, Subject
-from heavytop.render import history as _history
-from heavytop.render import page as _html
-from heavytop.render import terminal as _terminal
-from heavytop.render import text as _overview
-from heavytop.render import text as _text
-from heavytop.store import checks as _consistency
-from heavytop.store import store as _store
-from heavytop.suite import plan as _plan
-from heavytop.suite import run as _workers
-from heavytop.suite.checkpoint import Saved
-from heavytop.suite.rows import Task
-from heavytop.suite.rows import failed as failed_row
+from heavytop.report.compare import compare as _compare
+from heavytop.report.document.kind import kind_of
+from heavytop.report.render import history as _history
+from heavytop.report.render import page as _html
+from heavytop.report.render import terminal as _terminal
+from heavytop.report.render import text as _overview
+from heavytop.report.render import text as _text
+from heavytop.report.store import checks as _consistency
+from heavytop.report.store import store as _store
 
 compare = partial(_compare.compare, kinds=KINDS)
 history = partial(_history.history, kinds=KINDS)

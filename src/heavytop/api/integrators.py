@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.files import replace
+from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
-from heavytop.suite.integrator_check import Checked, check
 from heavytop.version import commit
 
 
@@ -88,9 +88,9 @@ def _texts(part: str) -> dict[str, str]:
 def listing() -> dict[str, Any]:
     """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them."""
     from heavytop.cases import CASES, named_bodies
+    from heavytop.harness.plan import BUILT_IN
     from heavytop.integrate import registry
     from heavytop.precision import FORMATS, available
-    from heavytop.suite.plan import BUILT_IN
     from heavytop.top.equations import SYSTEMS
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
@@ -121,7 +121,7 @@ def case_document(name: str) -> dict[str, Any]:
     Raises InputError for an unknown name.
     """
     from heavytop.cases import case
-    from heavytop.suite.case_text import case_data, forms
+    from heavytop.harness.case_text import case_data, forms
 
     found = case(name)
     return case_data(found) | {"about": found.about, "source": found.source, "units": found.units} | forms(found)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy
 
-from heavytop.api import arguments
-from heavytop.api.arguments import Number, Numbers
+from heavytop import arguments
+from heavytop.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.exact.bodies import Finder

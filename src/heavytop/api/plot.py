@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from heavytop.api import arguments
+from heavytop import arguments
 from heavytop.api.plot_data import (
     Motion,
     Samples,
@@ -28,12 +28,12 @@ from heavytop.api.plot_data import (
     principal,
     samples,
 )
-from heavytop.document.svg import COLOURS, decades, new_figure
 from heavytop.errors import InputError, quoted
-from heavytop.event_times.functions import Events, ReferenceEvents, Section, component
+from heavytop.features.events.functions import Events, ReferenceEvents, Section, component
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
+from heavytop.report.document.svg import COLOURS, decades, new_figure
 from heavytop.top.equations import NAMES
 from heavytop.top.heavy_top import HeavyTop
 

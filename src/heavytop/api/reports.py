@@ -8,26 +8,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from heavytop import records
-from heavytop.api import arguments
-from heavytop.api.arguments import Number
+from heavytop import arguments, records
 from heavytop.api.run_folder import prepare
-from heavytop.comparison import compare as comparing
-from heavytop.comparison import noise as policies
-from heavytop.comparison.compare import beside
+from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable, printable
-from heavytop.document.document import row_name, short
 from heavytop.errors import InputError, quoted
-from heavytop.kinds import KINDS
+from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import ordered, whole
-from heavytop.render import export as exports
-from heavytop.render import history as over
-from heavytop.render.comparison import headline, metric_name, values
-from heavytop.render.text import drifts, failed
-from heavytop.store import store
-from heavytop.store.checks import check_keys
-from heavytop.store.parquet import COLUMNS, lines
+from heavytop.report.compare import compare as comparing
+from heavytop.report.compare import noise as policies
+from heavytop.report.compare.compare import beside
+from heavytop.report.document.document import row_name, short
+from heavytop.report.render import export as exports
+from heavytop.report.render import history as over
+from heavytop.report.render.comparison import headline, metric_name, values
+from heavytop.report.render.text import drifts, failed
+from heavytop.report.store import store
+from heavytop.report.store.checks import check_keys
+from heavytop.report.store.parquet import COLUMNS, lines
 
 if TYPE_CHECKING:
     import pandas
@@ -64,7 +63,7 @@ class Report(Tabular, records.Report, frozen=True):
 
     def to_html(self) -> str:
         """The page of `show --html`: one self-contained file."""
-        from heavytop.render.page import report_page
+        from heavytop.report.render.page import report_page
 
         return report_page(self, KINDS)
 
@@ -102,7 +101,7 @@ class Comparison(Tabular, comparing.Differences):
 
     def to_html(self) -> str:
         """The page of `compare --html`, with both reports on the same axes; their rows are read for it."""
-        from heavytop.render.page import comparison_page
+        from heavytop.report.render.page import comparison_page
 
         old, new = (store.whole(report) for report in self.reports)
         return comparison_page(old, new, self, KINDS)

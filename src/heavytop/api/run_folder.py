@@ -13,28 +13,28 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from heavytop.api import arguments
+from heavytop import arguments
 from heavytop.display import printable
-from heavytop.document.document import row_name
 from heavytop.errors import InputError, quoted
+from heavytop.features.kinds import KINDS
+from heavytop.features.survey import gathered as survey
+from heavytop.features.survey.gathered import COLUMNS, FILE, contents, gathered
+from heavytop.harness import checkpoint
+from heavytop.harness.checkpoint import Checkpoint, identity_of
+from heavytop.harness.plan import read, warnings
+from heavytop.harness.rows import Task
+from heavytop.harness.run import Progress, unheard
+from heavytop.harness.run import run as run_tasks
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.registry import name_of, named, seconds_of
-from heavytop.kinds import KINDS
 from heavytop.precision import ordered
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.render import page, text
-from heavytop.render.terminal import brief
-from heavytop.store import parquet, store
-from heavytop.store.checks import check_rows
-from heavytop.store.store import environment
-from heavytop.suite import checkpoint
-from heavytop.suite.checkpoint import Checkpoint, identity_of
-from heavytop.suite.plan import read, warnings
-from heavytop.suite.rows import Task
-from heavytop.suite.run import Progress, unheard
-from heavytop.suite.run import run as run_tasks
-from heavytop.suite.survey import gathered as survey
-from heavytop.suite.survey.gathered import COLUMNS, FILE, contents, gathered
+from heavytop.report.document.document import row_name
+from heavytop.report.render import page, text
+from heavytop.report.render.terminal import brief
+from heavytop.report.store import parquet, store
+from heavytop.report.store.checks import check_rows
+from heavytop.report.store.store import environment
 
 PAGE = "report.html"
 _ANOTHER = "Give another --out."

@@ -14,18 +14,18 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.comparison.compare import Differences, compare
-from heavytop.comparison.noise import Policy
-from heavytop.comparison.rows import Finding
-from heavytop.comparison.verdicts import Verdict
 from heavytop.errors import InputError
+from heavytop.features.kinds import KINDS
+from heavytop.harness.plan import expand, load
+from heavytop.harness.rows import Task
+from heavytop.harness.run import rows
 from heavytop.integrate.broken import FAULTS
-from heavytop.kinds import KINDS
 from heavytop.precision import exact, log10
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.suite.plan import expand, load
-from heavytop.suite.rows import Task
-from heavytop.suite.run import rows
+from heavytop.report.compare.compare import Differences, compare
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.rows import Finding
+from heavytop.report.compare.verdicts import Verdict
 
 CONTROL = "control"
 _ALARMS = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 import sys
 
-# each adds its commands
-from heavytop.cli import claims, integrators, motions, output, reports  # noqa: F401
+from heavytop.cli import integrators, motions, output, reports  # noqa: F401  # each adds its commands
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
+from heavytop.features.claims import command as claims  # noqa: F401
 
 _ORDER = (
     *("run", "compare", "history", "show", "export"),

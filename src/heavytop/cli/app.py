@@ -68,7 +68,7 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON document on standar
 
 def plans(begun: str) -> list[str]:
     """Plans whose names begin so, for completion."""
-    from heavytop.suite.plan import BUILT_IN
+    from heavytop.harness.plan import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(begun)]
 

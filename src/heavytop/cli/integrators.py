@@ -87,8 +87,8 @@ def hunt(
     and the motion's amplification explain.  5000 motions of heyoka take three minutes.  Exit code 1 if anything is
     found, else 0.
     """
-    from heavytop.api.hunt import hunt as search
     from heavytop.cli.output import say_former
+    from heavytop.features.hunt.api import hunt as search
 
     say_former([integrator])
     found = search(integrator, precision, horizon, budget, family, against, limit, seed)  # type: ignore[arg-type]
@@ -177,9 +177,9 @@ def selftest(
 
     Exit 1 if a fault they should see slips through.  Takes two minutes on two cores.
     """
-    from heavytop.api import arguments
+    from heavytop import arguments
     from heavytop.api import selftest as detectors
-    from heavytop.kinds import KINDS
+    from heavytop.features.kinds import KINDS
 
     at_once = arguments.count(workers, "workers") or os.cpu_count() or 1
     tasks = detectors.tasks()

@@ -21,7 +21,7 @@ from heavytop.files import replace
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from heavytop.render.motion import MotionTable
+    from heavytop.report.render.motion import MotionTable
     from heavytop.top.attitude import Output
 
 
@@ -106,8 +106,8 @@ EventDirection = Annotated[
 
 def requested(texts: Sequence[str] | None, direction: int) -> list[str]:
     """The functions asked for, read before anything is computed; raises InputError for what is none."""
-    from heavytop.api.events import require_direction
-    from heavytop.event_times.functions import event_function
+    from heavytop.features.events.api import require_direction
+    from heavytop.features.events.functions import event_function
 
     require_direction(direction)
     for text in texts or ():
@@ -212,11 +212,11 @@ class _Asked:
     def events(self, expected: float, **settings: Any) -> list[Any]:
         """The events of each function up to the time farthest from 0.
 
-        expected: seconds.  settings: of :func:`heavytop.api.events.events`.
+        expected: seconds.  settings: of :func:`heavytop.features.events.api.events`.
         """
         if not self.functions:
             return []
-        from heavytop.api.events import events
+        from heavytop.features.events.api import events
 
         where, direction = (self.top, self.start, farthest(self.times)), self.options.event_direction
         with reaching("events", expected) as reach:
@@ -235,7 +235,7 @@ class _Asked:
         def text_with_events(shown: MotionTable) -> RenderableType:
             from rich.console import Group
 
-            from heavytop.render.motion import events_text
+            from heavytop.report.render.motion import events_text
 
             return Group(text(shown), events_text(events))
 
@@ -305,12 +305,12 @@ def propagate(
         )
 
     def table() -> MotionTable:
-        from heavytop.render.motion import of_motion
+        from heavytop.report.render.motion import of_motion
 
         return of_motion(motion, *made_by())
 
     def text(shown: MotionTable) -> RenderableType:
-        from heavytop.render.motion import motion_text
+        from heavytop.report.render.motion import motion_text
 
         return motion_text(motion, shown)
 
@@ -346,12 +346,12 @@ def reference(
         found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:
-        from heavytop.render.motion import of_reference
+        from heavytop.report.render.motion import of_reference
 
         return of_reference(found, asked.outputs, *made_by())
 
     def text(shown: MotionTable) -> RenderableType:
-        from heavytop.render.motion import reference_text
+        from heavytop.report.render.motion import reference_text
 
         return reference_text(found, shown)
 

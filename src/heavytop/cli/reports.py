@@ -25,7 +25,7 @@ from heavytop.cli.app import (
 )
 from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
-from heavytop.render import FORMATS
+from heavytop.report.render import FORMATS
 
 if TYPE_CHECKING:
     from heavytop.records import Report
@@ -69,7 +69,7 @@ def compare(
     if json:
         print_json(found.to_json())
     else:
-        from heavytop.render.comparison import comparison
+        from heavytop.report.render.comparison import comparison
 
         show_on_terminal(comparison(found, full))
     return found.exit_code
@@ -86,7 +86,7 @@ def history(
 ) -> int:
     """Show metrics over reports, with every step marked."""
     from heavytop.api.reports import read_history
-    from heavytop.render.history import history_text
+    from heavytop.report.render.history import history_text
 
     require_apart((html,), *reports, policy)
     with counted("reading", len(reports), "reports", _REPORT_SECONDS) as advance:
@@ -122,7 +122,7 @@ def show(
     """
     from heavytop.api.reports import read_report
     from heavytop.files import whole
-    from heavytop.store import parquet as tables
+    from heavytop.report.store import parquet as tables
 
     if parquet is not None:
         tables.check_name(parquet)
@@ -148,11 +148,11 @@ def show(
 
 def _print(report: Path, full: bool, json: bool) -> None:
     """The summary of a report, in short, in full, or as JSON."""
-    from heavytop.kinds import KINDS
-    from heavytop.render import text as overview
-    from heavytop.render.export import to_json
-    from heavytop.render.terminal import brief, summary
-    from heavytop.store import store
+    from heavytop.features.kinds import KINDS
+    from heavytop.report.render import text as overview
+    from heavytop.report.render.export import to_json
+    from heavytop.report.render.terminal import brief, summary
+    from heavytop.report.store import store
 
     if json:
         print_json(to_json(store.read(report, KINDS), KINDS))
@@ -217,10 +217,10 @@ def run(
     gate two minutes, peers five, growth ten, long half an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
-    from heavytop.kinds import KINDS
-    from heavytop.store.store import FILE as REPORT
-    from heavytop.suite.checkpoint import FILE as ROWS
-    from heavytop.suite.plan import former
+    from heavytop.features.kinds import KINDS
+    from heavytop.harness.checkpoint import FILE as ROWS
+    from heavytop.harness.plan import former
+    from heavytop.report.store.store import FILE as REPORT
 
     asked = prepare(
         plan,
@@ -307,7 +307,7 @@ def score(
     first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
     Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
     """
-    from heavytop.api.scores import read_trajectory, scored
+    from heavytop.features.score.api import read_trajectory, scored
 
     if out is not None:
         out = absolute(out)
@@ -326,7 +326,7 @@ def score(
     if json:
         print_json(found.to_json())
         return found.exit_code
-    from heavytop.render.score import requirement, score_text
+    from heavytop.features.score.text import requirement, score_text
 
     show_on_terminal(score_text(found.assessment))
     if html is not None:
@@ -338,7 +338,7 @@ def score(
 
 def _write_report(report: Report, out: Path) -> None:
     """The report that `compare` and `show` read."""
-    from heavytop.store import store
+    from heavytop.report.store import store
 
     try:
         out.mkdir(parents=True, exist_ok=True)

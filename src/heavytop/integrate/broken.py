@@ -1,6 +1,6 @@
 """Integrators that are deliberately wrong: heyoka with one planted fault each.
 
-They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.comparison.compare` tries the
+They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.report.compare.compare` tries the
 suite's detectors on them.  All are for the system `heavy_top` in double.
 """
 

@@ -1,0 +1,1 @@
+"""One package for each feature: its tables, measurement, document, charts, Python and command."""

@@ -1,0 +1,229 @@
+"""Sums of inverse functions that are a multiple of π all over a region, 4 atan(1/5) − atan(1/239) = π/4; of logarithms.
+
+A relation with small integers is proposed from values at samples (lattice reduction) and then proven: the product of
+the unit vectors with these angles, turned back by the multiple of π, has no imaginary part, by exact algebra; so the
+sum less that multiple is a multiple of π at each point.  It is 0 at all points where it is less than π by the ranges of
+the functions, or where it is continuous on a connected domain and less than π at one point, or where it is a number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import gcd
+from typing import TYPE_CHECKING
+
+import sympy
+from flint import arb, fmpq_mpoly, fmpz_mat
+
+from heavytop.exact.flint.balls import working_precision
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.rational import Quotient
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, Unprovable, used
+
+if TYPE_CHECKING:
+    from heavytop.features.claims.algebra.fields import Field
+    from heavytop.features.claims.algebra.prover import Region
+
+_ARCS = ("asin", "acos", "atan", "atan2")
+_BITS = 192
+_LARGEST = 128
+_MOST_ARCS = 10
+# of the degree of a product of vectors that are no numbers
+_MOST_TURNS = 12
+_PLACES = 3
+Vector = tuple[Quotient, Quotient]
+
+
+class Arcs:
+    """The relations between the inverse functions in the field of ``region``, found as they are asked for."""
+
+    def __init__(self, region: Region) -> None:
+        self._region = region
+        self._known = 0
+        self._free: list[int] = []
+        self._forms: dict[int, fmpq_mpoly] = {}
+
+    def without(self, p: fmpq_mpoly) -> fmpq_mpoly:
+        """A polynomial that is ``p`` all over the region, in fewer inverse functions."""
+        tower = self._region.field.tower
+        self._look_for_more()
+        for index in used(p) & self._forms.keys():
+            p = tower.reduce(tower.signs.substituted(p, index, self._forms[index]))
+        return p
+
+    def _look_for_more(self) -> None:
+        generators = self._region.field.tower.generators
+        known, self._known = self._known, len(generators)
+        for index in range(known, self._known):
+            if generators[index].kind in (*_ARCS, "log") and len(self._free) < _MOST_ARCS:
+                try:
+                    form = self._form_of(index)
+                except Unprovable:
+                    form = None
+                if form is None:
+                    self._free.append(index)
+                else:
+                    self._forms[index] = form
+
+    def _form_of(self, index: int) -> fmpq_mpoly | None:
+        """Inverse function ``index`` through those before it and π; None where there is no such relation."""
+        field = self._region.field
+        is_log = field.tower.generators[index].kind == "log"
+        alike = [other for other in self._free if (field.tower.generators[other].kind == "log") is is_log]
+        arcs = [*alike, index]
+        if is_log:
+            return self._form_of_logarithm(arcs)
+        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _PLACES])
+        if factors is None or not factors[-2]:
+            return None
+        weights = {arc: factor for arc, factor in zip(arcs, factors[:-1], strict=True) if factor}
+        if not self._is_proven(weights, -factors[-1]):
+            return None
+        gens, pi = field.tower.gens, field.enter(sympy.pi).numerator
+        total = pi * factors[-1]
+        for arc, factor in weights.items():
+            if arc != index:
+                total += gens[arc] * factor
+        return total / -weights[index]
+
+    def _form_of_logarithm(self, logarithms: list[int]) -> fmpq_mpoly | None:
+        """The last logarithm through the others: a product of powers of what they are taken of is 1."""
+        tower = self._region.field.tower
+        factors = _integer_relation([self._values(index) for index in logarithms])
+        if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
+            return None
+        weights = {index: factor for index, factor in zip(logarithms, factors, strict=True) if factor}
+        parts = [tower.power(tower.generators[index].arguments[0], factor) for index, factor in weights.items()]
+        if tower.product(parts) != tower.number(1):
+            return None
+        last = logarithms[-1]
+        total = sum((tower.gens[i] * factor for i, factor in weights.items() if i != last), tower.context.constant(0))
+        return total / -weights[last]
+
+    def _values(self, index: int) -> list[arb]:
+        """Its values at a few places of the region; of a number, the number."""
+        field = self._region.field
+        if index in field.tower.signs.numbers:
+            return [field.tower.signs.numbers[index]] * _PLACES
+        places = self._region.places[:_PLACES]
+        if not places:
+            raise Unprovable("No place to look at.")
+        try:
+            values = [evaluate(field.meaning(index), place, NUMBER_BITS) for place in places]
+        except KeyError:
+            raise Unprovable("No value at a place.") from None
+        if not all(value.is_finite() for value in values):
+            raise Unprovable("No value at a place.")
+        return [values[i % len(values)] for i in range(_PLACES)]
+
+    # --- proofs -------------------------------------------------------------------------------------------------------
+
+    def _is_proven(self, weights: dict[int, int], turns: int) -> bool:
+        """Σ weight · arc = turns · π all over the region."""
+        common = gcd(*weights.values())
+        whole = next(
+            h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0
+        )
+        weights = {arc: weight * whole // common for arc, weight in weights.items()}
+        angle = Fraction(whole * turns, common)
+        return self._is_multiple_of_pi(weights, angle) and (
+            self._is_small_by_ranges(weights, angle) or self._is_small_somewhere(weights, angle)
+        )
+
+    def _is_multiple_of_pi(self, weights: dict[int, int], angle: Fraction) -> bool:
+        """Of π is Σ weight · arc − angle · π, at each point."""
+        field = self._region.field
+        tower = field.tower
+        numbers = tower.signs.numbers.keys()
+        if sum(abs(weight) for arc, weight in weights.items() if arc not in numbers) > _MOST_TURNS:
+            return False
+        total = _times(field, (tower.number(1), tower.number(0)), _turn(field, -angle))
+        for arc, weight in weights.items():
+            x, y = _vector(field, arc)
+            vector = x, tower.product((tower.number(1 if weight > 0 else -1), y))
+            for _ in range(abs(weight)):
+                total = _times(field, total, vector)
+        return not total[1].numerator
+
+    def _is_small_by_ranges(self, weights: dict[int, int], angle: Fraction) -> bool:
+        """|Σ weight · arc − angle · π| < π by the ranges of the functions."""
+        low = high = -angle
+        inside = False
+        for arc, weight in weights.items():
+            g = self._region.field.tower.generators[arc]
+            least, most = self._ends(arc)
+            low, high = low + min(weight * least, weight * most), high + max(weight * least, weight * most)
+            inside = inside or (g.kind == "atan" and g.strict)
+        size = max(-low, high)
+        return size < 1 or (inside and size == 1)
+
+    def _ends(self, index: int) -> tuple[Fraction, Fraction]:
+        """A closed interval of the values of an inverse function, over π."""
+        tower = self._region.field.tower
+        g, half = tower.generators[index], Fraction(1, 2)
+        if g.kind == "acos":
+            sign = tower.sign(g.arguments[0]).value
+            return half if sign < 0 else Fraction(0), half if sign > 0 else Fraction(1)
+        size = Fraction(1) if g.kind == "atan2" else half
+        return Fraction(0) if g.sign > 0 else -size, Fraction(0) if g.sign < 0 else size
+
+    def _is_small_somewhere(self, weights: dict[int, int], angle: Fraction) -> bool:
+        """|Σ weight · arc − angle · π| < π: of numbers, or at a place where it is continuous on a connected domain."""
+        region, arcs = self._region, set(weights)
+        if not arcs <= region.field.tower.signs.numbers.keys() and (
+            not region.is_connected(arcs) or region.everywhere.obstacle_of_generators(arcs, analytic=False)
+        ):
+            return False
+        values = {arc: self._values(arc)[0] for arc in weights}
+        with working_precision(NUMBER_BITS):
+            total = sum((values[arc] * weight for arc, weight in weights.items()), arb(0))
+            return bool(abs(total - arb.pi() * angle.numerator / angle.denominator) < 3)
+
+
+def _pi() -> arb:
+    with working_precision(NUMBER_BITS):
+        return arb.pi()
+
+
+def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
+    """Small integers with which the values add up to 0, in each of their components, as far as can be seen."""
+    with working_precision(NUMBER_BITS):
+        found = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
+    if any(value is None for row in found for value in row):  # not finite, or too large to be told
+        return None
+    scaled = [[int(value) for value in row] for row in found]
+    count = len(values)
+    rows = [[int(i == j) for j in range(count)] + row for i, row in enumerate(scaled)]
+    for short in fmpz_mat(rows).lll().tolist():
+        factors = [int(value) for value in short[:count]]
+        if any(factors) and max(map(abs, factors)) <= _LARGEST and all(abs(int(v)) < 2**16 for v in short[count:]):
+            return factors
+    return None
+
+
+def _vector(field: Field, index: int) -> Vector:
+    """A vector of the angle that an inverse function is, but for a multiple of π."""
+    t, g = field.tower, field.tower.generators[index]
+    u = g.arguments[0]
+    if g.kind == "atan":
+        return t.polynomial(u.denominator), t.polynomial(u.numerator)
+    if g.kind == "atan2":
+        return g.arguments[1], u
+    other = t.root(t.sum((t.number(1), t.product((t.number(-1), u, u)))))
+    return (other, u) if g.kind == "asin" else (u, other)
+
+
+def _turn(field: Field, angle: Fraction) -> Vector:
+    """(cos, sin) of a multiple of π/12."""
+    whole = sympy.pi * sympy.Rational(angle.numerator, angle.denominator)
+    return field.enter(sympy.cos(whole)), field.enter(sympy.sin(whole))
+
+
+def _times(field: Field, a: Vector, b: Vector) -> Vector:
+    t = field.tower
+    minus = t.number(-1)
+    return (
+        t.sum((t.product((a[0], b[0])), t.product((minus, a[1], b[1])))),
+        t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
+    )

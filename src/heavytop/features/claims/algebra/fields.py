@@ -1,0 +1,451 @@
+"""From an expression in the variable and the parameters to a quotient in a
+:class:`~heavytop.features.claims.algebra.rational.Tower`.
+
+Exponentials, hyperbolic and circular functions of commensurable arguments become powers of one generator each, roots
+become generators with a relation, what is left (inverse functions, logarithms) becomes a free generator.  Derivatives
+are taken on the expression before.  Reduction to 0 is a proof; anything else proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import sympy
+from flint import fmpq_mpoly
+
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.functions import Refine, Transcendental
+from heavytop.features.claims.algebra.rational import Quotient, Tower, forces_zero
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign, Unprovable, used
+from heavytop.features.claims.algebra.structure import NAMES, Defined
+
+_MAX_EXPONENT = 64
+_MAX_REFINEMENTS = 12
+_HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
+_INVERSE = ("asin", "acos", "atan", "atan2")
+_WEIERSTRASS = ("wp", "wpprime", "wp3", "wp3prime", "wpinverse")
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A relation between parameters, solved: symbol = value holds at exactly the points where ``relation`` is 0.
+
+    radicand: where the value is a root ±√radicand, what is under it; it is > 0.
+    """
+
+    symbol: sympy.Symbol
+    value: sympy.Expr
+    relation: sympy.Expr
+    radicand: sympy.Expr | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Assumptions:
+    """What is known of the symbols.
+
+    positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
+    variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both; strict: it is not 0 there.
+    relations: expressions that are 0.  facts: expressions that are > 0.  nonzero: symbols that are not 0.
+    ranges: closed intervals of symbols.  weak: expressions that are >= 0.  solved: symbols that are put in through
+    others, in this order.  parameters: symbols that are constant along every motion.
+    """
+
+    variable: sympy.Symbol
+    positive: tuple[sympy.Symbol, ...] = ()
+    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
+    variable_sign: int = 0
+    relations: tuple[sympy.Expr, ...] = ()
+    strict: bool = False
+    facts: tuple[sympy.Expr, ...] = ()
+    nonzero: tuple[sympy.Symbol, ...] = ()
+    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
+    weak: tuple[sympy.Expr, ...] = ()
+    solved: tuple[Solution, ...] = ()
+    parameters: frozenset[sympy.Symbol] = frozenset()
+
+    def bounds(self) -> list[sympy.Expr]:
+        """Expressions that are > 0 or >= 0, in the symbols that are not solved."""
+        solved = {solution.symbol for solution in self.solved}
+        greater = [symbol - bound for symbol, bound in self.greater]
+        found = [*self.facts, *self.weak, *greater, *solved.intersection(self.positive)]
+        for solution in self.solved:
+            found = [bound.xreplace({solution.symbol: solution.value}) for bound in found]
+        return found
+
+
+class Field:
+    """The field that a set of expressions lives in.  Raises Unprovable for what it cannot carry."""
+
+    def __init__(self, assumptions: Assumptions, expressions: Iterable[sympy.Expr]) -> None:
+        self.assumptions = assumptions
+        self._divisors: list[int] = []
+        self._complete = False
+        expressions = list(expressions)
+        for _ in range(_MAX_REFINEMENTS):
+            try:
+                self._reset()
+                for expression in expressions:
+                    self.enter(expression)
+            except Refine:
+                continue
+            self._complete = True
+            return
+        raise Unprovable("The arguments of the exponentials have no common measure.")
+
+    def _reset(self) -> None:
+        self.tower = Tower()
+        self._known: dict[Any, Quotient] = {}
+        self._expressions: dict[int, sympy.Expr] = {}
+        self._transcendental = Transcendental(self, self._divisors)
+        a = self.assumptions
+        solved = {solution.symbol for solution in a.solved}
+        self._ranges = {symbol: ends for symbol, ends in a.ranges if symbol not in solved}
+        for symbol in a.positive:
+            if symbol != a.variable and symbol not in solved:
+                self._add(symbol, sign=Sign(1, True))
+        if a.variable not in self._known:
+            self._add(a.variable, constant=False, sign=Sign(a.variable_sign, a.strict))
+        for symbol in a.nonzero:
+            if symbol not in solved:
+                self._add(symbol, sign=Sign(0, True))
+        facts = [(fact, True) for fact in (*a.facts, *(symbol for symbol in a.positive if symbol in solved))]
+        for symbol, bound in a.greater:
+            if solved & {symbol, *bound.free_symbols}:
+                facts.append((symbol - bound, True))
+            else:
+                self._declare_greater(symbol, bound)
+        facts += [(fact, False) for fact in a.weak]
+        for fact, strict in facts:
+            if not fact.free_symbols & solved:
+                self._declare(fact, strict=strict)
+        # the last solution holds none of the symbols that are solved before it
+        for solution in reversed(a.solved):
+            if solution.radicand is not None:
+                self._declare(solution.radicand)
+            self._known[solution.symbol] = self.enter(solution.value)
+        for fact, strict in facts:
+            if fact.free_symbols & solved:
+                self._declare(fact, strict=strict)
+
+    def _declare(self, fact: sympy.Expr, *, strict: bool = True) -> None:
+        """fact > 0, or >= 0 where it is not strict."""
+        value = self.enter(fact)
+        below = self.tower.signs.of(value.denominator)
+        above = value.numerator if below.value else self.tower.times(value.numerator, value.denominator)
+        self.tower.signs.declare(above, Sign(below.value or 1, strict))
+
+    def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
+        """symbol = bound + excess."""
+        floor = self.enter(bound)
+        index = _index(self.enter(symbol))
+        if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
+            excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
+            self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
+        else:
+            self._declare(symbol - bound)
+
+    def _add(self, meaning: sympy.Expr, *, constant: bool = True, sign: Sign, kind: str = "symbol") -> int:
+        index = self.tower.add(meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind)
+        self._expressions[index] = meaning
+        self._known[meaning] = self.tower.polynomial(self.tower.gens[index])
+        if meaning in self._ranges:
+            self.tower.signs.ranges[index] = self._ranges[meaning]
+        return index
+
+    def means(self, index: int, meaning: sympy.Expr) -> None:
+        """Generator ``index`` stands for this expression."""
+        self._expressions[index] = meaning
+
+    def enter(self, expression: sympy.Expr) -> Quotient:
+        """The expression in this field; raises Unprovable for what it cannot carry."""
+        if expression not in self._known:
+            try:
+                self._known[expression] = self._enter(expression)
+            except Refine:
+                if not self._complete:
+                    raise
+                raise Unprovable("An exponential or angle is no whole multiple of those of the claim.") from None
+        return self._known[expression]
+
+    def is_zero(self, expression: sympy.Expr) -> bool:
+        """True only where the expression is proven to be 0 wherever no divisor of the tower is."""
+        return self.vanishes(expression) or self.is_forced(expression, radical=True)
+
+    def vanishes(self, expression: sympy.Expr) -> bool:
+        """True only where the expression reduces to 0, whatever the relations of the claim say."""
+        try:
+            return not self.enter(expression).numerator
+        except Unprovable:
+            return False
+
+    def is_forced(self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p) -> bool:
+        """The relations of the claim force it to be 0: it is their combination with factors of this field.
+
+        radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
+        simpler: the same polynomial where more is known of its generators.
+        """
+        try:
+            numerator = simpler(self.enter(expression).numerator)
+            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+        except Unprovable:
+            return False
+        return self._forces(relations, numerator, radical=radical)
+
+    def never_zero_on_relations(self, p: fmpq_mpoly) -> bool:
+        """True only where the relations of the claim and p = 0 exclude each other."""
+        relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+        return bool(relations) and self._forces([*relations, p], self.tower.one, radical=False)
+
+    def _forces(self, relations: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
+        """Also where a factor that is never 0 has to be divided out of the ideal."""
+        if not relations:
+            return False
+        roots = self.tower.relations()
+        if forces_zero([*relations, *roots], p, radical=radical):
+            return True
+        # what stays positive along a motion may be 0 on another
+        never_zero = [q for q in self.tower.signs.never_zero(relations) if self._is_constant_by_name(q)]
+        if never_zero and forces_zero([*relations, *roots], p, radical=radical, never_zero=never_zero):
+            return True
+        # a parameter is 0 or it is not
+        return any(
+            forces_zero([*relations, *roots], p, radical=radical, never_zero=[*never_zero, self.tower.gens[index]])
+            and forces_zero([*self._where_zero(relations, index), *roots], p, radical=radical, never_zero=never_zero)
+            for index in self._open_parameters(relations)
+        )
+
+    def _is_constant_by_name(self, p: fmpq_mpoly) -> bool:
+        symbols = set().union(*(self.meaning(index).free_symbols for index in used(p)))
+        return symbols <= self.assumptions.parameters.union(self.assumptions.positive)
+
+    def _is_of_parameters(self, p: fmpq_mpoly) -> bool:
+        generators = self.tower.generators
+        names = self.assumptions.parameters
+        return all(generators[i].kind == "symbol" and generators[i].meaning in names for i in used(p))
+
+    def _open_parameters(self, relations: list[fmpq_mpoly]) -> list[int]:
+        """Parameters that may be 0, in the relations between parameters."""
+        indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
+        return [index for index in sorted(indices) if not self.tower.generators[index].strict]
+
+    def _where_zero(self, relations: list[fmpq_mpoly], index: int) -> list[fmpq_mpoly]:
+        """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
+        signs, zero = self.tower.signs, self.tower.context.constant(0)
+        found = [self.tower.gens[index]]
+        for relation in relations:
+            if self._is_of_parameters(relation):
+                product = self.tower.one
+                for factor, _ in self.tower.by_power(relation, index).get(0, zero).factor()[1]:
+                    product = product if signs.of(factor).strict else product * factor
+                relation = product if self.tower.by_power(relation, index).get(0, zero) else zero
+            found.append(relation)
+        return [relation for relation in found if relation]
+
+    def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
+        """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
+        try:
+            return not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1]
+        except Unprovable:
+            return False
+
+    def relations_exclude_each_other(self) -> bool:
+        """True only where no point lies on all relations."""
+        try:
+            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+        except Unprovable:
+            return False
+        return self._forces(relations, self.tower.one, radical=False)
+
+    def is_constant(self, value: Quotient) -> bool:
+        """True where only generators that are constant in time are left."""
+        return all(self.tower.generators[i].constant for i in used(value.numerator) | used(value.denominator))
+
+    # --- expressions ------------------------------------------------------------------------------------------------
+
+    def _enter(self, e: sympy.Expr) -> Quotient:
+        tower = self.tower
+        if e.is_Rational:
+            return tower.number(Fraction(int(e.p), int(e.q)))
+        if e is sympy.pi:
+            index = self._add(e, sign=Sign(1, True), kind="number")
+            tower.signs.numbers[index] = evaluate(e, {}, NUMBER_BITS)
+            tower.signs.pi = index
+            return self._known[e]
+        if isinstance(e, Defined):
+            return self._definition(e)
+        if e.is_Symbol:
+            self._add(e, sign=UNKNOWN)
+            return self._known[e]
+        if e.is_Add:
+            return tower.sum(self.enter(part) for part in e.args)
+        if e.is_Mul:
+            return tower.product(self.enter(part) for part in e.args)
+        if e is sympy.E or isinstance(e, sympy.exp):
+            return self._transcendental.exponential(self.enter(sympy.log(e) if e is sympy.E else e.args[0]))
+        if e.is_Pow:
+            return self._power(e)
+        return self._function(type(e).__name__, [self.enter(part) for part in e.args])
+
+    def _definition(self, e: Defined) -> Quotient:
+        """What it stands for; where that is too large, a free generator: what holds for any value holds for it."""
+        try:
+            return self.enter(e.meaning)
+        except Unprovable:
+            self._add(e, constant=self.assumptions.variable not in e.free_symbols, sign=UNKNOWN, kind="defined")
+            return self._known[e]
+
+    def _function(self, name: str, arguments: list[Quotient]) -> Quotient:
+        tower, first = self.tower, arguments[0]
+        if name in _HYPERBOLIC:
+            return self._transcendental.hyperbolic(name, first)
+        if name in ("sin", "cos", "tan"):
+            sine, cosine = self._transcendental.circle(first)
+            return sine if name == "sin" else cosine if name == "cos" else tower.divide(sine, cosine)
+        if name == "Abs":
+            return tower.absolute(first)
+        if name == "sign":
+            return tower.divide(tower.absolute(first), first)
+        if name == "log":
+            return self._transcendental.logarithm(first)
+        if name in _WEIERSTRASS:
+            return self._transcendental.weierstrass(name, (first, arguments[1], arguments[2]))
+        if name in NAMES:
+            return self._transcendental.jacobi(name, first, arguments[1])
+        if name in _INVERSE:
+            return self._transcendental.function(name, tuple(arguments))
+        raise Unprovable(f"{name} has no place in the algebra.")
+
+    def _power(self, e: sympy.Expr) -> Quotient:
+        base, exponent = e.args
+        if exponent.is_Integer and abs(int(exponent)) <= _MAX_EXPONENT:
+            return self.tower.power(self.enter(base), int(exponent))
+        if exponent.is_Rational and exponent.q == 2 and abs(int(exponent.p)) <= _MAX_EXPONENT:
+            return self.tower.power(self.tower.root(self.enter(base)), int(exponent.p))
+        raise Unprovable(f"The power {exponent} is no small multiple of 1/2.")
+
+    # --- and back ---------------------------------------------------------------------------------------------------
+
+    def expression(self, value: Quotient) -> sympy.Expr:
+        """The quotient as an expression, in factors."""
+        fraction = sympy.Mul(*_factors(value.numerator), *(1 / factor for factor in _factors(value.denominator)))
+        occurring = used(value.numerator) | used(value.denominator)
+        return fraction.xreplace({_placeholder(index): self.meaning(index) for index in occurring})
+
+    def meaning(self, index: int) -> sympy.Expr:
+        """What a generator stands for."""
+        if index not in self._expressions:
+            (square,) = self.tower.generators[index].arguments
+            self._expressions[index] = sympy.sqrt(self.expression(square))
+        return self._expressions[index]
+
+
+def _index(value: Quotient) -> int:
+    """The generator that a symbol is."""
+    return used(value.numerator).pop()
+
+
+def _placeholder(index: int) -> sympy.Symbol:
+    return sympy.Symbol(f"x{index}", real=True)
+
+
+def _factors(p: fmpq_mpoly) -> Iterator[sympy.Expr]:
+    """A number and powers of factors, by FLINT: SymPy may take minutes.  A factor has no content, and its leading
+    coefficient, in SymPy's order, is positive.
+    """
+    if not p:
+        yield sympy.Integer(0)
+        return
+    number, factors = p.factor()
+    number = sympy.Rational(int(number.p), int(number.q))
+    for factor, power in factors:
+        content, part = sympy.Poly(_polynomial(factor), domain="QQ").primitive()
+        if part.LC() < 0:
+            content, part = -content, -part
+        number *= content ** int(power)
+        yield part.as_expr() ** int(power)
+    yield number
+
+
+def _polynomial(p: fmpq_mpoly) -> sympy.Expr:
+    """A polynomial over placeholders, so that nothing is expanded into what they stand for."""
+    terms = []
+    for monomial, coefficient in p.to_dict().items():
+        powers = (_placeholder(index) ** int(power) for index, power in enumerate(monomial) if power)
+        terms.append(sympy.Mul(sympy.Rational(int(coefficient.p), int(coefficient.q)), *powers))
+    return sympy.Add(*terms)
+
+
+# Is a quotient of a field real and continuous, or analytic, all over the domain: by the rules of composition.
+
+
+_SHOWN = 100
+
+
+class Regularity:
+    """Continuity over ``field``.  is_nonzero: whether a polynomial is known to be 0 nowhere on the domain."""
+
+    def __init__(self, field: Field, is_nonzero: Callable[[Any], bool] | None = None) -> None:
+        self._field = field
+        self._is_nonzero = is_nonzero or (lambda p: field.tower.signs.of(p).strict)
+        self._known: dict[tuple[int, bool], str] = {}
+
+    def obstacle(self, value: Quotient, *, analytic: bool = False) -> str:
+        """What stands against it being real and continuous (analytic) all over the domain; "" where nothing does."""
+        _, factors = self._field.tower.signs.factors(value.denominator)
+        for factor, _ in factors:
+            if not self._is_nonzero(factor):
+                return f"{self._text(factor)} may be 0"
+        return self.obstacle_of_generators(used(value.numerator) | used(value.denominator), analytic=analytic)
+
+    def obstacle_of_generators(self, indices: set[int], *, analytic: bool) -> str:
+        """The same of generators."""
+        for index in sorted(indices):
+            if (index, analytic) not in self._known:
+                self._known[index, analytic] = self._obstacle_of(index, analytic)
+            if self._known[index, analytic]:
+                return self._known[index, analytic]
+        return ""
+
+    def _obstacle_of(self, index: int, analytic: bool) -> str:
+        tower = self._field.tower
+        g = tower.generators[index]
+        if index in tower.signs.numbers:
+            return "" if tower.signs.numbers[index].is_finite() else f"{g.meaning} is no real number"
+        for argument in g.arguments:
+            if found := self.obstacle(argument, analytic=analytic):
+                return found
+        if g.kind == "defined":
+            return f"the definition of {g.meaning} is too large for the algebra"
+        if g.kind in ("wp", "wpinverse"):
+            return f"{g.meaning} has poles"
+        wanted = "> 0" if analytic else "≥ 0"
+        if g.kind == "root":
+            return self._unless_positive(g.arguments[0], analytic, wanted)
+        if g.kind == "log":
+            return self._unless_positive(g.arguments[0], True, "> 0")
+        if g.kind in ("asin", "acos"):
+            square = tower.product((tower.number(-1), g.arguments[0], g.arguments[0]))
+            return self._unless_positive(tower.sum((tower.number(1), square)), analytic, wanted)
+        if g.kind == "atan2":
+            y, x = g.arguments
+            right = tower.sign(x)
+            off_the_cut = (right.value > 0 and right.strict) or self._is_nonzero(y.numerator)
+            return "" if off_the_cut else f"{g.meaning} may jump"
+        return ""
+
+    def _unless_positive(self, value: Quotient, strict: bool, wanted: str) -> str:
+        sign = self._field.tower.sign(value)
+        if sign.value > 0 and (sign.strict or not strict):
+            return ""
+        return f"{self._text(value.numerator, value.denominator)} {wanted} is not shown"
+
+    def _text(self, numerator: fmpq_mpoly, denominator: Any = None) -> str:
+        try:
+            below = self._field.tower.one if denominator is None else denominator
+            text = str(self._field.expression(Quotient(numerator, below)))
+        except Unprovable:
+            text = "an intermediate value"
+        return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"

@@ -1,0 +1,666 @@
+"""Statements of one claim, proven or not: their fields are shared, and every condition of a proof is listed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy
+from flint import arb, fmpq_mpoly
+
+from heavytop.exact.flint.balls import working_precision
+from heavytop.features.claims.algebra.arcs import Arcs
+from heavytop.features.claims.algebra.conditions import (
+    ConditionKind,
+    Need,
+    for_no_parameters,
+    is_exactly_zero,
+    is_never_zero,
+    is_small_polynomial,
+    on_conditions,
+    written,
+)
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Field, Regularity
+from heavytop.features.claims.algebra.rational import Quotient
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, Unprovable, used
+from heavytop.features.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
+from heavytop.features.claims.algebra.structure import sign_of
+from heavytop.precision import shown
+
+# The proof of one statement: an identity of the algebra, and every condition under which it proves anything.
+#
+# Continuous values that satisfy an equation off a set without interior satisfy it everywhere: so a zero of a
+# denominator is removable where the values are continuous across it, and two halves of the time axis join.
+
+
+_EVERYWHERE = "proven all over the domain"
+KEPT = "kept by the flow: where it is so at first, it stays so"
+# rational, with |γ| = 1, on no surface of low degree with small coefficients
+_SOME_STATE = {
+    **dict(zip(("Omega1", "Omega2", "Omega3"), (Fraction(17, 13), Fraction(-29, 31), Fraction(37, 23)), strict=True)),
+    **{f"gamma{axis}": Fraction(part, 136763) for axis, part in enumerate((98838, -61370, 71895), 1)},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A condition of a proof: whether it is discharged, and how, or what stands against it.
+
+    assumption: what would discharge it, where that is about the parameters alone.
+    """
+
+    text: str
+    discharged: bool
+    reason: str
+    assumption: str = ""
+
+
+class Region:
+    """A field over one part of the domain, with what is known to vanish nowhere or on no open set there."""
+
+    def __init__(self, field: Field, setting: Setting, statement: Statement, places: Sequence[Place]) -> None:
+        self.field = field
+        self._statement = statement
+        self._setting = setting
+        self._flow = statement.flow
+        self.places = [place for place in places if self._holds(place)]
+        self._thin: dict[str, bool] = {}
+        self._thin_for_each: dict[str, bool] = {}
+        self._kept: dict[str, bool] = {}
+        self._divisors: dict[tuple[bool, str], bool] = {}
+        self._needs = statement.formulas.needs
+        self.regularity = Regularity(field, self.is_nowhere_zero)
+        # what is not 0 where the flow keeps it so may part the domain
+        self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
+        self._arcs = Arcs(self)
+
+    def _holds(self, place: Place) -> bool:
+        a = self.field.assumptions
+        value = place[a.variable] * a.variable_sign
+        return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
+
+    def vanishes(self, expression: sympy.Expr) -> bool:
+        """0 by the algebra, and by what inverse functions add up to."""
+        try:
+            p = self.field.enter(expression).numerator
+            return not p or not self._arcs.without(p)
+        except Unprovable:
+            return False
+
+    def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
+        """0 by the relations of the claim, as in :meth:`~heavytop.features.claims.algebra.fields.Field.is_forced`."""
+        return self.field.is_forced(expression, radical=radical, simpler=self._arcs.without)
+
+    def is_nowhere_zero(self, p: fmpq_mpoly) -> bool:
+        """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
+        return self.field.tower.signs.of(p).strict or self._is_apart(p) or self.is_kept(p)
+
+    def _is_apart(self, p: fmpq_mpoly) -> bool:
+        return bool(self._setting.relations) and self.field.never_zero_on_relations(p)
+
+    def is_kept(self, p: fmpq_mpoly) -> bool:
+        """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
+        key = str(p)
+        if key not in self._kept:
+            self._kept[key] = False  # what is asked of p on the way to the answer about p
+            self._kept[key] = self._flow is not None and self._is_kept(p, self._flow)
+        return self._kept[key]
+
+    def _is_kept(self, p: fmpq_mpoly, flow: Flow) -> bool:
+        try:
+            expression = self.field.expression(Quotient(p, self.field.tower.one))
+            if not expression.free_symbols & flow.state:
+                return False
+            rate = flow.rate(expression)
+            field = Field(self.field.assumptions, [expression, rate])
+            divisors = list(field.tower.divisors.values())
+            value = field.enter(expression)
+            cofactor = field.tower.divide(field.enter(rate), value)
+        except Unprovable:
+            return False
+        regularity = Regularity(field)
+        if regularity.obstacle(cofactor) or regularity.obstacle(value):
+            return False
+        own = Region(field, self._setting, self._statement, self.places)
+        return all(own.is_zero_nowhere_dense(divisor) for divisor in divisors)
+
+    def leaves(self, rate: sympy.Expr) -> str:
+        """Why a relation with this rate may not stay 0; "" where it does.
+
+        It does where its rate is a combination of the relations with factors that are continuous where these are 0.
+        """
+        try:
+            field = Field(self.field.assumptions, [rate, *self.field.assumptions.relations])
+        except Unprovable as error:
+            return error.cause
+        own = Region(field, self._setting, self._statement, self.places)
+        if not own.vanishes(rate) and not own.is_forced(rate, radical=False):
+            return "its rate is not shown to be 0 there"
+        divisor = next(own.divisors(forced=True), "")
+        return divisor and f"its rate is divided by {divisor}, which may be 0 there"
+
+    def _is_excluded(self, p: fmpq_mpoly) -> bool:
+        """The claim is made where p is not 0, as it is written, and p keeps its sign."""
+        one = self.field.tower.one
+        for need in self._needs:
+            if need.kind is not ConditionKind.NONNEGATIVE:
+                try:
+                    value = self.field.enter(need.expression)
+                except Unprovable:
+                    continue
+                if value.denominator == one and not divmod(value.numerator, p)[1]:
+                    return self.is_kept(p)
+        return False
+
+    def is_zero_nowhere_dense(self, p: fmpq_mpoly) -> bool:
+        """0 on a set without interior at most."""
+        key = str(p)
+        if key not in self._thin:
+            self._thin[key] = all(self._is_thin(factor) for factor, _ in self.field.tower.signs.factors(p)[1])
+        return self._thin[key]
+
+    def _is_thin(self, p: fmpq_mpoly) -> bool:
+        tower, square = self.field.tower, self._square(p)
+        if square is not None:
+            return self.is_zero_nowhere_dense(square)
+        if tower.signs.of(p).strict:
+            return True
+        if all(tower.generators[i].kind == "symbol" for i in used(p)):
+            return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
+        if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
+            return False
+        return any(self._is_nonzero_at(p, place) for place in self.places)
+
+    def _has_parameters(self, p: fmpq_mpoly) -> bool:
+        inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
+        return bool(inside & self._setting.parameters)
+
+    def is_connected(self, indices: set[int], fixed: Collection[sympy.Symbol] = ()) -> bool:
+        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them.
+
+        fixed: symbols that do not move.
+        """
+        a = self.field.assumptions
+        bounds = [bound for bound in a.bounds() if bound.free_symbols]
+        zeros = [relation for relation in a.relations if relation not in self._always]
+        near = set().union(*(self.field.meaning(index).free_symbols for index in indices)).difference(fixed)
+        bound_together = [e.free_symbols.difference(fixed) for e in (*bounds, *zeros, *self._always)]
+        while more := set().union(*(symbols for symbols in bound_together if symbols & near)) - near:
+            near |= more
+        cut = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
+        round_ = set().union(*(zero.free_symbols for zero in self._always))
+        return not near & cut and all(
+            not bound.free_symbols & round_ and is_small_polynomial(bound) and _degree(bound, fixed) <= 1
+            for bound in bounds
+            if bound.free_symbols & near
+        )
+
+    def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
+        """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
+        try:
+            expression = self.field.expression(Quotient(p, self.field.tower.one)).xreplace(dict(flow.names))
+            values = {symbol: _SOME_STATE.get(str(symbol)) for symbol in expression.free_symbols}
+            others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(values)))
+            return not evaluate(
+                expression, {s: next(others) if v is None else v for s, v in values.items()}, NUMBER_BITS
+            ).contains(0)
+        except Unprovable:
+            return False
+
+    def _is_nonzero_at(self, p: fmpq_mpoly, place: Place) -> bool:
+        meanings = {index: self.field.meaning(index) for index in used(p)}
+        try:
+            balls = {index: evaluate(meaning, place, NUMBER_BITS) for index, meaning in meanings.items()}
+        except (KeyError, Unprovable):
+            return False
+        with working_precision(NUMBER_BITS):
+            total = arb(0)
+            for monomial, coefficient in p.to_dict().items():
+                term = arb(coefficient)
+                for index in balls:
+                    for _ in range(int(monomial[index])):
+                        term *= balls[index]
+                total += term
+            return bool(total.is_finite() and not total.contains(0))
+
+    # --- conditions -------------------------------------------------------------------------------------------------
+
+    def discharge(self, need: Need) -> str:
+        """How it is discharged all over the region; "" where it is not."""
+        if self.fails_everywhere(need):
+            return ""
+        on_relations = self._on_relations(need)
+        how = self._discharge(need) or (self._discharge(on_relations) if on_relations != need else "")
+        return "" if how == KEPT and not self.is_met_for_each(need) else how
+
+    def _on_relations(self, need: Need) -> Need:
+        return replace(need, expression=on_conditions(need.expression, [*self._setting.relations, *self._always]))
+
+    def is_met_for_each(self, need: Need) -> bool:
+        """Where it asks that its expression is not 0: it is so somewhere, for any values of the parameters."""
+        if need.kind is not ConditionKind.NONZERO:
+            return True
+        try:
+            value = self.field.enter(self._on_relations(need).expression)
+        except Unprovable:
+            return not need.expression.free_symbols & self._setting.parameters
+        return bool(value.numerator) and all(map(self.is_for_no_parameters, self._factors(value.numerator)))
+
+    def fails_everywhere(self, need: Need) -> str:
+        """What its expression is at every state of a body, where that does not meet it; else ""."""
+        value = on_conditions(need.expression, self._always)
+        if value.free_symbols or replace(need, expression=value).is_met({}) is not False:
+            return ""
+        return f"it is {value}" + (" where |gamma| = 1" if self._always else "")
+
+    @property
+    def _always(self) -> tuple[sympy.Expr, ...]:
+        return () if self._flow is None else self._flow.always
+
+    def _discharge(self, need: Need) -> str:
+        plain = sign_of(need.expression)
+        if (
+            plain.strict
+            if need.kind is ConditionKind.NONZERO
+            else plain.value > 0 and (plain.strict or need.kind is ConditionKind.NONNEGATIVE)
+        ):
+            return _EVERYWHERE
+        try:
+            value = self.field.enter(need.expression)
+        except Unprovable:
+            return ""
+        sign = self.field.tower.sign(value)
+        apart = (
+            need.kind is ConditionKind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
+        )
+        if apart or need.kind.is_met_by(sign):
+            return _EVERYWHERE
+        if self.keeps_sign(value, need.kind):
+            return KEPT
+        return ""
+
+    def keeps_sign(self, value: Quotient, kind: ConditionKind) -> bool:
+        """Along the flow: its numerator does, and its denominator, unless only that it is not 0 is asked."""
+        if self._flow is None or not value.numerator or not self.is_kept(value.numerator):
+            return False
+        below = self.field.tower.signs.factors(value.denominator)[1]
+        return kind is ConditionKind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
+
+    def _factors_nowhere_zero(self, p: fmpq_mpoly) -> bool:
+        return all(
+            self.field.tower.signs.of(f).strict or self._is_apart(f) for f, _ in self.field.tower.signs.factors(p)[1]
+        )
+
+    def is_removable(self, need: Need) -> bool:
+        """It fails, for any values of the parameters, on a set without interior at most."""
+        if self._setting.relations:  # on them it may fail all over
+            return False
+        try:
+            value = self.field.enter(need.expression)
+        except Unprovable:
+            return False
+        weak = need.kind is ConditionKind.NONZERO or self.field.tower.sign(value).value > 0
+        return weak and bool(value.numerator) and all(map(self._is_thin_for_each, self._factors(value.numerator)))
+
+    def _factors(self, p: fmpq_mpoly) -> list[fmpq_mpoly]:
+        return [factor for factor, _ in self.field.tower.signs.factors(p)[1]]
+
+    def _is_thin_for_each(self, p: fmpq_mpoly) -> bool:
+        """0 on a set without interior at most, whatever the parameters are."""
+        key = str(p)
+        if key not in self._thin_for_each:
+            square = self._square(p)
+            self._thin_for_each[key] = (
+                all(map(self._is_thin_for_each, self._factors(square)))
+                if square is not None
+                else self.field.tower.signs.of(p).strict
+                or (
+                    self.is_for_no_parameters(p)
+                    and (self.is_zero_nowhere_dense(p) or (self._has_parameters(p) and self._is_analytic(p)))
+                )
+            )
+        return self._thin_for_each[key]
+
+    def _square(self, p: fmpq_mpoly) -> fmpq_mpoly | None:
+        """The radicand of a polynomial that is a root by itself; None of another."""
+        tower, (index, *others) = self.field.tower, sorted(used(p))
+        alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
+        return tower.radicand(index) if alone else None
+
+    def _is_analytic(self, p: fmpq_mpoly) -> bool:
+        """In what moves, over a domain in one piece."""
+        return self.is_connected(used(p), fixed=self._setting.parameters) and not (
+            self.everywhere.obstacle_of_generators(used(p), analytic=True)
+        )
+
+    def is_for_no_parameters(self, p: fmpq_mpoly) -> bool:
+        """True only where p is 0 all over the region for no values of the parameters."""
+        flow, domain = self._statement.flow, self._statement.domain
+        try:
+            e = self.field.expression(Quotient(p, self.field.tower.one))
+        except Unprovable:
+            return False
+        if flow is not None:
+            state = {symbol: sympy.Rational(_SOME_STATE[str(symbol)]) for symbol in flow.state - flow.names.keys()}
+            at_rest = {symbol: value for symbol, value in state.items() if str(symbol).startswith("gamma")}
+            points = [{**state, **dict.fromkeys(state.keys() - at_rest.keys(), sympy.S.Zero), **at_rest}, state]
+            return for_no_parameters(e.xreplace(dict(flow.names)), self.field.assumptions, points, self._always)
+        # bounds of the variable may hold parameters, and no point lies within all of them
+        times = () if domain.facts else (0, *domain.points)
+        points = [{self._setting.variable: sympy.Rational(time)} for time in times]
+        return for_no_parameters(e, self.field.assumptions, points)
+
+    def assumption_for(self, need: Need) -> str:
+        """What, assumed of the parameters, would discharge it, or leave zeros that are removable; "" for nothing."""
+        parameters = self._setting.parameters
+        open_part = need.expression if need.expression.free_symbols <= parameters else None
+        if open_part is None and need.kind is ConditionKind.NONZERO:
+            with suppress(Unprovable):
+                factors = self._factors(self.field.enter(need.expression).numerator)
+                parts = [self.field.expression(Quotient(f, self.field.tower.one)) for f in factors]
+                alone = [part for part in parts if part.free_symbols <= parameters]
+                open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
+        if open_part is None or not open_part.free_symbols:
+            return ""
+        return written(f"{open_part} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0")
+
+    def obstacle(self, values: Sequence[sympy.Expr]) -> str:
+        """What stands against the values being real and continuous all over the region."""
+        for value in values:
+            try:
+                found = self.regularity.obstacle(self.field.enter(value))
+            except Unprovable as error:
+                found = error.cause
+            if found:
+                return found
+        return ""
+
+    def divisors(self, *, forced: bool) -> Iterator[str]:
+        """Divisors of the algebra that might be 0 on too much of the region; forced: on any of it."""
+        for text, p in list(self.field.tower.divisors.items()):
+            if (forced, text) not in self._divisors:
+                self._divisors[forced, text] = (
+                    self._divisor_is_never_zero(p) if forced else self.is_zero_nowhere_dense(p)
+                )
+            if not self._divisors[forced, text]:
+                try:
+                    yield str(self.field.expression(Quotient(p, self.field.tower.one)))
+                except Unprovable:
+                    yield text
+
+    def _divisor_is_never_zero(self, p: fmpq_mpoly) -> bool:
+        tower = self.field.tower
+        return all(
+            tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)
+            for factor, _ in tower.signs.factors(p)[1]
+        )
+
+
+def _degree(bound: sympy.Expr, fixed: Collection[sympy.Symbol]) -> int:
+    return int(sympy.Poly(bound, *bound.free_symbols.difference(fixed)).total_degree())
+
+
+_CONTINUOUS = "the formulas are real and continuous all over the domain"
+_ATTITUDE = "the attitude of the angles is continuous inside the domain"
+_SAMPLE = "every formula is defined and real at a sample in the domain"
+_DIVISORS = "the algebra divides by nothing that is 0"
+_ALGEBRA = "the algebra can carry the formulas"
+_REMOVABLE = "removable: the formulas are continuous across it"
+_AT_THE_END = "proven inside the domain, removable in gamma at its end"
+Key = tuple[int | bool | str, ...]
+
+
+class Prover:
+    """The statements of a claim with the fields in which they are proven."""
+
+    def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
+        self._statements = statements
+        self._setting = setting
+        self._fields: dict[Key, Field | None] = {}
+        self._regions: dict[int, Region] = {}
+        self._conditions: dict[object, tuple[Condition, ...]] = {}
+        self._places: dict[tuple[str, str], list[Place]] = {}
+
+    # --- fields -----------------------------------------------------------------------------------------------------
+
+    def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
+        """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
+        key: Key = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
+        if key not in self._fields:
+            alike = [
+                other
+                for other in self._statements
+                if (other.branch, other.domain) == (statement.branch, statement.domain)
+            ]
+            parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
+            self._fields[key] = self._make(alike, sign, strict, parts)
+        if self._fields[key] is None:
+            alone: Key = (*key, _text(statement.residual))
+            if alone not in self._fields:
+                self._fields[alone] = self._make([statement], sign, strict, [])
+            return self._fields[alone]
+        return self._fields[key]
+
+    def _make(
+        self, statements: Sequence[Statement], sign: int, strict: bool, parts: Iterable[sympy.Expr]
+    ) -> Field | None:
+        needs = self._kept_facts(statements[0])
+        facts = (
+            *statements[0].domain.facts,
+            *(need.expression for need in needs if need.kind is ConditionKind.POSITIVE),
+        )
+        weak = tuple(need.expression for need in needs if need.kind is ConditionKind.NONNEGATIVE)
+        assumptions = self._setting.assumptions(sign, strict=strict, facts=facts, weak=weak)
+        expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
+        kept: set[sympy.Expr] = set()
+        for statement in statements:
+            f = statement.formulas
+            expressions |= dict.fromkeys((*f.values, *f.attitude))
+            expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
+            kept |= {e for e in (*f.values, *(need.expression for need in f.needs)) if _is_kept(e, statement)}
+        for chosen in (expressions, [e for e in expressions if e not in kept]):
+            try:
+                return Field(assumptions, chosen)
+            except Unprovable:
+                continue
+        return None
+
+    def _kept_facts(self, statement: Statement) -> list[Need]:
+        """Of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
+        if statement.flow is None:
+            return []
+        needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not ConditionKind.NONZERO]
+        try:
+            base = Field(self._setting.assumptions(0), [statement.residual, *(need.expression for need in needs)])
+        except Unprovable:
+            return []
+        region = Region(base, self._setting, statement, [])
+        values = {need: base.enter(need.expression) for need in needs if not region.fails_everywhere(need)}
+        kept = [need for need, value in values.items() if region.keeps_sign(value, need.kind)]
+        return [need for need in kept if base.tower.sign(values[need]) != PLUS]
+
+    def _region(self, statement: Statement, sign: int, *, strict: bool) -> Region | None:
+        field = self.field(statement, sign, strict=strict)
+        if field is None:
+            return None
+        if id(field) not in self._regions:
+            self._regions[id(field)] = Region(field, self._setting, statement, self.places(statement))
+        return self._regions[id(field)]
+
+    def places(self, statement: Statement) -> list[Place]:
+        """Exact places in the domain, on all relations."""
+        key = (statement.domain.label + statement.domain.note, str(statement.domain.points))
+        if key not in self._places:
+            self._places[key] = list(self._setting.places(statement))
+        return self._places[key]
+
+    # --- proofs -----------------------------------------------------------------------------------------------------
+
+    def prove(self, statement: Statement) -> tuple[bool, tuple[Condition, ...]]:
+        """(whether the residual is proven to be 0, the conditions under which that proves the statement)."""
+        proven, divisors = self._identity(statement)
+        sample = self._sample(statement)
+        return proven, (*self._conditions_of(statement), *divisors, sample)
+
+    def _identity(self, statement: Statement) -> tuple[bool, list[Condition]]:
+        """By one field, or for ``all`` by one for either sign of the variable: together they are dense in it."""
+        domain = statement.domain
+        strict = bool(domain.sign)
+        divisors = self._zero_in(self._region(statement, domain.sign, strict=strict), statement)
+        if divisors is None and not domain.sign and not domain.note and statement.flow is None:
+            halves = [self._zero_in(self._region(statement, sign, strict=True), statement) for sign in (-1, 1)]
+            if halves[0] is not None and halves[1] is not None:
+                divisors = [*halves[0], *halves[1]]
+        if divisors is None:
+            return False, []
+        return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
+
+    def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
+        """The divisors that stand against the proof; None where there is no proof."""
+        if region is None:
+            return None
+        flow = statement.flow
+        if region.vanishes(statement.residual) or (
+            flow is not None and any(region.field.vanishes_on(statement.residual, zero) for zero in flow.always)
+        ):
+            # where the relations are 0 a divisor may be so too, however thin the set of its zeros is elsewhere
+            return list(region.divisors(forced=flow is not None and bool(self._setting.relations)))
+        radical = flow is None or not flow.is_relation
+        if region.is_forced(statement.residual, radical=radical):
+            return list(region.divisors(forced=True))
+        return None
+
+    def _sample(self, statement: Statement) -> Condition:
+        places = self.places(statement)
+        if not places:
+            return Condition(_SAMPLE, False, self._why_no_place(statement))
+        if any(self.is_defined(statement, place) for place in places):
+            return Condition(_SAMPLE, True, "checked in balls")
+        return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
+
+    def _why_no_place(self, statement: Statement) -> str:
+        setting = self._setting
+        if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
+            return "at no sample is each principal moment at most the sum of the others: no body has such moments"
+        region = self._region(statement, statement.domain.sign, strict=False)
+        if region is not None and region.field.relations_exclude_each_other():
+            within = " within |gamma| = 1" if statement.flow is not None else ""
+            return f"the relations exclude each other{within}: no motion lies on them"
+        return _missed(statement, setting)
+
+    def is_defined(self, statement: Statement, place: Place) -> bool:
+        """Whether every formula and the residual is certainly defined and real at a place."""
+        formulas = statement.formulas
+        if not all(need.is_met(place) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
+            return False
+        # a derivative of |u| is none where u is 0
+        if any(
+            Need(ConditionKind.NONZERO, kink.args[0]).is_met(place) is not True
+            for kink in statement.residual.atoms(sympy.sign)
+        ):
+            return False
+        try:
+            return bool(evaluate(statement.residual, place, NUMBER_BITS).is_finite())
+        except Unprovable:
+            return False
+
+    def _conditions_of(self, statement: Statement) -> tuple[Condition, ...]:
+        key = (statement.branch, statement.domain, statement.formulas, id(statement.flow))
+        if key not in self._conditions:
+            self._conditions[key] = tuple(self._make_conditions(statement))
+        return self._conditions[key]
+
+    def _make_conditions(self, statement: Statement) -> list[Condition]:
+        domain, f = statement.domain, statement.formulas
+        ends = domain.holds_its_end
+        whole = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
+        inner = self._region(statement, domain.sign, strict=True) if ends else whole
+        if whole is None or inner is None:
+            return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
+        # a function of first integrals alone is as constant as they are, continuous or not
+        moving = [value for value in f.values if not _is_kept(value, statement)]
+        against = whole.obstacle(moving), inner.obstacle(f.attitude)
+        continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
+        found = {
+            need: whole.discharge(need)
+            or (KEPT if _is_kept(need.expression, statement) and whole.is_met_for_each(need) else "")
+            for need in _sorted(f.needs | f.angle_needs)
+        }
+        for need, how in found.items():
+            if not how and need not in f.needs and inner.discharge(need) and continuous:
+                found[need] = _AT_THE_END
+            elif not how and continuous and inner.is_removable(need):
+                found[need] = _REMOVABLE
+        conditions = [_condition(need, how, whole) for need, how in found.items()]
+        for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
+            if values:
+                conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
+        if f.pole:
+            conditions.append(Condition(f.pole, continuous, "removable in gamma" if continuous else "not shown"))
+        return [*conditions, *self._kept(statement, whole)]
+
+    def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
+        """The side conditions are invariant: their rates are combinations of them."""
+        for text, rate in statement.flow.kept if statement.flow is not None else ():
+            against = region.leaves(rate)
+            reason = against or "its rate is a combination of the conditions"
+            yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
+
+
+def _condition(need: Need, how: str, region: Region) -> Condition:
+    """On what the formulas need, discharged in this way; "" where it is not."""
+    if how:
+        return Condition(need.text, True, how)
+    missing = region.assumption_for(need)
+    reason = f"{missing} is not assumed" if missing.endswith("!= 0") else "not shown"
+    return Condition(need.text, False, region.fails_everywhere(need) or reason, missing)
+
+
+def _missed(statement: Statement, setting: Setting) -> str:
+    """Which relation the first sample of a body misses, or bounds of the variable all points; for whom wrote them."""
+    on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
+    for sample in setting.samples:
+        place = {setting.variable: statement.domain.points[0], **sample}
+        for zero in setting.zeros:
+            if is_exactly_zero(zero, place) is False:
+                used = ", ".join(
+                    f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols
+                )
+                where = f"where {used}, {written(str(zero))} is not 0"
+                return f"no sample lies on the relations{on_sphere}: {where}"
+        if not setting.zeros and statement.domain.facts:
+            points = ", ".join(map(str, statement.domain.points))
+            return f"no point tried lies where {statement.domain.label}: {setting.variable} = {points}"
+    return f"no sample is proven to lie on the relations{on_sphere}"
+
+
+def _is_kept(expression: sympy.Expr, statement: Statement) -> bool:
+    return statement.flow is not None and statement.flow.keeps(expression)
+
+
+def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:
+    """The formula as the algebra writes it, if that is shorter and proven to be equal, but for removable gaps."""
+    statement = Statement("", 0, "", domain, formula, "")
+    try:
+        field = Field(setting.assumptions(domain.sign, strict=domain.label == "t>0"), [formula])
+        short = field.expression(field.enter(formula))
+    except Unprovable:
+        return formula
+    region = Region(field, setting, statement, list(setting.places(statement)))
+    if sympy.count_ops(short) >= sympy.count_ops(formula) or next(region.divisors(forced=False), None) is not None:
+        return formula
+    return short
+
+
+def _sorted(needs: Iterable[Need]) -> list[Need]:
+    return sorted(needs, key=lambda need: (need.kind.value, _text(need.expression)))
+
+
+@lru_cache(maxsize=10_000)
+def _text(expression: sympy.Expr) -> str:
+    """As SymPy writes it, which takes it a millisecond."""
+    return str(expression)

@@ -1,0 +1,468 @@
+"""Rational functions over FLINT modulo square roots: where an identity is proven, exactly.
+
+A :class:`Tower` holds generators x0, x1, ...; some are free (parameters, time, an exponential), some are roots with
+a relation R² = q, q a polynomial in the generators before R.  Whatever reduces to 0 modulo the relations is 0
+wherever none of the tower's ``divisors`` is 0.  The converse needs the roots to be independent and is not claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt, lcm
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
+
+from heavytop.exact.flint.balls import working_precision
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs, Unprovable, used
+
+# Nested square roots that are sums of simpler ones: √(3 + 2√2) = 1 + √2, √(a + √(a² − b²)) = (√(a + b) + √(a − b))/√2.
+#
+# With p = A + B R, R = √C ≥ 0, and A² − B² C = D²,
+#
+#     √p = √((A + D)/2) + s √((A − D)/2),   s = sign B,
+#
+# where A ≥ 0, so that both radicands are ≥ 0 with p; for s < 0 also D ≥ 0, so that the sum is.
+
+
+# roots within roots that are taken apart
+_DEPTH = 3
+_MAX_TERMS = 40
+
+
+def denested(tower: Tower, p: fmpq_mpoly, depth: int = _DEPTH) -> Quotient | None:
+    """√p through roots that are nested less, for a polynomial ``p`` in roots; None where there is no such sum.
+
+    It is √p wherever that is real.
+    """
+    roots = [index for index in sorted(used(p), reverse=True) if tower.generators[index].kind == "root"]
+    if not depth or len(p) > _MAX_TERMS:
+        return None
+    for index in roots:
+        try:
+            found = _as_sum(tower, p, index, depth)
+        except Unprovable:
+            continue
+        if found is not None:
+            return found
+    return _through_conjugate(tower, p) if roots else None
+
+
+def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | None:
+    """√(A + B R), R = √C the generator ``index``."""
+    parts = tower.by_power(p, index)
+    if parts.keys() != {0, 1}:
+        return None
+    a, b = parts[0], parts[1]
+    s = tower.signs.of(b).value
+    radicand = tower.radicand(index)
+    assert radicand is not None  # R is a root
+    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), radicand))
+    if not s or tower.signs.of(a).value <= 0:
+        return None
+    d = _plain_root(tower, norm, any_sign=s > 0)
+    if d is None or d.denominator != tower.one:
+        return None
+    halves = [_simpler_root(tower, (a + sign * d.numerator) / 2, depth - 1) for sign in (1, -1)]
+    if halves[0] is None or halves[1] is None:
+        return None
+    return tower.sum((halves[0], tower.product((tower.number(s), halves[1]))))
+
+
+def _simpler_root(tower: Tower, p: fmpq_mpoly, depth: int) -> Quotient | None:
+    plain = _plain_root(tower, p)
+    return denested(tower, p, depth) if plain is None else plain
+
+
+def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quotient | None:
+    """√p where that nests no root, from factors of known sign; with ``any_sign`` some D with D² = p."""
+    if not p:
+        return tower.number(0)
+    constant, factors = tower.signs.factors(p)
+    result = tower.one
+    for factor, power in factors:
+        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
+        if power % 2:
+            constant = constant * sign
+            known = tower.known_root(factor * sign) if sign else None
+            is_nested = any(tower.radicand(i) is not None for i in used(factor))
+            if not sign or (known is None and is_nested):
+                return None
+        elif not sign:
+            return None
+    if constant < 0:
+        return None
+    root = tower.root_of_number(constant)
+    for factor, power in factors:
+        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
+        result = tower.times(result, tower.raised(factor * sign, int(power) // 2))
+        if power % 2:
+            result = tower.times(result, tower.gens[tower.root_of(factor * sign)])
+    return tower.product((tower.polynomial(result), root))
+
+
+def _needs_no_sign(power: Any, any_sign: bool) -> bool:
+    """An even power of a factor comes out of the root, as does any where the sign of the root may be either."""
+    return bool(power % 4 == 0 or (any_sign and power % 2 == 0))
+
+
+def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
+    """√p = √(p q)/√q, for a root √q of the tower with p q the square of something plain: √(√2 − 1) = 1/√(√2 + 1)."""
+    for index in reversed(range(len(tower.generators))):
+        q = tower.radicand(index)
+        if q is None or tower.generators[index].kind != "root" or not tower.generators[index].strict:
+            continue
+        if len(q) > _MAX_TERMS or not any(tower.radicand(i) is not None for i in used(q) & used(p)):
+            continue
+        try:
+            root = _plain_root(tower, tower.reduce(tower.times(p, q)))
+        except Unprovable:
+            continue
+        if root is not None:
+            return tower.divide(root, tower.polynomial(tower.gens[index]))
+    return None
+
+
+SLOTS = 64
+# terms of a product, and of numerator times denominator where a common factor is sought: the paper's claims need
+# 95 and 600, and what needs much more does not end
+_MAX_PRODUCT = 10_000
+_MAX_QUOTIENT = 1_500
+_FACTORED_BITS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Quotient:
+    """numerator / denominator, reduced by its tower."""
+
+    numerator: fmpq_mpoly
+    denominator: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Generator:
+    """One generator: what it stands for, whether it is constant in time, and what is known of its sign.
+
+    sign: 1 or -1 where it is so all over the domain, 0 allowed; else 0.  strict: it is never 0.
+    kind: ``symbol``, ``number``, ``root`` (√arguments[0]) or the name of a function of ``arguments``.
+    """
+
+    meaning: Any
+    constant: bool
+    sign: int
+    strict: bool = False
+    kind: str = "symbol"
+    arguments: tuple[Quotient, ...] = ()
+
+
+class Tower:
+    """Generators with their relations and signs, and the arithmetic of quotients modulo them."""
+
+    def __init__(self) -> None:
+        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
+        self.gens = self.context.gens()
+        self.generators: list[Generator] = []
+        self._radicands: dict[int, fmpq_mpoly] = {}
+        self._roots: dict[str, int] = {}
+        self.one = self.context.constant(1)
+        self.signs = Signs(self)
+        # what has been divided by so far, by its text: nothing is proven where one of them is 0
+        self.divisors: dict[str, fmpq_mpoly] = {}
+
+    # --- generators -----------------------------------------------------------------------------------------------
+
+    def add(
+        self,
+        meaning: Any,
+        *,
+        constant: bool,
+        sign: int = 0,
+        strict: bool = False,
+        kind: str = "symbol",
+        arguments: tuple[Quotient, ...] = (),
+    ) -> int:
+        """The index of a new free generator."""
+        if len(self.generators) == SLOTS:
+            raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
+        self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
+        return len(self.generators) - 1
+
+    def add_root(self, meaning: Any, square: fmpq_mpoly, *, sign: int, kind: str = "root") -> int:
+        """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
+        constant = all(self.generators[i].constant for i in used(square))
+        strict = kind == "root" and self.signs.of(square).strict
+        argument = Quotient(square, self.one)
+        index = self.add(meaning, constant=constant, sign=sign, strict=strict, kind=kind, arguments=(argument,))
+        self._radicands[index] = square
+        number = self.signs.ball(square)
+        if number is not None and kind == "root":
+            with working_precision(NUMBER_BITS):
+                self.signs.numbers[index] = number.sqrt()
+        return index
+
+    def radicand(self, index: int) -> fmpq_mpoly | None:
+        """q of a root R² = q; None for a free generator."""
+        return self._radicands.get(index)
+
+    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
+        """(R, q) of every root R² = q."""
+        return list(self._radicands.items())
+
+    def relations(self) -> list[fmpq_mpoly]:
+        """R² − q for every root R = √q."""
+        return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
+
+    # --- arithmetic -----------------------------------------------------------------------------------------------
+
+    def polynomial(self, numerator: fmpq_mpoly) -> Quotient:
+        """A polynomial as a quotient."""
+        return Quotient(self.reduce(numerator), self.one)
+
+    def number(self, value: Fraction | int) -> Quotient:
+        """A rational number as a quotient."""
+        return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one)
+
+    def times(self, a: fmpq_mpoly, b: fmpq_mpoly) -> fmpq_mpoly:
+        """The product of two polynomials; raises Unprovable where it would be too large to hold."""
+        if len(a) * len(b) > _MAX_PRODUCT:
+            raise Unprovable("A product of polynomials is too large.", "Split the claim into smaller ones.")
+        return a * b
+
+    def reduce(self, p: fmpq_mpoly) -> fmpq_mpoly:
+        """``p`` with every root to a power below 2."""
+        degrees = p.degrees()
+        for index in sorted(self._radicands, reverse=True):
+            if degrees[index] > 1:
+                parts = self.by_power(p, index)
+                q, root = self._radicands[index], self.gens[index]
+                total = self.context.constant(0)
+                for power, part in parts.items():
+                    total += self.times(self.raised(q, power // 2), part * root ** (power % 2))
+                p, degrees = total, total.degrees()
+        return p
+
+    def raised(self, p: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
+        """A power of a polynomial; raises Unprovable where it would be too large to hold."""
+        result = self.one
+        for _ in range(exponent):
+            result = self.times(result, p)
+        return result
+
+    def by_power(self, p: fmpq_mpoly, index: int) -> dict[int, fmpq_mpoly]:
+        """The coefficients of the powers of one generator."""
+        parts: dict[int, dict[Any, Any]] = {}
+        for monomial, coefficient in p.to_dict().items():
+            rest = (*monomial[:index], 0, *monomial[index + 1 :])
+            parts.setdefault(int(monomial[index]), {})[rest] = coefficient
+        return {power: self.context.from_dict(terms) for power, terms in parts.items()}
+
+    def summands(self, argument: Quotient) -> list[Quotient]:
+        """The summands of the numerator, each over the denominator."""
+        return [
+            self.quotient(self.context.from_dict({monomial: coefficient}), argument.denominator)
+            for monomial, coefficient in argument.numerator.to_dict().items()
+        ]
+
+    def quotient(self, numerator: fmpq_mpoly, denominator: Any) -> Quotient:
+        """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
+        numerator, denominator = self.reduce(numerator), self.reduce(denominator)
+        degrees = denominator.degrees()
+        for index in sorted(self._radicands, reverse=True):
+            if degrees[index] == 1:
+                parts = self.by_power(denominator, index)
+                conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
+                rational = self.reduce(self.times(denominator, conjugate))
+                if rational:
+                    numerator = self.reduce(self.times(numerator, conjugate))
+                    denominator, degrees = rational, rational.degrees()
+        if not denominator:
+            raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
+        if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
+            raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
+        self._divided_by(denominator)
+        common = numerator.gcd(denominator) if numerator else denominator
+        numerator, denominator = numerator / common, denominator / common
+        lead = denominator.leading_coefficient()
+        return Quotient(numerator / lead, denominator / lead)
+
+    def _divided_by(self, p: fmpq_mpoly) -> None:
+        if not p.is_constant():
+            self.divisors.setdefault(str(p), p)
+
+    def sum(self, parts: Iterable[Quotient]) -> Quotient:
+        """The sum of quotients."""
+        total = self.number(0)
+        for part in parts:
+            if part.denominator == total.denominator:
+                total = self.quotient(total.numerator + part.numerator, total.denominator)
+            else:
+                left = self.times(total.numerator, part.denominator)
+                right = self.times(part.numerator, total.denominator)
+                total = self.quotient(left + right, self.times(total.denominator, part.denominator))
+        return total
+
+    def product(self, parts: Iterable[Quotient]) -> Quotient:
+        """The product of quotients."""
+        total = self.number(1)
+        for part in parts:
+            total = self.quotient(
+                self.times(total.numerator, part.numerator), self.times(total.denominator, part.denominator)
+            )
+        return total
+
+    def power(self, base: Quotient, exponent: int) -> Quotient:
+        """An integer power, by squaring."""
+        if exponent < 0:
+            return self.power(self.quotient(base.denominator, base.numerator), -exponent)
+        result, square = self.number(1), base
+        while exponent:
+            if exponent & 1:
+                result = self.product((result, square))
+            exponent >>= 1
+            if exponent:
+                square = self.product((square, square))
+        return result
+
+    def divide(self, a: Quotient, b: Quotient) -> Quotient:
+        """a / b."""
+        return self.product((a, self.power(b, -1)))
+
+    # --- absolute values and roots ----------------------------------------------------------------------------------
+
+    def ratio(self, a: Quotient, b: Quotient) -> Fraction | None:
+        """The number c with a = c b, where there is one; nothing is divided for it."""
+        above = self.reduce(self.times(a.numerator, b.denominator))
+        below = self.reduce(self.times(b.numerator, a.denominator))
+        if not above or not below:
+            return None
+        c = above.leading_coefficient() / below.leading_coefficient()
+        return Fraction(int(c.p), int(c.q)) if above == below * c else None
+
+    def sign(self, value: Quotient) -> Sign:
+        """The sign of a quotient where it is defined."""
+        above, below = self.signs.of(value.numerator), self.signs.of(value.denominator)
+        return Sign(above.value * below.value, above.strict)
+
+    def absolute(self, value: Quotient) -> Quotient:
+        """|value|, factor by factor; a factor of unknown sign becomes a root of its square."""
+        return self.divide(
+            self.polynomial(self._absolute(value.numerator)), self.polynomial(self._absolute(value.denominator))
+        )
+
+    def _absolute(self, p: fmpq_mpoly) -> fmpq_mpoly:
+        constant, factors = p.factor()
+        result = self.context.constant(abs(constant))
+        for factor, power in factors:
+            sign = self.signs.of(factor).value
+            size = factor * sign if sign else self.gens[self.root_of(factor * factor)]
+            result = self.times(result, self.raised(size, int(power)))
+        return result
+
+    def root(self, value: Quotient) -> Quotient:
+        """√value >= 0; raises Unprovable where value is negative all over the domain."""
+        square = self.times(value.numerator, value.denominator)
+        if not square:
+            return self.number(0)
+        return self.divide(self._root(square), self.polynomial(self._absolute(value.denominator)))
+
+    def _root(self, p: fmpq_mpoly) -> Quotient:
+        """√p: squares come out as absolute values, factors of known sign as roots of their own."""
+        constant, factors = p.factor()
+        outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
+        roots = []
+        for factor, power in factors:
+            outside = self.times(outside, self._absolute(self.raised(factor, int(power) // 2)))
+            if power % 2:
+                known = self.signs.of(factor).value
+                if known:
+                    roots.append(self._simplest_root(factor * known))
+                    sign *= known
+                else:
+                    rest = self.times(rest, factor)
+        if rest != self.one:
+            roots.append(self._simplest_root(rest * sign))
+        elif sign < 0:
+            raise Unprovable(
+                "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
+            )
+        return self.product((self.polynomial(outside), *roots, self.root_of_number(abs(constant))))
+
+    def _simplest_root(self, square: fmpq_mpoly) -> Quotient:
+        """√square as a sum of simpler roots where there is one, else as a generator."""
+        if self.known_root(square) is None:
+            simpler = denested(self, square)
+            if simpler is not None:
+                return simpler
+        return self.polynomial(self.gens[self.root_of(square)])
+
+    def known_root(self, square: fmpq_mpoly) -> int | None:
+        """The generator √square, None where there is none yet."""
+        return self._roots.get(str(square))
+
+    def root_of_number(self, value: Any) -> Quotient:
+        """√(p/q) = √(p q)/q, over the primes of p q."""
+        whole = int(value.p) * int(value.q)
+        root = isqrt(whole)
+        if root * root == whole:
+            return self.number(Fraction(root, int(value.q)))
+        primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        result = self.one / fmpq(value.q)
+        for prime, power in primes:
+            result *= int(prime) ** (int(power) // 2)
+            if power % 2:
+                result = self.times(result, self.gens[self.root_of(self.context.constant(int(prime)))])
+        return self.polynomial(result)
+
+    def root_of(self, square: fmpq_mpoly) -> int:
+        """The generator √square, made once."""
+        key = str(square)
+        if key not in self._roots:
+            self._roots[key] = self.add_root(("sqrt", square), square, sign=1)
+        return self._roots[key]
+
+
+# Membership in the ideal of a few polynomial relations: the proof that they force another polynomial to be 0.
+
+
+# elements of the basis, terms and bits of each: more is abandoned, which leaves the verdict undecided
+_LIMITS = (60, 2_000, 4_096)
+
+
+def forces_zero(
+    relations: Sequence[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool, never_zero: Sequence[Any] = ()
+) -> bool:
+    """True only where ``p`` is a combination of ``relations`` with polynomial factors, so 0 where they all are.
+
+    radical: also where a power of ``p`` is (Rabinowitsch: the relations and 1 − y p = 0 exclude each other).
+    never_zero: also where ``p`` times powers of these is (saturation: 1 − z Π never_zero joins the relations).
+    """
+    if not p:
+        return True
+    names = sorted(set().union(used(p), *(used(relation) for relation in (*relations, *never_zero))))
+    context = fmpz_mpoly_ctx.get([*(f"x{index}" for index in names), "y", "z"], Ordering.degrevlex)
+
+    def integral(q: Any) -> Any:
+        terms = {(*(monomial[index] for index in names), 0, 0): c for monomial, c in q.to_dict().items()}
+        common = lcm(*(int(coefficient.q) for coefficient in terms.values()))
+        return context.from_dict({monomial: int(c.p) * (common // int(c.q)) for monomial, c in terms.items()})
+
+    # whatever the limits leave out of a basis, what reduces to 0 is in the ideal
+    generators = [integral(relation) for relation in relations]
+    if never_zero:
+        product = context.gens()[-1]
+        for q in never_zero:
+            product *= integral(q)
+        generators.append(1 - product)
+    if not integral(p).reduction_primitive_part(_basis(generators, context)):
+        return True
+    if not radical:
+        return False
+    off = 1 - context.gens()[-2] * integral(p)
+    return any(element.is_constant() and element for element in _basis([*generators, off], context))
+
+
+def _basis(generators: Sequence[Any], context: Any) -> Any:
+    basis, _complete = fmpz_mpoly_vec(generators, context).buchberger_naive(limits=_LIMITS)
+    return basis

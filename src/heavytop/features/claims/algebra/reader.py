@@ -1,0 +1,404 @@
+"""A parser of formulas that people send: text in, sympy expression out; nothing is ever evaluated as code.
+
+    expression := term (("+" | "-") term)*          term  := factor (("*" | "/") factor)*
+    factor     := ("+" | "-") factor | power        power := atom (("^" | "**") factor)?
+    atom       := number | name | function "(" expression ("," expression)* ")" | "(" expression ")"
+
+Length, depth, number of nodes, size of numbers, degree and number of terms when expanded are bounded before anything
+is built, so that no formula can take more than its share of time and memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from math import comb
+from typing import Any, NamedTuple, TypeVar
+
+import sympy
+
+from heavytop.errors import InputError
+from heavytop.features.claims.algebra import structure
+from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
+from heavytop.features.claims.algebra.evaluate import WEIERSTRASS
+from heavytop.features.claims.algebra.structure import Defined
+from heavytop.precision import exact
+
+_OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sech", "asin", "acos", "atan")
+FUNCTIONS: dict[str, tuple[Any, int]] = {
+    **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
+    "atan2": (sympy.atan2, 2),
+    **{name: (getattr(structure, name), 2) for name in structure.NAMES},
+    **{name: (function, 3) for name, function in WEIERSTRASS.items()},
+}
+_MAX_LENGTH = 10_000
+_MAX_NODES = 2_000
+_MAX_BITS = 4_096
+_MAX_EXPONENT = 64
+_MAX_DEGREE = 1_024
+_MAX_TERMS = 10**15
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+
+
+class ExpressionBounds(NamedTuple):
+    """Bounds on what an expression can grow into: nodes, bits of its numbers, degree, terms when expanded."""
+
+    nodes: int
+    bits: int
+    degree: int
+    terms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A parsed formula with the bounds on its size, and what it needs to be defined and real as it is written."""
+
+    expression: sympy.Expr
+    size: ExpressionBounds
+    needs: frozenset[Need] = frozenset()
+
+
+def symbol(expression: sympy.Expr) -> Formula:
+    """A name that formulas may use."""
+    return Formula(expression, ExpressionBounds(1, 0, 1, 1))
+
+
+class TooLarge(InputError):
+    """A formula that grows beyond the bounds on its size."""
+
+
+def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    """The formula that ``text`` says in ``names``; ``where`` says in error texts which formula it is.
+
+    Definitions are put in; where the formula grows too large by that, they are kept as names with a meaning.
+    Raises InputError for anything else than the grammar above, and beyond the bounds on its size.
+    """
+    try:
+        return _parse(text, names, where)
+    except TooLarge:
+        kept = {name: _kept(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()}
+        return _parse(text, kept, where)
+
+
+@lru_cache(maxsize=1_000)
+def _kept(name: str, formula: Formula) -> Formula:
+    """A definition as a name, always the same one for the same formula."""
+    return replace(symbol(Defined(name, formula.expression)), needs=formula.needs)
+
+
+def _parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    if len(text) > _MAX_LENGTH:
+        raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
+    parser = _Parser(text, names, where)
+    result = parser.sum()
+    parser.end()
+    return result
+
+
+Part = TypeVar("Part")
+
+
+class Descent:
+    """What recursive descents over the grammar share: the tokens of a text, taken one by one, and a depth.
+
+    token: what a token is, white space before it.  deepest: how deep parentheses and powers may stand in one another.
+    """
+
+    token = re.compile(rf"\s*(?:{NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
+    deepest = 60
+
+    def __init__(self, text: str) -> None:
+        self._tokens: list[str] = []
+        self._position = self._depth = 0
+        place, text = 0, text.rstrip()
+        while place < len(text):
+            match = self.token.match(text, place)
+            if match is None:
+                raise self._no_token(text[place : place + 20])
+            self._tokens.append(match[0].strip())
+            place = match.end()
+
+    def _next(self) -> str:
+        return self._tokens[self._position] if self._position < len(self._tokens) else ""
+
+    def _take(self, *expected: str) -> str:
+        token = self._next()
+        if token and token in expected:
+            self._position += 1
+            return token
+        return ""
+
+    def _require(self, token: str) -> None:
+        if not self._take(token):
+            there = self._next()[:20]
+            raise self._error(f"{token!r} expected {f'before {there!r}' if there else 'at the end'}")
+
+    @contextmanager
+    def _deeper(self, what: str) -> Iterator[None]:
+        self._depth += 1
+        if self._depth > self.deepest:
+            raise self._error(f"{what} nested deeper than {self.deepest}")
+        yield
+        self._depth -= 1
+
+    def _arguments(self, one: Callable[[], Part]) -> list[Part]:
+        """What stands in parentheses, between commas."""
+        self._require("(")
+        found = [one()]
+        while self._take(","):
+            found.append(one())
+        self._require(")")
+        return found
+
+    def end(self) -> None:
+        """Raises an error if anything is left."""
+        if self._next():
+            raise self._error(f"{self._next()[:20]!r} was not expected")
+
+    def _no_token(self, text: str) -> Exception:
+        return self._error(f"{text.strip()!r} is not part of a formula")
+
+    def _error(self, what: str) -> Exception:
+        raise NotImplementedError
+
+
+class _Parser(Descent):
+    """The formula that a text says in names; ``where`` says in error texts which one it is."""
+
+    def __init__(self, text: str, names: Mapping[str, Formula], where: str) -> None:
+        self._names = names
+        self._where = where
+        super().__init__(text)
+
+    def _no_token(self, text: str) -> InputError:
+        return InputError(
+            f"{self._where}: {text.strip()!r} is not part of a formula.",
+            "Use numbers, names, + - * / ^ ( ) and the functions " + ", ".join(FUNCTIONS) + ".",
+        )
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f"{self._where}: {what}.", "See `heavytop docs claims-in-toml` for what a formula may hold.")
+
+    def sum(self) -> Formula:
+        """The expression from here on."""
+        with self._deeper("parentheses"):
+            total = self._term()
+            while sign := self._take("+", "-"):
+                part = self._term()
+                total = self._checked(
+                    total.expression + part.expression if sign == "+" else total.expression - part.expression,
+                    _added(total.size, part.size),
+                    total.needs | part.needs,
+                )
+        return total
+
+    def _term(self) -> Formula:
+        total = self._factor()
+        while operator := self._take("*", "/"):
+            part = self._factor()
+            if operator == "/":
+                if part.expression == 0:
+                    raise self._error("a division by 0")
+                needs = part.needs | condition("/", (part.expression,))
+                part = Formula(1 / part.expression, part.size, needs)
+            size = _multiplied(total.size, part.size)
+            self._check(size)
+            total = Formula(total.expression * part.expression, size, total.needs | part.needs)
+        return total
+
+    def _factor(self) -> Formula:
+        negative = False
+        while sign := self._take("+", "-"):
+            negative ^= sign == "-"
+        value = self._power()
+        return Formula(-value.expression, value.size, value.needs) if negative else value
+
+    def _power(self) -> Formula:
+        base = self._atom()
+        if not self._take("^", "**"):
+            return base
+        with self._deeper("powers"):
+            power = self._factor()
+        exponent, needs = power.expression, base.needs | power.needs
+        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
+            raise self._error(
+                f"the exponent is no integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
+            )
+        if base.expression == 0 and exponent < 0:
+            raise self._error("a division by 0")
+        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        n = base.size
+        size = ExpressionBounds(
+            n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole)
+        )
+        self._check(size)
+        if exponent.q == 2:
+            needs |= condition("sqrt", (base.expression,))
+        if exponent < 0:
+            needs |= condition("/", (base.expression,))
+        return self._checked(base.expression**exponent, size, needs)
+
+    def _atom(self) -> Formula:
+        token = self._next()
+        self._position += 1
+        if token == "(":
+            inside = self.sum()
+            self._require(")")
+            return inside
+        if token[:1].isdigit() or token[:1] == ".":
+            return self._number(token)
+        if token[:1].isalpha():
+            return self._function(token) if token in FUNCTIONS else self._name(token)
+        raise self._error(f"a number, a name or '(' expected, not {token[:20]!r}")
+
+    def _number(self, token: str) -> Formula:
+        exponent = re.search(r"[eE]([+-]?\d+)$", token)
+        if exponent and (len(exponent[1]) > 6 or abs(int(exponent[1])) > _MAX_BITS // 4):
+            raise self._error(f"the number {token[:20]!r} is too large or too small")
+        value = exact(token)
+        bits = value.numerator.bit_length() + value.denominator.bit_length()
+        return self._checked(sympy.Rational(value.numerator, value.denominator), ExpressionBounds(1, bits, 0, 1))
+
+    def _name(self, token: str) -> Formula:
+        if token not in self._names:
+            known = ", ".join(sorted(self._names))
+            remedy = f"Known here: {known[:400]}; functions: {', '.join(FUNCTIONS)}."
+            raise InputError(f"{self._where}: unknown name {token[:40]!r}.", remedy)
+        return self._names[token]
+
+    def _function(self, token: str) -> Formula:
+        function, count = FUNCTIONS[token]
+        arguments = self._arguments(self.sum)
+        if len(arguments) != count:
+            raise self._error(f"{token} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
+        size = arguments[0].size
+        for argument in arguments[1:]:
+            size = _added(size, argument.size)
+        size = size._replace(nodes=size.nodes + 1)
+        inside = tuple(argument.expression for argument in arguments)
+        needs = condition(token, inside).union(*(argument.needs for argument in arguments))
+        return self._checked(function(*inside), size, needs)
+
+    def _checked(self, expression: sympy.Expr, size: ExpressionBounds, needs: frozenset[Need] = frozenset()) -> Formula:
+        self._check(size)
+        if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
+            raise self._error(f"{expression} is no real number")
+        return Formula(expression, size, needs)
+
+    def _check(self, size: ExpressionBounds) -> None:
+        limits = ExpressionBounds(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
+        for what, value, limit in zip(ExpressionBounds._fields, size, limits, strict=True):
+            if value > limit:
+                raise TooLarge(
+                    f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
+                )
+
+
+def _added(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
+    return ExpressionBounds(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
+
+
+def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
+    return ExpressionBounds(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
+
+
+# What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1", "g != 0"]``.
+
+
+Bound = tuple[sympy.Expr, sympy.Expr]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """The fields of :class:`~heavytop.features.claims.algebra.statement.Setting` of the same names."""
+
+    positive: tuple[sympy.Symbol, ...]
+    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+    facts: tuple[sympy.Expr, ...]
+    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
+    weak: tuple[sympy.Expr, ...]
+
+
+def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
+    """(larger, smaller) of ``formula > formula``, and of each link of a chain such as ``0 < k < 1``.
+
+    Raises InputError for anything else.
+    """
+    sign = ">" if ">" in text else "<"
+    parts = [part.strip() for part in text.split(sign)]
+    if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
+        raise InputError(
+            f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula, or formula != formula."
+        )
+    links = list(pairwise(parts))
+    return links if sign == ">" else [(right, left) for left, right in links]
+
+
+def inequalities(texts: Iterable[str]) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """What ``assume`` says: the (larger, smaller) of its comparisons, and both sides of each ``formula != formula``.
+
+    Raises InputError for anything else.
+    """
+    above: list[tuple[str, str]] = []
+    apart: list[tuple[str, str]] = []
+    for text in texts:
+        left, sign, right = (part.strip() for part in text.partition("!="))
+        if not sign:
+            above += comparisons(text)
+        elif left and right and not set("<>=!") & {*left, *right}:
+            apart.append((left, right))
+        else:
+            raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
+    return above, apart
+
+
+def assume(
+    bounds: Sequence[Bound],
+    needs: Iterable[Need],
+    moments: Iterable[sympy.Expr],
+    symbols: Iterable[sympy.Symbol],
+    apart: Iterable[Bound] = (),
+) -> Assumed:
+    """What follows from left > right of each bound, from what these need to be real, and from positive moments.
+
+    apart: the sides of what is assumed to be unequal.
+    """
+    symbols = list(symbols)
+    positive = tuple(symbol for symbol in symbols if symbol.is_positive)
+    greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
+    facts: list[sympy.Expr] = []
+    below: dict[sympy.Symbol, set[sympy.Symbol]] = {}
+    for left, right in bounds:
+        if left in positive and right == 0:
+            continue
+        # one bound below becomes a form of the symbol; forms may not go round in a circle
+        reached = set(right.free_symbols).union(*(below.get(symbol, set()) for symbol in right.free_symbols))
+        if left in symbols and left not in below and left not in reached:
+            greater.append((left, right))
+            below[left] = reached
+            for others in below.values():
+                if left in others:
+                    others |= reached
+        else:
+            facts.append(left - right)
+    facts += [moment for moment in moments if not moment.is_positive]
+    asked = sorted(needs, key=lambda need: need.text)
+    facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
+    facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
+    facts += [(left - right) ** 2 for left, right in apart]
+    weak = tuple(need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE)
+    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
+
+
+def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fraction, Fraction]]]:
+    """Symbols between two fractions."""
+    lower = {left: right for left, right in bounds if left.is_Symbol and right.is_Rational}
+    upper = {right: left for left, right in bounds if right.is_Symbol and left.is_Rational}
+    for symbol in lower.keys() & upper.keys():
+        low, high = lower[symbol], upper[symbol]
+        yield symbol, (Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q)))

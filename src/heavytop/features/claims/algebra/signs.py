@@ -1,0 +1,601 @@
+"""The sign of a polynomial in the generators of a tower, all over the domain of the claim.
+
+Every rule here is a proof.  What no rule decides is unknown, and a condition that needs it stays undischarged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import sympy
+from flint import arb, fmpq, fmpq_mpoly
+
+from heavytop.errors import HeavyTopError
+from heavytop.exact.flint.balls import working_precision
+
+if TYPE_CHECKING:
+    from heavytop.features.claims.algebra.rational import Tower
+
+
+# Combinations with factors that are not negative: the exact linear program behind inequalities.
+
+
+_MOST_STEPS = 150
+Row = list[Fraction]
+Monomial = TypeVar("Monomial", bound=Hashable)
+
+
+def nonnegative_combination(target: Mapping[Monomial, Any], columns: Sequence[Mapping[Monomial, Any]]) -> Row | None:
+    """Weights c ≥ 0 with Σ c column = target, exactly; None where there are none, or none was found in time.
+
+    target, columns: coefficients by monomial, those that are left out are 0.
+    """
+    wanted = {monomial: _fraction(value) for monomial, value in target.items()}
+    parts = [{monomial: _fraction(value) for monomial, value in column.items()} for column in columns]
+    kept = _useful(wanted, parts)
+    monomials = list(dict.fromkeys([*wanted, *(monomial for j in kept for monomial in parts[j])]))
+    rows = [[parts[j].get(m, Fraction(0)) for j in kept] + [wanted.get(m, Fraction(0))] for m in monomials]
+    rows = [row if row[-1] >= 0 else [-value for value in row] for row in rows]
+    found = _feasible(rows, len(kept))
+    if found is None:
+        return None
+    weights = [Fraction(0)] * len(columns)
+    for j, weight in zip(kept, found, strict=True):
+        weights[j] = weight
+    return weights
+
+
+def _fraction(value: Any) -> Fraction:
+    return Fraction(int(value.p), int(value.q)) if hasattr(value, "p") else Fraction(value)
+
+
+def _useful(wanted: Mapping[Monomial, Fraction], parts: Sequence[Mapping[Monomial, Fraction]]) -> list[int]:
+    """Columns that can have a weight: no monomial of theirs is left over with one sign."""
+    kept = list(range(len(parts)))
+    while True:
+        signs: dict[Monomial, set[bool]] = {}
+        for j in kept:
+            for monomial, value in parts[j].items():
+                signs.setdefault(monomial, set()).add(value > 0)
+        for monomial, value in wanted.items():
+            signs.setdefault(monomial, set()).add(value < 0)
+        left = [j for j in kept if all(len(signs[monomial]) == 2 for monomial in parts[j])]
+        if left == kept:
+            return kept
+        kept = left
+
+
+def _feasible(rows: list[Row], count: int) -> Row | None:
+    """A solution ≥ 0 of rows = (coefficients, right side ≥ 0) by the simplex method with Bland's rule."""
+    basis = [-1] * len(rows)
+    for _ in range(_MOST_STEPS):
+        # what the rows still without a basic column add up to has to become 0
+        short = [row for row, basic in zip(rows, basis, strict=True) if basic < 0]
+        if not any(row[-1] for row in short):
+            solution = [Fraction(0)] * count
+            for row, basic in zip(rows, basis, strict=True):
+                if basic >= 0:
+                    solution[basic] = row[-1]
+            return solution
+        entering = next((j for j in range(count) if j not in basis and sum(row[j] for row in short) > 0), None)
+        if entering is None:
+            return None
+        ratios = [(row[-1] / row[entering], basis[i], i) for i, row in enumerate(rows) if row[entering] > 0]
+        _, _, pivot = min(ratios)
+        scale = rows[pivot][entering]
+        rows[pivot] = [value / scale for value in rows[pivot]]
+        for i, row in enumerate(rows):
+            if i != pivot and row[entering]:
+                factor = row[entering]
+                rows[i] = [value - factor * other for value, other in zip(row, rows[pivot], strict=True)]
+        basis[pivot] = entering
+    return None
+
+
+# Signs of numbers as far as they are known, and what follows for products and sums.
+
+
+NUMBER_BITS = 512
+"""Of the balls of generators that are numbers."""
+
+
+class Unprovable(HeavyTopError):
+    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
+
+
+class Sign(NamedTuple):
+    """value: 1 for >= 0, -1 for <= 0, 0 for unknown.  strict: never 0 (also where the value is unknown)."""
+
+    value: int
+    strict: bool
+
+    def times(self, other: Sign) -> Sign:
+        """The sign of a product."""
+        return Sign(self.value * other.value, self.strict and other.strict)
+
+
+UNKNOWN = Sign(0, False)
+PLUS = Sign(1, True)
+
+
+def sum_of(signs: Iterable[Sign]) -> Sign:
+    """The sign of a sum: that of its parts where they have one and the same."""
+    values, strict = set(), False
+    for value, part_strict in signs:
+        values.add(value)
+        strict = strict or part_strict
+        if len(values) > 1 or value == 0:
+            return UNKNOWN
+    return Sign(values.pop(), strict) if values else Sign(1, False)
+
+
+def used(p: fmpq_mpoly) -> set[int]:
+    """The generators that occur in a polynomial."""
+    return {index for index, degree in enumerate(p.degrees()) if degree > 0}
+
+
+_DEPTH = 4
+# calls a question: what takes more is abandoned
+_BUDGET = 120
+_MAX_TERMS = 200
+# terms of what is taken apart further than into factors
+_MAX_PARTED = 40
+_MAX_DEGREE = 24
+# atoms and products of a combination, their degree, and linear programs a tower
+_MAX_ATOMS = 10
+_MAX_PRODUCTS = 150
+_MAX_DEGREE_OF_PRODUCTS = 4
+_PROGRAMS = 30
+
+
+class Signs:
+    """What is known of the signs and ranges of the generators of ``tower``, and what follows for polynomials.
+
+    ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
+    is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.
+    """
+
+    def __init__(self, tower: Tower) -> None:
+        self._tower = tower
+        self._forms: dict[int, fmpq_mpoly] = {}
+        self._below_one: set[int] = set()
+        self._facts: list[tuple[fmpq_mpoly, Sign]] = []
+        self._products: list[tuple[fmpq_mpoly, Sign]] = []
+        self._known: dict[str, tuple[Sign, int]] = {}
+        self._factors: dict[str, Any] = {}
+        self._left = _BUDGET
+        self._depth = 0
+        self._programs = _PROGRAMS
+        self._half_angles: dict[int, int] = {}
+        self.ranges: dict[int, tuple[Fraction, Fraction]] = {}
+        self.circles: dict[int, int] = {}
+        self.numbers: dict[int, arb] = {}
+        self.pi: int | None = None
+        self.turns: dict[int, tuple[Fraction, Fraction]] = {}
+
+    def declare_form(self, index: int, form: fmpq_mpoly) -> None:
+        """Generator ``index`` is ``form``, a polynomial in generators of known sign."""
+        self._forms[index] = form
+        self._known.clear()
+
+    def can_have_form(self, index: int, form: fmpq_mpoly) -> bool:
+        """Whether ``form`` may be declared: there is none yet, and nothing in it has the form of its reciprocal."""
+        return index not in self._forms and not self._below_one & used(form)
+
+    def declare_below_one(self, index: int) -> None:
+        """1/x is the form of generator ``index``: it lies in (0, 1]."""
+        self._below_one.add(index)
+
+    def declare(self, p: fmpq_mpoly, sign: Sign) -> None:
+        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells.
+
+        A sign that is not strict tells nothing of a factor where another may be 0.
+        """
+        constant, factors = self.factors(p)
+        total = Sign(1 if constant > 0 else -1, True)
+        open_factors = []
+        for factor, power in factors:
+            known = self._by_terms(factor)
+            known = known if known.value and known.strict else self._by_forms(factor)
+            if power % 2 and not (known.value and known.strict):
+                open_factors.append(factor)
+            else:
+                total = total.times(known if power % 2 else Sign(1, known.strict or sign.strict))
+                if sign.strict and not known.strict:
+                    self._facts.append((factor, Sign(0, True)))
+        if not sign.strict and not total.strict:
+            return
+        known = Sign(sign.value * total.value, sign.strict)
+        if len(open_factors) == 1:
+            self._facts.append((open_factors[0], known))
+        elif open_factors:
+            product = self._tower.one
+            for factor in open_factors:
+                product = product * factor
+            self._products.append((product, known))
+            self._declare_each(open_factors, known)
+        self._known.clear()
+
+    def _declare_each(self, factors: list[fmpq_mpoly], known: Sign) -> None:
+        """Two factors whose product is > 0 have the sign of their sum, where that is known; or of a difference."""
+        if len(factors) != 2 or not (known.value and known.strict):
+            return
+        first, second = factors
+        self._facts += [(factor, Sign(0, True)) for factor in factors]
+        total = self.of(first + second * known.value)
+        if total.value and total.strict:
+            self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
+
+    def never_zero(self, relations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
+        indices = set().union(*map(used, relations))
+        found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
+        found += [self._tower.gens[index] for index in sorted(indices) if self._tower.generators[index].strict]
+        factors = [factor for relation in relations for factor, _ in self.factors(relation)[1]]
+        found += [factor for factor in factors if self.of(factor).strict]
+        return list({str(p): p for p in found}.values())
+
+    def factors(self, p: fmpq_mpoly) -> Any:
+        """(constant, [(factor, power)]), made once."""
+        key = str(p)
+        if key not in self._factors:
+            self._factors[key] = p.factor()
+        return self._factors[key]
+
+    def of(self, p: fmpq_mpoly) -> Sign:
+        """The sign of ``p``: the product of those of its factors."""
+        if not p:
+            return Sign(1, False)
+        if p.is_constant():
+            return Sign(1 if p.leading_coefficient() > 0 else -1, True)
+        if self._depth == 0:
+            self._left = _BUDGET
+        if self._depth > _DEPTH or self._left <= 0 or len(p) > _MAX_TERMS or max(p.degrees()) > _MAX_DEGREE:
+            return UNKNOWN
+        for product, sign in self._products:
+            quotient, rest = divmod(p, product)
+            if not rest:
+                return self.of(quotient).times(sign)
+        self._depth += 1
+        try:
+            constant, factors = self.factors(p)
+            total = Sign(1 if constant > 0 else -1, True)
+            for factor, power in factors:
+                known = self._of_factor(factor)
+                if power % 2 == 0:
+                    known = Sign(1, known.strict)
+                total = total.times(known)
+            return total
+        except Unprovable:
+            return UNKNOWN
+        finally:
+            self._depth -= 1
+
+    def _of_factor(self, p: fmpq_mpoly) -> Sign:
+        key = str(p)
+        if key in self._known:
+            known, depth = self._known[key]
+            if (known.value and known.strict) or depth <= self._depth:
+                return known
+        self._left -= 1
+        found = UNKNOWN
+        for rule in self._rules(p):
+            try:
+                one = rule(p)
+            except Unprovable:  # too large for this rule
+                continue
+            # a rule may tell the sign, another that it is never 0
+            found = Sign(found.value or one.value, found.strict or one.strict)
+            if found.value and found.strict:
+                break
+        # what was abandoned for lack of time may be found when it is asked first
+        self._known[key] = found, self._depth if self._left > 0 else _DEPTH
+        return found
+
+    def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
+        yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
+        if len(p) <= _MAX_PARTED and self._left > 0:
+            yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
+            yield self._by_difference_from_facts
+            yield self._by_products_of_facts
+            yield self._by_squares
+
+    # --- rules ------------------------------------------------------------------------------------------------------
+
+    def _by_facts(self, p: fmpq_mpoly) -> Sign:
+        found = UNKNOWN
+        for fact, sign in self._facts:
+            ratio = p.leading_coefficient() / fact.leading_coefficient()
+            if p == fact * ratio:
+                one = sign.times(Sign(1 if ratio > 0 else -1, True))
+                found = Sign(found.value or one.value, found.strict or one.strict)
+        return found
+
+    def ball(self, p: fmpq_mpoly) -> arb | None:
+        """The ball of a polynomial in numbers; None where another generator occurs."""
+        if not used(p) <= self.numbers.keys():
+            return None
+        with working_precision(NUMBER_BITS):
+            total = arb(0)
+            for monomial, coefficient in p.to_dict().items():
+                term = arb(coefficient)
+                for index, power in enumerate(monomial):
+                    for _ in range(int(power)):
+                        term *= self.numbers[index]
+                total += term
+            return total
+
+    def _by_number(self, p: fmpq_mpoly) -> Sign:
+        """A number that is no fraction: its ball."""
+        total = self.ball(p)
+        if total is None or not total.is_finite() or total.contains(0):
+            return UNKNOWN
+        return Sign(1 if total > 0 else -1, True)
+
+    def _by_terms(self, p: fmpq_mpoly) -> Sign:
+        """By terms of one sign; their coefficients may be numbers that are no fractions."""
+        groups: dict[Any, dict[Any, Any]] = {}
+        for monomial, coefficient in p.to_dict().items():
+            number = tuple(power if index in self.numbers else 0 for index, power in enumerate(monomial))
+            rest = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
+            groups.setdefault(rest, {})[number] = coefficient
+        signs = [self._of_term(rest, numbers) for rest, numbers in groups.items()]
+        return signs[0] if len(signs) == 1 else sum_of(signs)
+
+    def _of_term(self, monomial: Any, numbers: dict[Any, Any]) -> Sign:
+        coefficient = self._tower.context.from_dict(numbers)
+        if coefficient.is_constant():
+            sign = Sign(1 if coefficient.leading_coefficient() > 0 else -1, True)
+        else:
+            sign = self._by_number(coefficient)
+        for index, power in enumerate(monomial):
+            if power:
+                g = self._tower.generators[index]
+                sign = sign.times(Sign(g.sign if power % 2 else 1, g.strict))
+        return sign
+
+    def _by_forms(self, p: fmpq_mpoly) -> Sign:
+        """By terms, after each generator is written through positive ones."""
+        turned = self._below_one & used(p)
+        for index in turned:
+            # p(X) has the sign of X^n p(1/Z) with Z = 1/X >= 1
+            degree = int(p.degrees()[index])
+            terms = {
+                (*monomial[:index], degree - monomial[index], *monomial[index + 1 :]): coefficient
+                for monomial, coefficient in p.to_dict().items()
+            }
+            p = self._tower.context.from_dict(terms)
+        if not self._forms.keys() & used(p):
+            return UNKNOWN
+        p = self._without_forms(p, turned)
+        return self._by_terms(p) if p else UNKNOWN
+
+    def _without_forms(self, p: fmpq_mpoly, turned: Collection[int] = ()) -> Any:
+        """Every generator with a form written as that; raises Unprovable where that is too large.
+
+        turned: generators that stand for their reciprocals in ``p``; others that lie below 1 are left as they are.
+        It ends, since forms do not go round in a circle.
+        """
+        left = self._below_one.difference(turned)
+        while forms := self._forms.keys() & used(p) - left:
+            index = min(forms)
+            p = self.substituted(p, index, self._forms[index])
+            if len(p) > _MAX_TERMS:
+                raise Unprovable("A polynomial is too large.", "Split the claim into smaller ones.")
+        return p
+
+    def substituted(self, p: fmpq_mpoly, index: int, form: fmpq_mpoly) -> fmpq_mpoly:
+        """``p`` with a polynomial in the place of a generator."""
+        total = self._tower.context.constant(0)
+        for power, part in self._tower.by_power(p, index).items():
+            total += self._tower.times(part, self._tower.raised(form, power))
+        return total
+
+    def _by_roots_of_one_variable(self, p: fmpq_mpoly) -> Sign:
+        """An irreducible polynomial in one generator without a real root in its range (Sturm)."""
+        if len(used(p)) != 1:
+            return UNKNOWN
+        (index,) = used(p)
+        low, high = self._range(index)
+        x = sympy.Symbol("x")
+        coefficients = {int(monomial[index]): sympy.Rational(int(c.p), int(c.q)) for monomial, c in p.to_dict().items()}
+        polynomial = sympy.Poly(sum(c * x**power for power, c in coefficients.items()), x)
+        if polynomial.degree() == 1:
+            return self._line(polynomial, low, high)
+        if polynomial.count_roots(low, high):
+            return UNKNOWN
+        inside = low if low is not None else high if high is not None else sympy.Integer(0)
+        return Sign(1 if polynomial.eval(inside) > 0 else -1, True)
+
+    def _line(self, polynomial: Any, low: Any, high: Any) -> Sign:
+        """a x + b on a closed interval or ray."""
+        slope, _ = polynomial.all_coeffs()
+        ends = [polynomial.eval(end) if end is not None else None for end in (low, high)]
+        if slope < 0:
+            ends.reverse()
+        least, most = ends
+        if least is not None and least >= 0:
+            return Sign(1, bool(least > 0))
+        if most is not None and most <= 0:
+            return Sign(-1, bool(most < 0))
+        return UNKNOWN
+
+    def _range(self, index: int) -> tuple[Any, Any]:
+        """Closed interval of a generator, None for no bound."""
+        low: Any = None
+        high: Any = None
+        if index in self.ranges:
+            low, high = (sympy.Rational(end.numerator, end.denominator) for end in self.ranges[index])
+        sign = self._tower.generators[index].sign
+        if sign > 0:
+            low = sympy.Integer(0) if low is None else max(low, sympy.Integer(0))
+        if sign < 0:
+            high = sympy.Integer(0) if high is None else min(high, sympy.Integer(0))
+        return low, high
+
+    def _by_generators(self, p: fmpq_mpoly) -> Sign:
+        """As a polynomial in one of its generators, with coefficients of known sign."""
+        found = UNKNOWN
+        for index in sorted(used(p), reverse=True):
+            parts = self._tower.by_power(p, index)
+            for one in self._as_polynomial_in(index, p, parts):
+                found = Sign(found.value or one.value, found.strict or one.strict)
+                if found.value and found.strict:
+                    return found
+        return found
+
+    def _as_polynomial_in(self, index: int, p: fmpq_mpoly, parts: dict[int, Any]) -> Iterator[Sign]:
+        g, degree = self._tower.generators[index], max(parts)
+        if len(parts) > 1:
+            yield sum_of(
+                self.of(part).times(Sign(g.sign if power % 2 else 1, g.strict or not power))
+                for power, part in parts.items()
+            )
+        zero = self._tower.context.constant(0)
+        radicand = self._tower.radicand(index)
+        if degree == 1 and radicand is not None:
+            yield self._of_root_sum(parts.get(0, zero), parts[1], radicand, g.sign)
+        if degree == 2:
+            a, b, c = (parts.get(power, zero) for power in (2, 1, 0))
+            leading, defect = self.of(a), self.of(4 * a * c - b * b)
+            if leading.value and leading.strict and defect.value == 1:
+                yield Sign(leading.value, defect.strict)
+        if degree == 1 and index in self.ranges:
+            ends = [self.substituted(p, index, self._constant(end)) for end in self.ranges[index]]
+            signs = [self.of(end) for end in ends]
+            if signs[0].value == signs[1].value != 0:
+                yield Sign(signs[0].value, signs[0].strict and signs[1].strict)
+
+        if degree == 1 and index in self.turns and self.pi in used(p):
+            pi = self._tower.gens[self.pi]
+            ends = [self.substituted(p, index, self._constant(end) * pi) for end in self.turns[index]]
+            first, second = (self.of(end) for end in ends)
+            if first.value == second.value != 0:
+                yield Sign(first.value, first.strict or second.strict)
+
+    def _constant(self, value: Fraction) -> fmpq_mpoly:
+        return self._tower.context.constant(fmpq(value.numerator, value.denominator))
+
+    def _of_root_sum(self, a: fmpq_mpoly, b: fmpq_mpoly, radicand: fmpq_mpoly, sign: int) -> Sign:
+        """a + b R with R² = radicand >= 0: the larger of a² and b² R² decides."""
+        difference = self.of(self._tower.reduce(a * a - b * b * radicand))
+        if difference.value > 0:
+            return Sign(self.of(a).value, difference.strict)
+        if difference.value < 0:
+            return Sign(self.of(b).value * sign, difference.strict)
+        return UNKNOWN
+
+    def _by_half_angle(self, p: fmpq_mpoly) -> Sign:
+        """Sine 2τ/(1 + τ²) and cosine (1 − τ²)/(1 + τ²), and apart from them the angle π, where τ is infinite."""
+        for sine, cosine in self.circles.items():
+            if cosine not in used(p):
+                continue
+            tau = self._tower.gens[self._half_angle(sine)]
+            terms = [(int(m[sine]), int(m[cosine]), m, c) for m, c in p.to_dict().items()]
+            degree = max(i + j for i, j, _, _ in terms)
+            total = self._tower.context.constant(0)
+            for i, j, monomial, coefficient in terms:
+                rest = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
+                factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
+                total += self._tower.context.from_dict({tuple(rest): coefficient}) * factor
+            straight = self.substituted(
+                self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
+            )
+            signs = self.of(total), self.of(straight)
+            if signs[0].value == signs[1].value != 0:
+                return Sign(signs[0].value, signs[0].strict and signs[1].strict)
+        return UNKNOWN
+
+    def _half_angle(self, sine: int) -> int:
+        if sine not in self._half_angles:
+            self._half_angles[sine] = self._tower.add(f"tangent of half the angle of x{sine}", constant=False)
+        return self._half_angles[sine]
+
+    def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
+        """p = q·fact + r with q and r of one sign."""
+        for fact, sign in self._facts:
+            for part in (fact, -fact):
+                quotient, rest = divmod(p, part)
+                if quotient and rest and len(rest) < len(p) + len(fact):
+                    fact_sign = sign if part is fact else Sign(-sign.value, sign.strict)
+                    found = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
+                    if found.value:
+                        return found
+        return UNKNOWN
+
+    def _at_once(self, p: fmpq_mpoly) -> Sign:
+        """The sign of ``p`` by the rules that ask for no other sign."""
+        found = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
+        return next((sign for sign in found if sign.value), UNKNOWN)
+
+    def _by_squares(self, p: fmpq_mpoly) -> Sign:
+        """With a generator g ≥ 0 written as R², where there is a root R of g."""
+        for root, square in self._tower.radicands():
+            (index, *others) = used(square) or {-1}
+            # that there is a root does not make it real
+            is_real = self._at_once(square).value > 0
+            if is_real and not others and index in used(p) and square == self._tower.gens[index]:
+                return self.of(self.substituted(p, index, self._tower.gens[root] ** 2))
+        return UNKNOWN
+
+    # --- combinations of products -----------------------------------------------------------------------------------
+
+    def _by_products_of_facts(self, p: fmpq_mpoly) -> Sign:
+        """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
+        still = all(
+            g.constant and g.kind in ("symbol", "root") for g in map(self._tower.generators.__getitem__, used(p))
+        )
+        if not (self._facts or self._forms) or not still or self._programs <= 0 or self._depth > 2:
+            return UNKNOWN
+        p = self._tower.reduce(self._without_forms(p))
+        degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)
+        atoms = self._atoms_for(p)
+        if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_PARTED or len(atoms) < 2:
+            return UNKNOWN
+        self._programs -= 1
+        products = self._products_of(atoms, degree)
+        for sign in (1, -1):
+            weights = nonnegative_combination((sign * p).to_dict(), [product.to_dict() for product, _ in products])
+            if weights is not None:
+                return Sign(sign, any(weight and strict for weight, (_, strict) in zip(weights, products, strict=True)))
+        return UNKNOWN
+
+    def _atoms_for(self, p: fmpq_mpoly) -> list[tuple[fmpq_mpoly, bool]]:
+        """(polynomial ≥ 0, whether it is never 0): facts and generators that have to do with ``p``."""
+        facts = []
+        for fact, sign in self._facts:
+            if sign.value:
+                with suppress(Unprovable):
+                    facts.append((self._tower.reduce(self._without_forms(fact * sign.value)), sign.strict))
+        for index in self._forms:
+            g = self._tower.generators[index]
+            if g.sign and index not in self._below_one:
+                with suppress(Unprovable):
+                    facts.append((self._without_forms(self._tower.gens[index] * g.sign), g.strict))
+        near, chosen = used(p), []
+        while more := [fact for fact in facts if fact not in chosen and used(fact[0]) & near]:
+            chosen += more
+            near = near.union(*(used(fact) for fact, _ in more))
+        for index in sorted(near):
+            g, square = self._tower.generators[index], self._tower.radicand(index)
+            is_real = square is None or index in used(p) or self._at_once(square).value > 0
+            if g.sign and index not in self._forms.keys() - self._below_one and is_real:
+                chosen.append((self._tower.gens[index] * g.sign, g.strict))
+        return chosen[:_MAX_ATOMS]
+
+    def _products_of(self, atoms: list[tuple[fmpq_mpoly, bool]], degree: int) -> list[tuple[fmpq_mpoly, bool]]:
+        """1 and the products of up to ``degree`` atoms, as many as are tried."""
+        found = level = [(self._tower.one, True, 0)]
+        for _ in range(degree):
+            level = [
+                (self._tower.times(product, atom), strict and also, i)
+                for product, strict, first in level
+                for i, (atom, also) in enumerate(atoms[first:], first)
+            ]
+            if len(found) + len(level) > _MAX_PRODUCTS:
+                break
+            found = found + level
+        return [(self._tower.reduce(product), strict) for product, strict, _ in found]

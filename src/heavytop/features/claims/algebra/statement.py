@@ -1,0 +1,178 @@
+"""What a claim says, piece by piece, and what it is about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import sympy
+
+from heavytop.features.claims.algebra.conditions import ConditionKind, Need, is_exactly_zero
+from heavytop.features.claims.algebra.fields import Assumptions, Solution
+
+Place = dict[sympy.Symbol, Fraction]
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """Where a statement is made.
+
+    label: ``all``, ``t<=0`` or ``t>0``.  sign: the sign of the variable there, 0 for both.
+    points: exact values of the variable at which balls are taken.  note: what the label means, if not time.
+    facts: expressions that are > 0 on the domain by its definition.
+    """
+
+    label: str
+    sign: int
+    points: tuple[Fraction, ...]
+    note: str = ""
+    facts: tuple[sympy.Expr, ...] = ()
+
+    @property
+    def holds_its_end(self) -> bool:
+        """Whether 0 is an end that belongs to the domain."""
+        return self.label == "t<=0" and not self.note
+
+
+_BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9))
+_AFTER = (Fraction(1, 2), Fraction(7, 5), Fraction(1, 9))
+ALL = Domain("all", 0, (*_BEFORE[:2], *_AFTER[:2]))
+BEFORE = Domain("t<=0", -1, _BEFORE)
+AFTER = Domain("t>0", 1, _AFTER)
+
+
+@dataclass(frozen=True, slots=True)
+class Formulas:
+    """The formulas that a statement rests on.
+
+    values: must be real and continuous all over the domain.  needs: for these to be defined.
+    attitude: functions of the angles that must be continuous inside the domain.  angle_needs: for the angles.
+    pole: the condition under which the angles are defined, where they are not defined all over the domain.
+    sampled: the same needs in the symbols of the samples, where first integrals in them have got names.
+    """
+
+    values: tuple[sympy.Expr, ...] = ()
+    needs: frozenset[Need] = frozenset()
+    attitude: tuple[sympy.Expr, ...] = ()
+    angle_needs: frozenset[Need] = frozenset()
+    pole: str = ""
+    sampled: frozenset[Need] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """The motion under which a first integral or relation is claimed to be kept.
+
+    rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
+    state: the variables.  is_relation: whether the statement is that a relation stays 0.
+    always: what is 0 at every state of a body and stays so, so that a witness has to lie there: |γ|² - 1.
+    names: symbols of ``state`` that stand for a first integral, with its formula.
+    """
+
+    rate: Callable[[sympy.Expr], sympy.Expr]
+    state: frozenset[sympy.Symbol]
+    kept: tuple[tuple[str, sympy.Expr], ...] = ()
+    is_relation: bool = False
+    always: tuple[sympy.Expr, ...] = ()
+    names: Mapping[sympy.Symbol, sympy.Expr] = field(default_factory=dict, hash=False)
+
+    def keeps(self, e: sympy.Expr) -> bool:
+        """Whether it holds nothing of the state but names of first integrals, and at least one of them."""
+        inside = e.free_symbols & self.state
+        return bool(inside) and inside <= self.names.keys()
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One equation, component, branch and domain; it says that ``residual`` is 0.
+
+    text: the equation in words and signs.  formulas: what has to be defined for that.  flow: of a first integral.
+    """
+
+    equation: str
+    component: int
+    branch: str
+    domain: Domain
+    residual: sympy.Expr
+    text: str
+    formulas: Formulas = Formulas()
+    flow: Flow | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What the statements of a claim are about.
+
+    variable: the symbol that moves (t, or Ω2 in the general case).
+    samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
+    constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
+    facts: expressions that are > 0.  weak: expressions that are >= 0.  nonzero: symbols that are not 0.
+    ranges: closed intervals of symbols.
+    bodies: what the parameters have to meet for a body with the moments of the claim to exist.
+    solutions: of relations that can be solved.  solved: those that are put in, in the place of their relations.
+    parameters: symbols that are constant along every motion.
+    """
+
+    variable: sympy.Symbol
+    positive: tuple[sympy.Symbol, ...]
+    samples: tuple[Mapping[sympy.Symbol, Fraction], ...]
+    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
+    parts: Mapping[str, tuple[tuple[str, sympy.Expr], ...]] = field(default_factory=dict)
+    constants: tuple[tuple[str, sympy.Expr], ...] = ()
+    relations: tuple[sympy.Expr, ...] = ()
+    facts: tuple[sympy.Expr, ...] = ()
+    weak: tuple[sympy.Expr, ...] = ()
+    nonzero: tuple[sympy.Symbol, ...] = ()
+    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
+    bodies: tuple[Need, ...] = ()
+    solutions: tuple[Solution, ...] = ()
+    solved: tuple[Solution, ...] = ()
+    parameters: frozenset[sympy.Symbol] = frozenset()
+
+    def with_solutions(self) -> Setting:
+        """The same, with the solutions in the place of their relations."""
+        done = {solution.relation for solution in self.solutions}
+        left = tuple(relation for relation in self.relations if relation not in done)
+        return replace(self, relations=left, solutions=(), solved=self.solutions)
+
+    def assumptions(
+        self,
+        sign: int,
+        *,
+        strict: bool = False,
+        facts: tuple[sympy.Expr, ...] = (),
+        weak: tuple[sympy.Expr, ...] = (),
+    ) -> Assumptions:
+        """What the algebra may use on a domain where the variable has this sign (strict: and is not 0)."""
+        return Assumptions(
+            self.variable,
+            self.positive,
+            self.greater,
+            sign,
+            self.relations,
+            strict,
+            (*self.facts, *facts),
+            self.nonzero,
+            self.ranges,
+            (*self.weak, *weak),
+            self.solved,
+            self.parameters,
+        )
+
+    @property
+    def zeros(self) -> tuple[sympy.Expr, ...]:
+        """What is 0 wherever the claim is made."""
+        return (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
+
+    def places(self, statement: Statement) -> Iterator[Place]:
+        """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
+        for sample in self.samples:
+            if not all(need.is_met(sample) for need in self.bodies):
+                continue
+            for point in statement.domain.points:
+                place = {self.variable: point, **sample}
+                if not all(Need(ConditionKind.POSITIVE, fact).is_met(place) for fact in statement.domain.facts):
+                    continue
+                if all(is_exactly_zero(relation, place) for relation in self.zeros):
+                    yield place

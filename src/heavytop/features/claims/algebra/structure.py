@@ -1,0 +1,233 @@
+"""What the structure of an expression tells, before anything is expanded: its sign, and the first integrals in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+from heavytop.features.claims.algebra.signs import PLUS, UNKNOWN, Sign, sum_of
+
+# Definitions kept as names, so that a chain of them is not expanded: symbols with a meaning, and their rates.
+
+
+class Defined(sympy.Dummy):  # type: ignore[misc]
+    """A symbol that stands for a formula, of which it depends on the symbols.  meaning: that formula."""
+
+    meaning: sympy.Expr
+
+    def __new__(cls, name: str, meaning: sympy.Expr) -> Defined:
+        """A new symbol, equal to no other."""
+        symbol: Defined = sympy.Dummy.__new__(cls, name, real=True)
+        symbol.meaning = meaning
+        symbol._inner = frozenset(meaning.free_symbols)
+        return symbol
+
+    @property
+    def free_symbols(self) -> set[sympy.Basic]:
+        """Itself, and what its formula holds."""
+        return {self, *self._inner}
+
+    def _sympystr(self, _printer: Any) -> str:
+        return str(self.name)
+
+
+def rate_along(rates: Mapping[sympy.Symbol, sympy.Expr]) -> Callable[[sympy.Expr], sympy.Expr]:
+    """The derivative along a motion, given the rates of the variables; a definition has a rate that is defined too."""
+    known: dict[Defined, sympy.Expr] = {}
+
+    def rate(value: sympy.Expr) -> sympy.Expr:
+        names = {symbol: sympy.Dummy(real=True) for symbol in value.atoms(Defined)}
+        plain = value.xreplace(names)
+        moving = {**rates, **{name: rate_of(symbol) for symbol, name in names.items()}}
+        total = sum((sympy.diff(plain, x) * dx for x, dx in moving.items()), sympy.Integer(0))
+        return total.xreplace({name: symbol for symbol, name in names.items()})
+
+    def rate_of(symbol: Defined) -> sympy.Expr:
+        if symbol not in known:
+            inner = rate(symbol.meaning)
+            known[symbol] = inner if inner.is_number else Defined(f"{symbol.name}'", inner)
+        return known[symbol]
+
+    return rate
+
+
+def at_values(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> sympy.Expr:
+    """The expression with these values, inside of definitions too."""
+    known: dict[Defined, sympy.Expr] = {}
+
+    def put_in(e: sympy.Expr) -> sympy.Expr:
+        for symbol in e.atoms(Defined):
+            if symbol not in known:
+                known[symbol] = put_in(symbol.meaning)
+        e = e.xreplace(known)
+        return e.subs(values, simultaneous=True) if e.free_symbols else e
+
+    return put_in(expression)
+
+
+# Jacobi's functions of a real argument u and a parameter m = k², 0 ≤ m ≤ 1, as formulas of a claim.
+#
+# sn² + cn² = 1, dn² + m sn² = 1, dn > 0;  d/du sn = cn dn, cn' = −sn dn, dn' = −m sn cn  (DLMF 22.6.1, 22.13.1).
+
+
+NAMES = ("sn", "cn", "dn")
+
+
+class _Jacobi(sympy.Function):  # type: ignore[misc]
+    """Real and analytic in u; the parameter has no rate here: it does not move in any claim that is proven."""
+
+    nargs = 2
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        u, m = self.args
+        if argindex != 1:
+            return sympy.Function(f"rate_of_{type(self).__name__}_by_m", real=True)(u, m)
+        rates: dict[str, Any] = {
+            "sn": lambda: cn(u, m) * dn(u, m),
+            "cn": lambda: -sn(u, m) * dn(u, m),
+            "dn": lambda: -m * sn(u, m) * cn(u, m),
+        }
+        return rates[type(self).__name__]()
+
+
+class sn(_Jacobi):  # noqa: N801
+    """sn(u, m)."""
+
+    @classmethod
+    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
+        if u.is_zero:
+            return sympy.S.Zero
+        if u.could_extract_minus_sign():
+            return -cls(-u, m)
+        return sympy.sin(u) if m.is_zero else sympy.tanh(u) if m == 1 else None
+
+
+class cn(_Jacobi):  # noqa: N801
+    """cn(u, m)."""
+
+    @classmethod
+    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
+        if u.is_zero:
+            return sympy.S.One
+        if u.could_extract_minus_sign():
+            return cls(-u, m)
+        return sympy.cos(u) if m.is_zero else sympy.sech(u) if m == 1 else None
+
+
+class dn(_Jacobi):  # noqa: N801
+    """dn(u, m)."""
+
+    @classmethod
+    def eval(cls, u: sympy.Expr, m: sympy.Expr) -> sympy.Expr | None:
+        if u.is_zero or m.is_zero:
+            return sympy.S.One
+        if u.could_extract_minus_sign():
+            return cls(-u, m)
+        return sympy.sech(u) if m == 1 else None
+
+
+_BOUNDS = dict.fromkeys(("sin", "cos", "tanh", "sech", "sn", "cn"), Fraction(1)) | {"atan": Fraction(11, 7)}
+
+
+def sign_of(e: sympy.Expr) -> Sign:
+    """Its sign wherever it is defined and real, from positive symbols, squares, roots, exponentials."""
+    if e.is_Rational:
+        return Sign(1 if e >= 0 else -1, bool(e != 0))
+    if e.is_Symbol or e.is_NumberSymbol:
+        return PLUS if e.is_positive else UNKNOWN
+    if e.is_Mul:
+        total = PLUS
+        for part in e.args:
+            total = total.times(sign_of(part))
+        return total
+    if e.is_Add:
+        return _sign_of_sum(e)
+    if isinstance(e, (sympy.exp, sympy.cosh, sympy.sech, dn)):
+        return PLUS
+    if e.is_Pow and e.args[1].is_Rational:
+        return _sign_of_power(*e.args)
+    if isinstance(e, sympy.Abs):
+        return Sign(1, sign_of(e.args[0]).strict)
+    if isinstance(e, (sympy.tanh, sympy.sinh, sympy.atan, sympy.asin)):
+        return sign_of(e.args[0])
+    return Sign(1, False) if isinstance(e, sympy.acos) else UNKNOWN
+
+
+def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
+    inside = sign_of(base)
+    strict = inside.strict or bool(exponent < 0)
+    if exponent.q == 2 or exponent.p % 2 == 0:
+        return Sign(1, strict)
+    return Sign(inside.value, strict) if exponent.q == 1 else UNKNOWN
+
+
+def _sign_of_sum(e: sympy.Expr) -> Sign:
+    """Of parts of one sign; bounded functions count against the constant part."""
+    constant, signs = Fraction(0), []
+    for part in e.args:
+        coefficient, rest = part.as_coeff_Mul()
+        size = abs(Fraction(int(coefficient.p), int(coefficient.q))) if coefficient.is_Rational else None
+        if part.is_Rational:
+            constant += Fraction(int(part.p), int(part.q))
+        elif size is not None and type(rest).__name__ in _BOUNDS and sign_of(part).value <= 0:
+            constant -= size * _BOUNDS[type(rest).__name__]
+        else:
+            signs.append(sign_of(part))
+    if constant:
+        signs.append(Sign(1 if constant > 0 else -1, True))
+    elif not signs:
+        return UNKNOWN
+    # a constant part below 0 is a bound from below, and tells nothing
+    return sum_of(signs) if constant >= 0 else UNKNOWN
+
+
+class Names:
+    """Symbols for the polynomials of the state that are constant in time, the smallest first."""
+
+    def __init__(self, state: frozenset[sympy.Symbol], is_constant: Callable[[sympy.Expr], bool]) -> None:
+        self._state = state
+        self._is_constant = is_constant
+        self._names: dict[sympy.Expr, sympy.Symbol | None] = {}
+
+    @property
+    def meanings(self) -> dict[sympy.Symbol, sympy.Expr]:
+        """Those given so far, with what they stand for."""
+        return {name: e for e, name in self._names.items() if name is not None}
+
+    def put_into(self, e: sympy.Expr) -> sympy.Expr:
+        """``e`` with its first integrals replaced by their symbols."""
+        if not e.free_symbols & self._state:
+            return e
+        if isinstance(e, Defined):
+            return self._definition(e)
+        if not e.args:
+            return self._name(e)
+        if e.is_Add:
+            return self._into_sum(e)
+        named = e.func(*(self.put_into(part) for part in e.args))
+        return self._name(e) if e.is_Mul and named.free_symbols & self._state else named
+
+    def _definition(self, e: Defined) -> sympy.Expr:
+        if e not in self._names:
+            is_constant = not self.put_into(e.meaning).free_symbols & self._state
+            self._names[e] = sympy.Symbol(f"({e})", real=True) if is_constant else None
+        return self._names[e] or e
+
+    def _into_sum(self, e: sympy.Expr) -> sympy.Expr:
+        parts = {part: self.put_into(part) for part in e.args}
+        left = [part for part, named in parts.items() if named.free_symbols & self._state]
+        done = [named for part, named in parts.items() if part not in left]
+        whole = sympy.Add(*left)
+        name = self._name(whole) if left else whole
+        return sympy.Add(*done, name) if name != whole else sympy.Add(*parts.values())
+
+    def _name(self, e: sympy.Expr) -> sympy.Expr:
+        if e not in self._names:
+            constant = e.is_polynomial(*self._state) and self._is_constant(e)
+            # no name of a file has brackets
+            self._names[e] = sympy.Symbol(f"({e})", real=True) if constant else None
+        return self._names[e] or e

@@ -1,0 +1,131 @@
+"""Audits of claims from Python, and the library of published ones."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from heavytop import arguments
+from heavytop.display import Tabular, TitledTable
+from heavytop.features.claims.audit.audit import PAPER, Judged, judged, only_branch, require_branch
+from heavytop.features.claims.audit.audit import audit as audit_named
+from heavytop.features.claims.audit.judge import Audit
+from heavytop.features.claims.library.entry import Entry, library, require_tag
+from heavytop.top.equations import System
+
+
+def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, branch: str | None = None) -> Audit:
+    """Prove or refute a claim, equation by equation.
+
+    Arguments:
+        claim: "ershkov-general", "ershkov-partial", the id of an entry of :func:`claim_library`, or the path of a claim
+            in TOML (`heavytop docs claims-in-toml`).
+        system: "heavy_top", "gyrostat" or "heavy_gyrostat": the system whose motion it is claimed to be; None for the
+            file's, else "heavy_gyrostat" where its rotor is a list of three, else "heavy_top".
+        branch: "smooth" or "printed": the rows of that branch alone.
+
+    Returns:
+        An :class:`Audit`; ``verdict`` is "holds" only where every equation is proven on its whole domain.
+
+    Raises:
+        InputError: for an unknown claim, system or branch, for a file that is no claim, and for one whose audit takes
+            too long.
+    """
+    if branch is not None:
+        require_branch(arguments.text(branch, "branch"))
+    name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
+    found = audit_named(name, None if system is None else arguments.system(system).name)
+    return found if branch is None else only_branch(found, branch)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ClaimLibrary(Tabular, Sequence[Entry]):
+    """Entries of the library with their verdicts, by id.
+
+    entries: what stands in each file.  verdicts: of each of them, by id.
+    """
+
+    entries: tuple[Entry, ...]
+    verdicts: dict[str, Judged]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.entries[place]
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Ids of the entries whose verdict is another than the expected one, and is one."""
+        return tuple(each.id for each in self.entries if self.verdicts[each.id].verdict not in (each.expects, _OPEN))
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Ids of the entries that are undecided where a verdict is expected."""
+        return tuple(e.id for e in self.entries if self.verdicts[e.id].verdict == _OPEN != e.expects)
+
+    @property
+    def exit_code(self) -> int:
+        """0 where every verdict is the expected one, 1 where one is another, else 3 where one is undecided."""
+        return 1 if self.changed else 3 if self.undecided else 0
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``heavytop claims --json``."""
+        return {"claims": [self._document(entry) for entry in self.entries]}
+
+    def _document(self, entry: Entry) -> dict[str, Any]:
+        found = self.verdicts[entry.id]
+        document = {
+            "id": entry.id,
+            "title": entry.title,
+            "year": entry.source.year,
+            "source": entry.source.text,
+            "status": entry.status,
+            "read": entry.read,
+            "tags": entry.tags,
+            "verdict": found.verdict,
+            "expects": entry.expects,
+            "seconds": round(found.seconds, 3),
+        }
+        return document | ({"reason": found.reason} if found.reason else {})
+
+    def _table(self) -> TitledTable:
+        counts = [sum(each.verdict == name for each in self.verdicts.values()) for name in _VERDICTS]
+        said = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
+        rows = [(each.id, str(each.source.year), self.verdicts[each.id].verdict) for each in self.entries]
+        return TitledTable(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
+
+
+_OPEN = "undecided"
+_VERDICTS = ("holds", "refuted", _OPEN)
+_SAID = {"holds": "hold", "refuted": "are refuted", _OPEN: "are undecided"}
+
+
+def claim_library(
+    tag: str | None = None, *, anew: bool = False, done: Callable[[], None] | None = None
+) -> ClaimLibrary:
+    """The library of published claims with the verdict on each.
+
+    Arguments:
+        tag: the entries with that tag alone.
+        anew: audit every entry, whatever is known from before; else an audit of the same entry by the same program
+            stands, from the cache of the user.
+        done: called after each verdict.
+
+    Returns:
+        A :class:`ClaimLibrary`: a sequence of entries, ``verdicts[id].verdict``, ``to_json()``.
+
+    Raises:
+        InputError: for a tag that no entry has.
+    """
+    found = library().values() if tag is None else _tagged(arguments.text(tag, "tag"))
+    told = arguments.callback(done, "done") or (lambda: None)
+    entries = tuple(found)
+    return ClaimLibrary(entries, judged(entries, anew=bool(arguments.flag(anew, "anew")), done=told))
+
+
+def _tagged(tag: str) -> list[Entry]:
+    require_tag(tag)
+    return [entry for entry in library().values() if tag in entry.tags]

@@ -1,0 +1,328 @@
+"""`audit`: one claim, one system, a verdict for every equation and the reason for it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import sys
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import msgspec
+
+from heavytop.errors import HeavyTopError, InputError, invalid
+from heavytop.features.claims.audit.context import ClaimFile
+from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
+from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
+from heavytop.features.claims.audit.values import ValueClaim, ValueFile
+from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
+
+# Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
+#
+# The format is that of docs/claims-in-toml.md.  Formulas go through :mod:`heavytop.features.claims.algebra.reader`;
+# nothing in a file is ever evaluated as code.
+
+
+_MAX_BYTES = 100_000
+_REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
+
+
+def read_claim(path: Path) -> Auditable | ValueClaim:
+    """The claim in a TOML file; raises InputError, with the reason, for anything that is not one."""
+    try:
+        with path.open("rb") as stream:
+            raw = stream.read(_MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.", "Give the path of a claim in TOML.") from None
+    if len(raw) > _MAX_BYTES:
+        raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
+    try:
+        table = tomllib.loads(raw.decode())
+    except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError of its own
+        raise InputError(f"{path} is not TOML: {str(error)[:200]}.", _REMEDY) from None
+    return claim_from_table(table, str(path))
+
+
+def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueClaim:
+    """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
+    entry, rest = split(table, where)
+    if "entry" in rest:
+        raise InputError(f"{where}: entry is no key of a claim.", _REMEDY)
+    if rest.get("kind") == "value":
+        return _value_claim(rest, entry, where)
+    try:
+        content = msgspec.convert(rest, ClaimFile)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
+    tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
+    if content.kind not in tables:
+        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral, relation or value.")
+    wanted = "motion" if content.kind == "motion" else "integral"
+    if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
+        raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    if content.quadrature is not None and content.kind != "motion":
+        raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
+    if content.domain not in ("all", "t<=0", "t>0"):
+        raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
+    content = msgspec.structs.replace(content, entry=entry)
+    return UserMotion(content) if content.kind == "motion" else UserIntegral(content)
+
+
+def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
+    try:
+        return ValueClaim(msgspec.convert(table, ValueFile), entry)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"{where}: {invalid(error)}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+    except InputError as error:
+        raise InputError(f"{where}: {error.cause}", error.remedy) from None
+
+
+PAPER = ("ershkov-general", "ershkov-partial")
+_SEARCH, _MOST_FOUND = 6.0, 3
+"""Seconds for assumptions that would decide a claim, and how many of them are said."""
+
+
+def paper_claim(name: str) -> Auditable:
+    """The paper's claim of that name, one of :data:`PAPER`."""
+    from heavytop.features.claims.library.ershkov_audit import GeneralClaim, PartialClaim
+
+    return GeneralClaim() if name == "ershkov-general" else PartialClaim()
+
+
+def find_claim(name: str) -> Auditable | ValueClaim:
+    """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
+    if name in PAPER:
+        return paper_claim(name)
+    return read_claim(_path(name))
+
+
+def _path(name: str) -> Path:
+    """The path of a claim in TOML, or of the entry of that name; raises InputError for any other name."""
+    path = Path(name)
+    if path.suffix == ".toml":
+        return path
+    found = file_of(name)
+    if found is None:
+        remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
+        raise InputError(f"Unknown claim {name[:60]!r}.", remedy)
+    return found
+
+
+def audit(
+    name: str, system_name: str | None = None, progress: Callable[[int, int], None] = lambda done, of: None
+) -> Audit:
+    """The audit of a claim of the paper, or of a TOML file, as a motion of that system; None for the claim's own.
+
+    progress: hears of a claim of the paper how many equations are judged, of how many.
+    Raises InputError for an unknown claim or system and for a file that cannot be read.
+    """
+    asked = None if system_name is None else system(system_name)
+    if name in PAPER:
+        return audit_claim(paper_claim(name), asked, progress)
+    return in_time(str(_path(name)), "" if asked is None else asked.name)
+
+
+def audit_claim(
+    claim: Auditable | ValueClaim,
+    asked: System | None = None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Audit:
+    """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
+    about, began = claim.about(asked), perf_counter()
+    if isinstance(claim, ValueClaim):
+        return Audit(claim.name, about.name, claim.source, claim.rows(about), kind=claim.kind, entry=claim.entry)
+    rows = judge(claim.statements(about), claim.setting, progress)
+    deciding = would_decide(claim, about, rows, perf_counter() - began)
+    why, solves = claim.explain(about, rows)
+    constants = tuple((name, str(value)) for name, value in claim.setting.constants)
+    said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
+    return Audit(*said, deciding)
+
+
+def would_decide(
+    claim: Auditable, about: System, rows: Sequence[StatementVerdict], seconds: float
+) -> tuple[tuple[str, str], ...]:
+    """Assumptions on the parameters of an undecided claim in a file, each of which decides it, with the verdict then.
+
+    seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.
+    """
+    if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
+        return ()
+    missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
+    found: list[tuple[str, str]] = []
+    began = perf_counter()
+    for bound in dict.fromkeys([*missing, *(f"{name} > 0" for name in claim.unassumed)]):
+        if perf_counter() - began + 2 * seconds > _SEARCH or len(found) == _MOST_FOUND:
+            break
+        if (bound.replace(">", "!="), "holds") in found:  # more than is needed
+            continue
+        try:
+            other = claim.assuming(bound)
+            verdict = verdict_of(judge(other.statements(about), other.setting))
+        except HeavyTopError:  # a sample breaks it, or the formula is none that may be assumed
+            continue
+        if verdict != "undecided":
+            found.append((bound, verdict))
+    return tuple(found)
+
+
+def require_branch(branch: str) -> None:
+    """Raises InputError for what is no branch."""
+    if branch not in ("smooth", "printed"):
+        raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
+
+
+def only_branch(report: Audit, branch: str) -> Audit:
+    """The same report with the rows of one branch, and its verdict on them; raises InputError where there are none."""
+    require_branch(branch)
+    rows = tuple(row for row in report.rows if row.branch == branch)
+    if not rows:
+        raise InputError(f"{report.claim} says nothing on the {branch} branch.", "Leave out --branch.")
+    return replace(report, rows=rows)
+
+
+# The verdicts on the library of claims: audited now, or found in the cache by what they follow from.
+
+
+SECONDS = 60.0
+"""An audit of an entry that takes longer is undecided."""
+_PACKAGE = Path(__file__).parents[3]
+_ROOMS = ("features/claims", "top", "exact")
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """The verdict on an entry, and the seconds that its audit took when it was made.
+
+    reason: why there is no verdict, where the audit was stopped or the file cannot be judged.
+    """
+
+    verdict: Verdict
+    seconds: float
+    reason: str = ""
+
+
+Done = Callable[[], None]
+
+
+def audited(entry: Entry, system: str = "") -> tuple[Judged, Audit | None]:
+    """The audit of an entry; undecided, with None, where it is stopped or its file cannot be judged."""
+    began = perf_counter()
+    try:
+        found = in_time(str(FOLDER / f"{entry.id}.toml"), system, SECONDS)
+    except AuditEnded:
+        raise
+    except HeavyTopError as error:
+        return Judged("undecided", perf_counter() - began, error.cause), None
+    return Judged(_verdict(found), perf_counter() - began), found
+
+
+def _verdict(found: Audit) -> Verdict:
+    return "holds" if found.verdict == "holds" else "refuted" if found.verdict == "refuted" else "undecided"
+
+
+@cache
+def own_system(name: str) -> str:
+    """The system that an entry is about, by the keys of its file: ``about`` of its claim, but no formula is read."""
+    table = tomllib.loads((FOLDER / f"{name}.toml").read_text("utf-8"))
+    carries = isinstance((table.get("top") or table["body"]).get("rotor"), list)
+    return str(table.get("system") or (HEAVY_GYROSTAT if carries else HEAVY_TOP).name)
+
+
+def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda: None) -> dict[str, Judged]:
+    """The verdict on each entry by its id, as many audits at once as there are processors.
+
+    anew: whatever the cache holds.  done: called after each.
+    Raises AuditEnded where the process of an audit ends without an answer.
+    """
+    todo = list(entries)
+
+    def one(entry: Entry) -> Judged:
+        found = None if anew else _kept(entry)
+        if found is None:
+            found, _ = audited(entry)
+            _keep(entry, found)
+        done()
+        return found
+
+    with ThreadPoolExecutor(max_workers=_processors()) as pool:
+        return dict(zip((entry.id for entry in todo), pool.map(one, todo), strict=True))
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _kept(entry: Entry) -> Judged | None:
+    """What the cache holds of exactly this entry and this program."""
+    try:
+        return msgspec.json.decode(_place(entry).read_bytes(), type=Judged)
+    except (OSError, msgspec.DecodeError, msgspec.ValidationError):
+        return None
+
+
+def _keep(entry: Entry, found: Judged) -> None:
+    """Beside others that write the same at once; a cache that cannot be written is none."""
+    place = _place(entry)
+    part = place.with_suffix(f".{os.getpid()}.part")
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(msgspec.json.encode(found))
+        part.replace(place)
+
+
+def _place(entry: Entry) -> Path:
+    content = (FOLDER / f"{entry.id}.toml").read_bytes()
+    return _cache_folder() / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
+
+
+@cache
+def _program() -> bytes:
+    """A digest of what a verdict follows from: the versions of Python and its algebra, and the source of the rooms."""
+    digest = hashlib.sha256(sys.version.encode())
+    for name in ("sympy", "flint"):
+        digest.update(str(__import__(name).__version__).encode())
+    for path in sorted(path for room in _ROOMS for path in (_PACKAGE / room).rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.digest()
+
+
+def _cache_folder() -> Path:
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    with suppress(RuntimeError):
+        return (Path(home) if home else Path.home() / ".cache") / "heavytop" / "claims"
+    return Path(os.devnull) / "none"
+
+
+# The process in which the claim of a file is audited: :mod:`heavytop.features.claims.audit.guard` starts it.
+
+
+def child() -> None:
+    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
+    path, system_name, seconds = sys.argv[2:]
+    if hasattr(signal, "alarm"):
+        signal.alarm(int(seconds))
+    limit_memory()
+    try:
+        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
+    except HeavyTopError as error:
+        answer = Answer(error=(_printable(error.cause), error.remedy))
+    except MemoryError:
+        answer = Answer(memory=True)
+    except RecursionError:
+        answer = Answer(depth=True)
+    sys.stdout.buffer.write(msgspec.json.encode(answer))
+
+
+def _printable(text: str) -> str:
+    """Text that JSON can carry: a path may hold bytes that are no characters."""
+    return text.encode(errors="replace").decode()

@@ -1,0 +1,592 @@
+"""What every kind of claim in a file shares: its names, assumptions and samples, and the top that it is about."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import combinations, pairwise
+from typing import Annotated, Self
+
+import msgspec
+import sympy
+from flint import arb
+from msgspec import structs
+
+from heavytop.errors import InputError, quoted
+from heavytop.features.claims.algebra.conditions import (
+    ConditionKind,
+    Need,
+    condition,
+    conditions_for_zero,
+    is_exactly_zero,
+    solve_relations,
+    written,
+)
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
+from heavytop.features.claims.algebra.reader import (
+    Assumed,
+    Bound,
+    Formula,
+    assume,
+    comparisons,
+    inequalities,
+    parse,
+    symbol,
+)
+from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Setting
+from heavytop.features.claims.algebra.structure import rate_along
+from heavytop.features.claims.audit.statements import SYSTEMS
+from heavytop.features.claims.library.entry import Entry
+from heavytop.precision import exact
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System, system
+
+# What a claim in TOML may hold: a motion, a first integral or an invariant relation, as it is written.
+
+
+Text = Annotated[str, msgspec.Meta(max_length=20_000)]
+Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,30}$")]
+Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Tensor = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
+Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
+
+
+class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[top]: moments of inertia, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
+    k3 where it is about `heavy_gyrostat`.
+
+    inertia: three principal moments; or a tensor in other axes: six numbers I11, I22, I33, I12, I13, I23, nine row by
+    row, or three rows of three.
+    """
+
+    inertia: Tensor
+    weight: Text
+    centre: Three
+    rotor: Text | Three | None = None
+
+
+class ClaimedMotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[motion]: Ω(t), γ(t), and the angles (φ, θ, ψ); γ may be left out where the angles are given, and so may Ω."""
+
+    omega: Three | None = None
+    gamma: Three | None = None
+    angles: Three | None = None
+
+
+class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[quadrature]: the formulas of [motion] hold u, and t = F(u) + constant where u is between bounds.
+
+    time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u to look for a witness at.
+    """
+
+    variable: Name
+    time: Text | None = None
+    integrand: Text | None = None
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    points: Samples | None = None
+
+
+class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at.
+
+    Without states the audit takes some of its own, on the conditions where it finds such.
+    """
+
+    value: Text
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    states: (
+        Annotated[
+            list[Annotated[list[Text], msgspec.Meta(min_length=6, max_length=6)]],
+            msgspec.Meta(min_length=1, max_length=8),
+        ]
+        | None
+    ) = None
+
+
+class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole file.
+
+    entry: what it says as an entry of the library, where it is one.
+    """
+
+    name: Annotated[str, msgspec.Meta(max_length=80)]
+    kind: str
+    top: TopTable
+    system: str | None = None
+    source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
+    domain: str = "all"
+    times: Samples | None = None
+    assume: Annotated[list[Text], msgspec.Meta(max_length=20)] = []
+    parameters: Annotated[dict[Name, Samples | Text], msgspec.Meta(max_length=20)] = {}
+    definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
+    relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    motion: ClaimedMotionTable | None = None
+    quadrature: QuadratureTable | None = None
+    integral: IntegralTable | None = None
+    entry: Entry | None = None
+
+
+def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str, str]]:
+    """The sample values of the parameters, one dict a sample; a single value serves all samples.
+
+    Raises InputError where the lists differ in length.
+    """
+    lengths = {len(values) for values in parameters.values() if not isinstance(values, str)}
+    if len(lengths) > 1:
+        raise InputError(f"The samples of the parameters have lengths {sorted(lengths)}.", "Give as many for each.")
+    count = max(lengths, default=1)
+    return [
+        {name: values if isinstance(values, str) else values[index] for name, values in parameters.items()}
+        for index in range(count)
+    ]
+
+
+# The tensor of inertia of a claim: three principal moments, or six or nine entries in other axes.
+
+
+_ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
+"""Place of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
+_REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
+
+
+@dataclass(frozen=True, slots=True)
+class TensorTexts:
+    """The entries as they are written: three, or nine row by row."""
+
+    texts: tuple[str, ...]
+
+    @property
+    def diagonal(self) -> tuple[str, ...]:
+        """The moments about the axes."""
+        return self.texts if len(self.texts) == 3 else self.texts[::4]
+
+    def of(self, entries: Sequence[sympy.Expr]) -> tuple[sympy.Expr | tuple[sympy.Expr, ...], ...]:
+        """Three moments, or three rows; raises InputError for a tensor that is not symmetric."""
+        if len(entries) == 3:
+            return tuple(entries)
+        rows = tuple(tuple(entries[3 * i : 3 * i + 3]) for i in range(3))
+        for i, j in combinations(range(3), 2):
+            if sympy.expand(rows[i][j] - rows[j][i]) != 0:
+                pair = f"I{i + 1}{j + 1} = {self.texts[3 * i + j]}, I{j + 1}{i + 1} = {self.texts[3 * j + i]}"
+                raise InputError(f"The tensor of inertia is not symmetric: {pair}.", _REMEDY)
+        # off the diagonal 0: the axes are principal
+        if all(rows[i][j] == 0 for i, j in combinations(range(3), 2)):
+            return rows[0][0], rows[1][1], rows[2][2]
+        return rows
+
+
+def read_tensor(inertia: Sequence[str | list[str]]) -> TensorTexts:
+    """The entries of ``inertia``; raises InputError unless they are 3, 6 or 9, or 3 rows of 3."""
+    if all(isinstance(part, list) for part in inertia):
+        if len(inertia) != 3 or any(len(row) != 3 for row in inertia):
+            raise InputError("top.inertia: the rows are not 3 of 3.", _REMEDY)
+        return TensorTexts(tuple(text for row in inertia for text in row))
+    if not all(isinstance(part, str) for part in inertia) or len(inertia) not in (3, 6, 9):
+        raise InputError(f"top.inertia: {len(inertia)} entries.", _REMEDY)
+    texts = tuple(str(part) for part in inertia)
+    return TensorTexts(tuple(texts[place] for place in _ORDER) if len(texts) == 6 else texts)
+
+
+def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[sympy.Expr, ...]:
+    """What is > 0 of every body: the moments; of a full tensor its principal minors, the determinant last."""
+    if not isinstance(inertia[0], tuple):
+        return tuple(inertia)
+    return _principal_minors(sympy.Matrix(inertia))
+
+
+def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
+    places = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
+    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
+
+
+def of_bodies(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[Need, ...]:
+    """∫ x xᵀ dm = ½ tr I − I is positive semidefinite: its principal minors are >= 0; () for numbers."""
+    matrix = sympy.Matrix(inertia)
+    if not matrix.free_symbols:
+        return ()
+    spread = sympy.eye(3) * matrix.trace() / 2 - matrix
+    return tuple(Need(ConditionKind.NONNEGATIVE, minor) for minor in _principal_minors(spread) if minor.free_symbols)
+
+
+TIME = sympy.Symbol("t", real=True)
+STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
+RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+_SAMPLE_BITS = 512
+_MOST_BITS = 6_640
+"""Of numerator and denominator of a number in a sample: 2000 digits."""
+_OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
+_OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What every kind of claim shares: names, assumptions, samples, and the top they are about.
+
+    rotor: λ of a gyrostat, with what it needs.  carried: k of a heavy gyrostat.
+    """
+
+    names: dict[str, Formula]
+    symbols: dict[str, sympy.Symbol]
+    assumed: Assumed
+    samples: tuple[dict[sympy.Symbol, Fraction], ...]
+    relations: tuple[sympy.Expr, ...]
+    top: Parameters
+    rotor: sympy.Expr | None
+    needs: frozenset[Need]
+    rotor_needs: frozenset[Need]
+    carried: tuple[sympy.Expr, ...] | None = None
+
+    def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
+        """The context with the rotor in this form; raises InputError unless it is shown to be constant in time."""
+        if not is_constant:
+            text = quoted(str(self.rotor))[1:-1]
+            raise InputError(
+                f"top.rotor: {text} is not shown to be constant in time.",
+                "The rotor of a gyrostat turns at a constant rate: use parameters, or first integrals of its motion.",
+            )
+        return replace(self, rotor=rotor)
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The systems that the claim says something about."""
+        if self.carried is not None:
+            return (HEAVY_GYROSTAT,)
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self._turns_about_two)
+
+    @property
+    def _turns_about_two(self) -> bool:
+        return self.rotor is not None and not isinstance(self.top.inertia[0], tuple)
+
+    def parameters(self, system: System) -> Parameters:
+        """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
+        if (system is HEAVY_GYROSTAT) is not (self.carried is not None):
+            raise _other_rotor(system)
+        if self.carried is not None:
+            return self.top._replace(rotor=self.carried)
+        if system is GYROSTAT and isinstance(self.top.inertia[0], tuple):
+            cause = "gyrostat has its rotor on a principal axis, and top.inertia has products of inertia."
+            raise InputError(cause, "Give the three principal moments, or use heavy_gyrostat.")
+        if system is GYROSTAT and self.rotor is None:
+            raise InputError("The file gives no rotor, so it says nothing about gyrostat.", "Add rotor to [top].")
+        return self.top._replace(rotor=sympy.Integer(0) if self.rotor is None else self.rotor)
+
+
+def _other_rotor(system: System) -> InputError:
+    """What is said where one of the two has a rotor of three components, and the other has not."""
+    if system is HEAVY_GYROSTAT:
+        cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
+        return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
+    cause = f"The file gives a rotor of three components, so it says nothing about {system.name}."
+    return InputError(cause, "Use the system heavy_gyrostat, or give no such rotor.")
+
+
+def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
+    """Parsed parameters, assumptions, definitions and top; raises InputError for what cannot be understood."""
+    variables = tuple(variables)
+    reserved = RESERVED.union(map(str, variables))
+    for name in (*content.parameters, *content.definitions):
+        if name in reserved or (name in content.parameters and name in content.definitions):
+            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
+    above, apart = inequalities(content.assume)
+    tensor = read_tensor(content.top.inertia)
+    # the moments of inertia of a top are positive, said or not
+    positive = {left for left, right in above if right == "0"} | {text.strip() for text in tensor.diagonal}
+    symbols = {
+        name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
+        for name in content.parameters
+    }
+    names = {name: symbol(value) for name, value in symbols.items()}
+    names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
+    for name, text in content.definitions.items():
+        names[name] = parse(text, names, f"definition of {name}")
+    sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in (*above, *apart)]
+    pairs = [(left.expression, right.expression) for left, right in sides]
+    bounds, unequal = pairs[: len(above)], pairs[len(above) :]
+    top = content.top
+    moments = [parse(text, names, "top.inertia") for text in tensor.texts]
+    arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
+    rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
+    carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
+    relations = [parse(text, names, "relations") for text in content.relations]
+    _check_constant("top.inertia", moments, _OF_THE_TOP, variables)
+    _check_constant("top.centre", arm[:3], _OF_THE_TOP, variables)
+    _check_constant("top.weight", arm[3:], _OF_THE_TOP, variables)
+    _check_constant("top.rotor", carried, _OF_THE_TOP, variables)
+    _check_constant("relations", relations, _OF_PARAMETERS, variables)
+    weight = arm.pop()
+    inertia = tensor.of([part.expression for part in moments])
+    centre = tuple(part.expression for part in arm)
+    context = Context(
+        names,
+        symbols,
+        assume(bounds, needs_of(side for link in sides for side in link), minors(inertia), symbols.values(), unequal),
+        tuple(
+            {symbols[name]: sample_number(value, name) for name, value in row.items()}
+            for row in sample_rows(content.parameters)
+        ),
+        tuple(relation.expression for relation in relations),
+        Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
+        None if rotor is None else rotor.expression,
+        needs_of([*moments, *arm, weight, *carried, *relations]).union(
+            *(condition("/", (part,)) for part in minors(inertia)[-3:])
+        ),
+        frozenset() if rotor is None else rotor.needs,
+        tuple(part.expression for part in carried) or None,
+    )
+    _check_samples(context, bounds, unequal)
+    return context
+
+
+def sample_number(text: str, what: str) -> Fraction:
+    """The exact number of a sample, a state or a time; raises InputError for one of thousands of digits."""
+    try:
+        value = exact(text)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) > _MOST_BITS:
+        raise InputError(f"{what} = {quoted(text)[1:-1]} is too long a number.", "Use numbers of at most 2000 digits.")
+    return value
+
+
+def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:
+    """What all of them need."""
+    return frozenset().union(*(formula.needs for formula in formulas))
+
+
+def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[Formula, Formula, Formula]:
+    """The formulas of three texts."""
+    first, second, third = (parse(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
+    return first, second, third
+
+
+def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
+    """Raises InputError where a formula, or what it needs, depends on what moves, directly or not."""
+    for formula in formulas:
+        free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
+        moving = sorted(map(str, free & {TIME, *STATE, *variables}))
+        if moving:
+            text = quoted(written(str(formula.expression)))[1:-1]
+            raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
+
+
+def _check_samples(context: Context, bounds: Sequence[Bound], unequal: Sequence[Bound]) -> None:
+    """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
+    for sample in context.samples:
+        shown = ", ".join(f"{name} = {value}" for name, value in sample.items()) or "without parameters"
+        broken = [f"assumption {left} > {right}" for left, right in bounds if not _at(left - right, sample) > 0]
+        broken += [
+            f"assumption {left} != {right}"
+            for left, right in unequal
+            if is_exactly_zero(left - right, sample) is not False
+        ]
+        broken += [f"relation {zero} = 0" for zero in context.relations if is_exactly_zero(zero, sample) is False]
+        if broken:
+            raise InputError(f"The sample {shown} breaks the {written(broken[0])}.", "Change the sample.")
+        for index, moment in enumerate(minors(context.top.inertia), 1):
+            if not _at(moment, sample) > 0:
+                full = isinstance(context.top.inertia[0], tuple)
+                what = "the tensor of inertia not positive definite" if full else f"I{index} not positive"
+                raise InputError(f"The sample {shown} makes {what}.", "Change the sample.")
+
+
+def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
+    try:
+        return evaluate(expression, sample, _SAMPLE_BITS)
+    except (KeyError, Unprovable):
+        raise InputError(
+            f"{written(str(expression))[:80]} is not a number at a sample.", "It may hold parameters only."
+        ) from None
+
+
+def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
+    """The setting of a claim in this context."""
+    a = context.assumed
+    relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
+    parameters = frozenset(context.symbols.values())
+    setting = Setting(
+        variable,
+        a.positive,
+        context.samples,
+        a.greater,
+        relations=relations,
+        facts=a.facts,
+        weak=a.weak,
+        ranges=a.ranges,
+        parameters=parameters,
+        bodies=_body_needs(context.top.inertia),
+    )
+    known = replace(setting.assumptions(0), relations=())
+    return replace(setting, solutions=solve_relations(relations, known, parameters))
+
+
+def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
+    """No principal moment of a rigid body exceeds the sum of the other two; () for moments that are numbers.
+
+    A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
+    top that no body is.
+    """
+    if isinstance(inertia[0], tuple):
+        return of_bodies(inertia)
+    if not any(moment.free_symbols for moment in inertia):
+        return ()
+    return tuple(Need(ConditionKind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
+
+
+def of_file(asked: System | None, written: str | None, usual: System) -> System:
+    """The system asked for, else the one written in a file, else the usual; raises InputError where two differ."""
+    own = None if written is None else system(written)
+    if asked is not None and own is not None and asked is not own:
+        raise InputError(
+            f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
+        )
+    return asked or own or usual
+
+
+@dataclass(frozen=True)
+class FileClaim:
+    """A claim of a file."""
+
+    content: ClaimFile
+    context: Context = field(init=False)
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """What its formulas may hold beside its parameters."""
+        return ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "context", parse_context(self.content, self.variables))
+
+    @property
+    def name(self) -> str:
+        """As the file has it."""
+        return self.content.name
+
+    @property
+    def source(self) -> str:
+        """As the file has it."""
+        return self.content.source
+
+    @property
+    def unassumed(self) -> list[str]:
+        """Parameters of whose sign no assumption says anything."""
+        words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
+        return [name for name in self.content.parameters if name not in words]
+
+    def assuming(self, bound: str) -> Self:
+        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        return type(self)(structs.replace(self.content, assume=[*self.content.assume, bound]))
+
+    @property
+    def entry(self) -> Entry | None:
+        """What the file says as an entry of the library."""
+        return self.content.entry
+
+    @property
+    def kind(self) -> str:
+        """motion, integral or relation."""
+        return self.content.kind
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.
+
+        Raises InputError where the file names another system, or gives another rotor than the system has.
+        """
+        found = of_file(asked, self.content.system, HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT)
+        self.context.parameters(found)
+        return found
+
+
+# The clock of a claimed motion: the time itself, or a quadrature t = F(u) + constant that is not inverted.
+#
+# Formulas in u are a motion where u is between bounds and F' is finite and never 0 there: u(t) is the inverse of F,
+# with u' = 1/F'(u), and rates are taken through it.
+
+
+_DOMAINS = {"all": ALL, "t<=0": BEFORE, "t>0": AFTER}
+_POINTS = tuple(Fraction(*pair) for pair in ((1, 3), (-1, 2), (7, 5), (-9, 4)))
+_BETWEEN = (Fraction(1, 2), Fraction(1, 3), Fraction(4, 5))
+_BEYOND = (Fraction(1, 7), Fraction(3, 2))
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """What the formulas of a motion hold, and its rate.
+
+    variable: t or u.  rate: the derivative in time.  values: F' and 1/F', both of which have to be continuous; none
+    where t itself is the variable.  needs: for these, and for the bounds of u, to be defined.
+    """
+
+    variable: sympy.Symbol
+    rate: Callable[[sympy.Expr], sympy.Expr]
+    domain: Domain
+    values: tuple[sympy.Expr, ...] = ()
+    needs: frozenset[Need] = frozenset()
+
+
+def variable_of(content: ClaimFile) -> sympy.Symbol:
+    """The symbol that the formulas of a motion hold: t, or the variable of its quadrature.
+
+    Raises InputError where that name is taken.
+    """
+    if content.quadrature is None:
+        return TIME
+    name = content.quadrature.variable
+    if name in RESERVED:
+        taken = f"Taken are {', '.join(sorted(RESERVED))}."
+        raise InputError(f"The name {name!r} of the variable of [quadrature] is taken.", taken)
+    return sympy.Symbol(name, real=True)
+
+
+def read_clock(content: ClaimFile, context: Context) -> Clock:
+    """The clock of a motion claimed in a file; raises InputError for a quadrature that cannot be understood."""
+    table, u = content.quadrature, variable_of(content)
+    if table is None:
+        return Clock(TIME, rate_along({TIME: sympy.Integer(1)}), _DOMAINS[content.domain])
+    if content.domain != "all" or content.times is not None:
+        cause = f"domain and times are about t, and the formulas of this claim hold {u}."
+        raise InputError(cause, "Bound it by where, and give points, in [quadrature].")
+    text = table.time or table.integrand
+    if text is None or (table.time is not None and table.integrand is not None):
+        raise InputError("[quadrature] needs either time or integrand.", "Give F(u) as time, or F'(u) as integrand.")
+    given = parse(text, context.names, "quadrature")
+    integrand = given.expression if table.time is None else rate_along({u: sympy.Integer(1)})(given.expression)
+    if integrand == 0:
+        raise InputError(f"[quadrature]: t = {text[:60]} does not move with {u}.", "Give t as a function of it.")
+    links = [link for text in table.where for link in comparisons(text, "where of [quadrature]")]
+    sides = [[parse(side, context.names, "where of [quadrature]") for side in link] for link in links]
+    facts = tuple(above.expression - below.expression for above, below in sides)
+    label = ", ".join(table.where) or f"all {u}"
+    domain = Domain(label, 0, _points(table, u, facts, context.samples), f"{u} is the variable of [quadrature]", facts)
+    needs = needs_of([given, *(side for pair in sides for side in pair)]) | condition("/", (integrand,))
+    return Clock(u, rate_along({u: 1 / integrand}), domain, (integrand, 1 / integrand), needs)
+
+
+def _points(
+    table: QuadratureTable,
+    u: sympy.Symbol,
+    facts: Sequence[sympy.Expr],
+    samples: Sequence[Mapping[sympy.Symbol, Fraction]],
+) -> tuple[Fraction, ...]:
+    """Those of the file, else some between and beyond the bounds at the samples, on the domain or not."""
+    if table.points is not None:
+        return tuple(sample_number(point, "quadrature.points") for point in table.points)
+    found = list(_POINTS)
+    for sample in samples:
+        ends = sorted(end for fact in facts if (end := _end(fact, u, sample)) is not None)
+        found += [low + (high - low) * part for low, high in pairwise(ends) for part in _BETWEEN]
+        found += [end + sign * step for end in ends for step in _BEYOND for sign in (1, -1)]
+    return tuple(dict.fromkeys(found))
+
+
+def _end(fact: sympy.Expr, u: sympy.Symbol, sample: Mapping[sympy.Symbol, Fraction]) -> Fraction | None:
+    """The rational zero of a bound that is linear in u, at a sample."""
+    slope = sympy.diff(fact, u)
+    if u in slope.free_symbols or slope == 0:
+        return None
+    value = (u - fact / slope).subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+    value = sympy.expand(value)
+    return Fraction(int(value.p), int(value.q)) if value.is_Rational else None

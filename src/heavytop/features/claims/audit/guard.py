@@ -1,0 +1,103 @@
+"""The audit of a file in a process of its own, with an end to its time and memory.
+
+The algebra of an honest claim takes seconds; that of a hostile or hopeless one can take forever, and cannot be
+interrupted from within.  The file is opened, read and parsed in that process too.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+
+import msgspec
+
+from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.features.claims.audit.judge import Audit
+
+SECONDS = 20
+_BYTES = 3 << 30
+# the process ends itself that much later, where nobody is left to stop it
+_GRACE = 2
+# the program of the child: it imports nothing of the caller's script, so that this needs no main guard there
+_CHILD = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from heavytop.features.claims.audit.audit import child; child()"
+)
+_NO_MEMORY = b"Unable to allocate memory"
+_TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or split the claim."
+
+
+class AuditEnded(HeavyTopError):
+    """The process of an audit ended without an answer: says how."""
+
+    exit_code = 3
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """What the child says: a report, or (cause, remedy) of an error, or that its memory or stack was used up."""
+
+    report: Audit | None = None
+    error: tuple[str, str] | None = None
+    memory: bool = False
+    depth: bool = False
+
+
+def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
+    """The audit of the claim in a file, about its own system for the name "".
+
+    Raises InputError where it takes more than ``seconds``, 3 GB or the stack, and
+    AuditEnded with what happened where the process of the audit ends without an answer.
+    """
+    last = str(math.ceil(seconds) + _GRACE)
+    command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, last]
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{path}: the audit took more than {seconds:g} s and was stopped.", _TOO_LARGE) from None
+    except ValueError as error:
+        raise InputError(f"{quoted(path)} cannot be read: {error}.", "Give the path of a claim in TOML.") from None
+    except OSError as error:
+        raise AuditEnded(f"{path}: the process of the audit cannot be started: {error.strerror}.") from None
+    try:
+        answer = msgspec.json.decode(done.stdout, type=Answer)
+    except msgspec.DecodeError:
+        if _NO_MEMORY in done.stdout + done.stderr:  # FLINT ends the process
+            raise _no_memory(path) from None
+        raise AuditEnded(f"{path}: the process of the audit {_end_of(done)}.", "Try again.") from None
+    if answer.report is not None:
+        return answer.report
+    if answer.error is not None:
+        raise InputError(*answer.error)
+    if answer.depth:
+        raise InputError(f"{path}: the formulas are nested too deeply, and the audit was stopped.", _TOO_LARGE)
+    raise _no_memory(path)
+
+
+def _no_memory(path: str) -> InputError:
+    return InputError(f"{path}: the audit took more than {_BYTES >> 30} GB and was stopped.", _TOO_LARGE)
+
+
+def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
+    """How a process that gave no answer ended."""
+    if done.returncode < 0:
+        try:
+            name = signal.Signals(-done.returncode).name
+        except ValueError:
+            name = f"signal {-done.returncode}"
+        return f"was killed by {name}"
+    last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+    return f"ended without an answer, exit code {done.returncode}" + "".join(f": {line[:200]}" for line in last)
+
+
+def limit_memory() -> None:
+    """Where the platform can: Windows has no such limit."""
+    try:
+        import resource
+    except ImportError:
+        return
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = _BYTES if hard == resource.RLIM_INFINITY else min(_BYTES, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))

@@ -1,0 +1,352 @@
+"""A claim substituted into every equation: a verdict for each, with a proof or a witness.
+
+``holds`` is an identity proven by exact algebra with every condition of the proof discharged; ``refuted`` is a
+witness: exact parameters and a time in the domain, on all relations, where every formula is defined and real and a
+ball excludes 0; anything else is ``undecided`` with a bound at the sample points.  Balls alone never prove.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Protocol, runtime_checkable
+
+import msgspec
+import sympy
+from flint import arb
+
+from heavytop.display import Tabular, TitledTable
+from heavytop.exact.flint.balls import radius as radius_of
+from heavytop.exact.flint.balls import radius_text, value_text
+from heavytop.features.claims.algebra.conditions import conditions_of, is_exactly_zero, written
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Field
+from heavytop.features.claims.algebra.prover import Condition, Prover
+from heavytop.features.claims.algebra.rational import Quotient
+from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.statement import Formulas, Setting, Statement
+from heavytop.features.claims.library.entry import Entry
+from heavytop.top.equations import System
+
+VERDICTS = {True: "holds", False: "refuted", None: "undecided"}
+ABOUT = {
+    "motion": "a motion",
+    "integral": "a first integral",
+    "relation": "an invariant relation",
+    "value": "numbers of a motion",
+}
+"""What a claim of each kind says that its formulas are."""
+_BITS = (192, 1024)
+_MOST_BITS = 300_000
+"""Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
+_LONGEST = 160
+
+
+@dataclass(frozen=True, slots=True)
+class StatementVerdict:
+    """The verdict on one statement.
+
+    holds: True (proven), False (refuted by ``witness``), None (undecided).
+    residual: "0", the closed form where found, else what the balls say.
+    conditions: what the proof rests on; the row is undecided if one is not discharged.
+    figures: of a published number, what is printed, its digits that are right, the proven value.
+    """
+
+    equation: str
+    component: int
+    branch: str
+    domain: str
+    holds: bool | None
+    residual: str
+    statement: str
+    witness: Mapping[str, Any] | None = None
+    note: str = ""
+    conditions: tuple[Condition, ...] = ()
+    figures: Mapping[str, Any] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The row with the keys that scripts rely on."""
+        names = ("equation", "component", "branch", "domain", "holds", "residual", "statement")
+        document: dict[str, Any] = {name: getattr(self, name) for name in names}
+        if self.witness is not None:
+            document["witness"] = dict(self.witness)
+        if self.note:
+            document["where"] = self.note
+        document |= self.figures or {}
+        document["conditions"] = [
+            {"text": c.text, "discharged": c.discharged, "reason": c.reason} for c in self.conditions
+        ]
+        return document
+
+
+def verdict_of(rows: Sequence[StatementVerdict]) -> str:
+    """refuted if one row is, else undecided if one is, else holds."""
+    if any(row.holds is False for row in rows):
+        return "refuted"
+    return "undecided" if any(row.holds is None for row in rows) else "holds"
+
+
+@dataclass(frozen=True, slots=True)
+class ExplanationStep:
+    """A step of the explanation: a statement and the verdict on it."""
+
+    statement: str
+    holds: bool | None
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Audit(Tabular):
+    """The audit of one claim about one system.
+
+    why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
+    satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
+    constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
+    deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
+    """
+
+    claim: str
+    system: str
+    source: str
+    rows: tuple[StatementVerdict, ...]
+    why: tuple[ExplanationStep, ...] = ()
+    solves: tuple[str, ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
+    kind: str = "motion"
+    entry: Entry | None = None
+    deciding: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """``holds``, ``refuted`` or ``undecided``."""
+        return verdict_of(self.rows)
+
+    @property
+    def exit_code(self) -> int:
+        """0 if every equation holds, 1 if one is refuted, 3 if none is but one is undecided."""
+        return {"holds": 0, "refuted": 1, "undecided": 3}[self.verdict]
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``heavytop audit --json``."""
+        return (
+            {
+                "claim": self.claim,
+                "system": self.system,
+                "kind": self.kind,
+                "verdict": self.verdict,
+                "source": self.source,
+                "solves": list(self.solves),
+                "constants": dict(self.constants),
+                "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
+                "equations": [row.to_json() for row in self.rows],
+            }
+            | ({} if self.entry is None else {"entry": msgspec.to_builtins(self.entry)})
+            | self._missing()
+        )
+
+    def _missing(self) -> dict[str, Any]:
+        return {"would_decide": dict(self.deciding)} if self.deciding else {}
+
+    def _table(self) -> TitledTable:
+        lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
+        title = f"{self.claim} as {ABOUT[self.kind]} of {self.system}: {self.verdict}"
+        return TitledTable(title, ("equation", "component", "branch", "domain", "verdict"), lines)
+
+
+def judge(
+    statements: Sequence[Statement], setting: Setting, progress: Callable[[int, int], None] = lambda done, of: None
+) -> tuple[StatementVerdict, ...]:
+    """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
+    statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
+    prover, solved = Prover(statements, setting), setting.with_solutions()
+    second = Prover(statements, solved) if setting.solutions else None
+    rows = []
+    for statement in statements:
+        row = _judge_one(statement, setting, prover)
+        if row.holds is None and second is not None:
+            # with a relation solved for a parameter more is seen, if not always
+            with_solutions = _judge_one(statement, solved, second)
+            row = min(row, with_solutions, key=_what_is_open)
+        rows.append(row)
+        progress(len(rows), len(statements))
+    return tuple(rows)
+
+
+def _what_is_open(row: StatementVerdict) -> tuple[bool, int]:
+    return row.holds is None, sum(not condition.discharged for condition in row.conditions)
+
+
+def _bare(statement: Statement) -> Statement:
+    """An identity that says nothing of a motion rests on what stands in it."""
+    return replace(statement, formulas=Formulas(needs=conditions_of([statement.residual])))
+
+
+def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> StatementVerdict:
+    witness = next(_witnesses(statement, setting, prover), None)
+    proven, conditions = prover.prove(statement)
+    if witness is not None:
+        found = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
+        closed = None if found is None else _closed_form(statement, setting, found)
+        return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
+    for text, rate in statement.flow.kept if statement.flow is not None else ():
+        left = next(_witnesses(replace(statement, residual=rate), setting, prover), None)
+        if left is not None:
+            residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
+            return _row(statement, False, residual, conditions, left)
+    if proven and all(condition.discharged for condition in conditions):
+        return _row(statement, True, "0", conditions)
+    residual = "0 where the conditions are met" if proven else _bound(statement, prover)
+    return _row(statement, None, residual, conditions)
+
+
+def _row(
+    s: Statement,
+    holds: bool | None,
+    residual: str,
+    conditions: tuple[Condition, ...],
+    witness: Mapping[str, Any] | None = None,
+) -> StatementVerdict:
+    name, note = s.domain.label, s.domain.note
+    said = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
+    return StatementVerdict(
+        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said
+    )
+
+
+def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
+    """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
+    always = () if statement.flow is None else statement.flow.always
+    places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
+    for bits in _BITS:
+        for values in places:
+            ball = _ball(statement.residual, values, bits)
+            if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
+                value, radius = _texts(ball)
+                place = {str(symbol): str(number) for symbol, number in values.items()}
+                time = place.pop(str(setting.variable))
+                moving = {} if statement.flow is not None else {str(setting.variable): time}
+                yield {"parameters": place, **moving, "value": value, "radius": radius}
+
+
+def _texts(ball: arb) -> tuple[str, str]:
+    """(value, radius) to 20 digits, whatever the exponent: no exact number is made of one such as exp(-10^9)."""
+    if max(abs(_power_of_2(part)) for part in (ball.mid(), ball.rad())) < _MOST_BITS:
+        return value_text(ball, 20)
+    value, _, radius = ball.str(20).strip("[]").partition(" +/- ")
+    return value, radius or "0"
+
+
+def _power_of_2(number: arb) -> int:
+    """The exponent of an exact number; 0 for 0."""
+    mantissa, exponent = number.man_exp()
+    return int(exponent) + int(mantissa).bit_length() if mantissa else 0
+
+
+def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb | None:
+    """The residual at one place; None where it is undefined there."""
+    try:
+        ball = evaluate(residual, values, bits)
+    except Unprovable:
+        return None
+    return ball if ball.is_finite() else None
+
+
+def _bound(statement: Statement, prover: Prover) -> str:
+    places = [place for place in prover.places(statement) if prover.is_defined(statement, place)]
+    balls = [_ball(statement.residual, values, _BITS[-1]) for values in places]
+    bounds = [abs(ball).upper() for ball in balls if ball is not None]
+    if not bounds:
+        return "undefined at every sample point"
+    largest = max(bounds)
+    if largest == 0:
+        return "0 at the sample points"
+    if _power_of_2(largest) > _MOST_BITS:
+        return f"|residual| < 2^{_power_of_2(largest)} at the sample points"
+    largest = max(largest, arb((1, -_MOST_BITS)))
+    return f"|residual| < {radius_text(radius_of(arb(0, largest)))} at the sample points"
+
+
+def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str | None:
+    """The residual as (constant) · (part), such as -(k/2)·gamma3; else as it stands, if it is short."""
+    try:
+        residual = field_.enter(statement.residual)
+        for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
+            value = field_.enter(part)
+            factor = field_.tower.divide(residual, value) if value.numerator else None
+            if factor is not None and field_.is_constant(factor):
+                return _product_text(_constant_text(factor, setting, field_), name)
+        text = str(field_.expression(residual))
+    except Unprovable:
+        return None
+    return text if len(text) <= _LONGEST else None
+
+
+def _constant_text(factor: Quotient, setting: Setting, field_: Field) -> str:
+    tower = field_.tower
+    for name, constant in setting.constants:
+        ratio = tower.divide(factor, field_.enter(constant))
+        for number, sign in ((1, ""), (-1, "-")):
+            if ratio == tower.number(number):
+                return f"{sign}({name})"
+    return str(field_.expression(factor))
+
+
+def _product_text(factor: str, name: str) -> str:
+    simple = factor.startswith(("(", "-(")) and factor.endswith(")") and factor.count("(") == 1
+    if not name:
+        return factor.replace("(", "", 1)[:-1] if simple else factor
+    if factor in ("1", "-1"):
+        return factor.removesuffix("1") + name
+    return f"{factor}*{name}" if simple or re.fullmatch(r"-?\d+(/\d+)?", factor) else f"({factor})*{name}"
+
+
+# What can be audited: a claim as statements, and one of which more may be assumed.
+
+
+class Auditable(Protocol):
+    """A claim whose formulas can be put into equations."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def entry(self) -> Entry | None: ...
+
+    @property
+    def setting(self) -> Setting: ...
+
+    def about(self, asked: System | None) -> System:
+        """The system that it is judged about, where that one is asked for, or none; raises InputError for another."""
+        ...
+
+    def statements(self, system: System) -> list[Statement]:
+        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
+        ...
+
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
+        """The steps that explain the verdict, and the names of the systems whose motions the claim is.
+
+        rows: the verdicts about the system ``about``, so that they need not be found again.
+        """
+        ...
+
+
+@runtime_checkable
+class Assuming(Auditable, Protocol):
+    """A claim with parameters, of which more may be assumed."""
+
+    @property
+    def unassumed(self) -> list[str]:
+        """Parameters of which the claim assumes nothing."""
+        ...
+
+    def assuming(self, bound: str) -> Auditable:
+        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        ...

@@ -1,0 +1,193 @@
+"""The equations of the heavy top as statements about a claimed motion, and the explanation when (1.2) fails.
+
+The fields, integrals and angles are those of :mod:`heavytop.top`, over sympy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import sympy
+
+from heavytop.features.claims.algebra.conditions import Need
+from heavytop.features.claims.algebra.statement import Domain, Formulas, Statement
+from heavytop.features.claims.audit.judge import ExplanationStep
+from heavytop.precision import cross, dot
+from heavytop.top.attitude import gamma_from_angles, omega_from_angles
+from heavytop.top.equations import (
+    GYROSTAT,
+    HEAVY_GYROSTAT,
+    HEAVY_TOP,
+    Parameters,
+    System,
+    area,
+    area_with_rotor,
+    energy,
+    gamma_squared,
+    gyrostat_energy,
+    momentum,
+    momentum_squared,
+)
+
+SYMBOLIC = SimpleNamespace(
+    sqrt=sympy.sqrt,
+    exp=sympy.exp,
+    log=sympy.log,
+    sin=sympy.sin,
+    cos=sympy.cos,
+    tanh=sympy.tanh,
+    sech=sympy.sech,
+    arctan=sympy.atan,
+    arccos=sympy.acos,
+    atan2=sympy.atan2,
+)
+
+Derivative = Callable[[sympy.Expr], sympy.Expr]
+Triple = tuple[sympy.Expr, sympy.Expr, sympy.Expr]
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimedMotion:
+    """A claimed motion on one branch and domain, as expressions.
+
+    rate: the derivative in time.  angles: (φ, θ); rates: (φ', θ', ψ').
+    constants: (|γ|², C0, C1) that (1.3) should have; without them (1.3) says that the three are constant.
+    needs: what Ω and γ need to be defined.  attitude, angle_needs, pole: as in Formulas.
+    clock: of a quadrature, F' and 1/F', which have to be continuous for the motion to exist.
+    """
+
+    branch: str
+    domain: Domain
+    omega: Triple
+    gamma: Triple
+    rate: Derivative
+    phi: sympy.Expr | None = None
+    rates: Triple | None = None
+    constants: Triple | None = None
+    needs: frozenset[Need] = frozenset()
+    attitude: tuple[sympy.Expr, ...] = ()
+    angle_needs: frozenset[Need] = frozenset()
+    pole: str = ""
+    clock: tuple[sympy.Expr, ...] = ()
+
+    @property
+    def state(self) -> tuple[sympy.Expr, ...]:
+        """The six variables in the order of the state."""
+        return (*self.omega, *self.gamma)
+
+    @property
+    def formulas(self) -> Formulas:
+        """What the equations in Ω and γ rest on."""
+        return Formulas((*self.state, *self.clock), self.needs)
+
+    @property
+    def angle_formulas(self) -> Formulas:
+        """What the equations in the angles rest on."""
+        return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
+
+
+def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
+    """γ and ξ of the angles: they are continuous where the attitude is, at the poles too."""
+    sine, cosine = sympy.sin(phi), sympy.cos(phi)
+    tilt = sympy.cos(theta)
+    xi = (
+        sympy.cos(psi) * cosine - tilt * sine * sympy.sin(psi),
+        -sympy.cos(psi) * sine - tilt * cosine * sympy.sin(psi),
+        sympy.sin(theta) * sympy.sin(psi),
+    )
+    return (*gamma_from_angles(phi, theta, SYMBOLIC), *xi)
+
+
+def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
+    """(1.1), (1.2), (1.3) and, where there are angles, (3.1), each component, about ``system``."""
+    y = motion.state
+    turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
+    torque = "" if system is GYROSTAT else " + P*gamma x r"
+    carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
+    field = system.rates(p, y)
+    for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
+        text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}{carried}"
+        residual = motion.rate(value) - claimed
+        yield _statement("1.2" if index >= 3 else "1.1", index % 3 + 1, motion, residual, text)
+    yield from _integral_statements(motion, p, system)
+    if motion.phi is not None and motion.rates is not None:
+        turned = omega_from_angles(motion.gamma, motion.phi, motion.rates, SYMBOLIC)
+        actual = system.angular_velocity(p, y)
+        for component, (ours, theirs) in enumerate(zip(actual, turned, strict=True), 1):
+            text = f"{turning} = psi', theta', phi' of the angles"
+            statement = _statement("3.1", component, motion, ours - theirs, text)
+            yield replace(statement, formulas=motion.angle_formulas)
+
+
+def _integral_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
+    about_gamma, third = {
+        HEAVY_TOP.name: (area, (energy, "Omega.M/2 + P*r.gamma", "C1")),
+        GYROSTAT.name: (area, (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")),
+        HEAVY_GYROSTAT.name: (area_with_rotor, (energy, "Omega.(M - k)/2 + P*r.gamma", "C1")),
+    }[system.name]
+    known = (gamma_squared, "|gamma|^2", "1"), (about_gamma, "M.gamma", "C0"), third
+    for component, (integral, left, right) in enumerate(known, 1):
+        text = f"{left} = {right}"
+        value = integral(p, motion.state)
+        if motion.constants is not None:
+            yield _statement("1.3", component, motion, value - motion.constants[component - 1], text)
+        elif component == 1:
+            yield _statement("1.3", component, motion, value - 1, text)
+        else:
+            yield _statement("1.3", component, motion, motion.rate(value), f"{left} is constant")
+
+
+def _statement(equation: str, component: int, motion: ClaimedMotion, residual: sympy.Expr, text: str) -> Statement:
+    return Statement(equation, component, motion.branch, motion.domain, residual, text, motion.formulas)
+
+
+def why_not_equivalent() -> Sequence[ExplanationStep]:
+    """The general steps, each a polynomial identity in Ω, γ, δ, I and P r, checked by expanding it.
+
+    Along (1.1) with γ' = γ × Ω + δ the rates of (1.3) are 2γ·δ, M·δ and P r·δ; so they force δ = 0 only where
+    det(γ, M, r) is not 0.  And |M|² = C0² with (1.3) makes |M − C0 γ|² = 0.
+    """
+    omega, gamma, delta, inertia, moment = (
+        sympy.symbols(f"{name}1:4") for name in ("Omega", "gamma", "delta", "I", "n")
+    )
+    p = Parameters(inertia, moment, sympy.Integer(0))
+    state = (*omega, *gamma)
+    field = HEAVY_TOP.rates(p, state)
+    rates = (*field[:3], *(g + d for g, d in zip(field[3:], delta, strict=True)))
+
+    def rate(value: sympy.Expr) -> sympy.Expr:
+        return sum((sympy.diff(value, x) * dx for x, dx in zip(state, rates, strict=True)), sympy.Integer(0))
+
+    m = momentum(p, state)
+    c0 = sympy.Symbol("C0")
+    off = [ours - c0 * g for ours, g in zip(m, gamma, strict=True)]
+    square = momentum_squared(p, state) - 2 * c0 * area(p, state) + c0**2 * gamma_squared(p, state)
+    along = "with gamma' = gamma x Omega + delta and (1.1):"
+    identities = [
+        (
+            "|M|^2 = C0^2 with (1.3) makes |M - C0*gamma|^2 = C0^2 - 2*C0*C0 + C0^2 = 0: M is parallel to gamma (2.1)",
+            dot(off, off) - square,
+        ),
+        (f"{along} (|gamma|^2)' = 2*gamma.delta", rate(gamma_squared(p, state)) - 2 * dot(gamma, delta)),
+        (f"{along} (M.gamma)' = M.delta", rate(area(p, state)) - dot(m, delta)),
+        (f"{along} (energy)' = P*r.delta", rate(energy(p, state)) - dot(moment, delta)),
+        (
+            "so (1.3) constant gives (1.2) only where det(gamma, M, r) is not 0; for M = C0*gamma it is 0",
+            dot(cross(gamma, [c0 * g for g in gamma]), moment),
+        ),
+    ]
+    return [ExplanationStep(text, True if sympy.expand(identity) == 0 else None) for text, identity in identities]
+
+
+def determinant(motion: ClaimedMotion, p: Parameters) -> Statement:
+    """det(γ, M, P r) = 0 along the claim."""
+    value = dot(cross(motion.gamma, momentum(p, motion.state)), p.moment)
+    return Statement(
+        "det(gamma, M, r)", 1, motion.branch, motion.domain, value, "det(gamma, M, P*r) = 0", motion.formulas
+    )
+
+
+SYSTEMS = (HEAVY_TOP, GYROSTAT)
+"""Those of the paper, and of tops without k."""

@@ -1,0 +1,481 @@
+"""A motion claimed in a file as statements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import islice
+
+import sympy
+
+from heavytop.errors import InputError
+from heavytop.features.claims.algebra.conditions import (
+    Need,
+    all_over,
+    conditions_for_zero,
+    is_exactly_zero,
+    is_small_polynomial,
+    on_conditions,
+)
+from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.prover import shortest
+from heavytop.features.claims.algebra.reader import Formula, parse
+from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.statement import AFTER, ALL, Flow, Formulas, Place, Setting, Statement
+from heavytop.features.claims.algebra.structure import Names, rate_along
+from heavytop.features.claims.audit.context import (
+    STATE,
+    TIME,
+    ClaimedMotionTable,
+    ClaimFile,
+    Clock,
+    Context,
+    FileClaim,
+    IntegralTable,
+    needs_of,
+    read_clock,
+    sample_number,
+    setting_of,
+    three,
+    variable_of,
+)
+from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.statements import SYMBOLIC, ClaimedMotion, Triple, attitude, motion_statements
+from heavytop.precision import shown
+from heavytop.top.attitude import omega_from_angles
+from heavytop.top.equations import GYROSTAT, System
+
+
+def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
+    return formulas[0].expression, formulas[1].expression, formulas[2].expression
+
+
+@dataclass(frozen=True)
+class UserMotion(FileClaim):
+    """A motion claimed in a file."""
+
+    motion: ClaimedMotion = field(init=False)
+    clock: Clock = field(init=False)
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """t, or the variable of the quadrature."""
+        return (variable_of(self.content),)
+
+    def __post_init__(self) -> None:
+        FileClaim.__post_init__(self)
+        assert self.content.motion is not None
+        object.__setattr__(self, "clock", _with_times(read_clock(self.content, self.context), self.content))
+        object.__setattr__(self, "context", _with_constant_rotor(self.context, self.clock))
+        motion = _read_motion(self.content.motion, self.context, self.clock)
+        object.__setattr__(self, "motion", motion)
+
+    @property
+    def setting(self) -> Setting:
+        """The file's assumptions and samples; γ as the part through which residuals are written."""
+        parts = tuple((f"gamma{index}", part) for index, part in enumerate(self.motion.gamma, 1))
+        return replace(setting_of(self.context, self.clock.variable), parts={"smooth": parts})
+
+    def statements(self, system: System) -> list[Statement]:
+        """(1.1)-(1.3), (3.1) where angles are claimed, and (3.2) where γ is claimed beside them."""
+        motion = self.motion
+        if system is GYROSTAT:
+            motion = replace(motion, needs=motion.needs | self.context.rotor_needs)
+        return [*motion_statements(motion, self.context.parameters(system), system), *self._angles_give_gamma()]
+
+    def _angles_give_gamma(self) -> Iterator[Statement]:
+        table = self.content.motion
+        if table is not None and table.angles is not None and table.gamma is not None:
+            turned = self.motion.attitude[:3]
+            for component, (ours, theirs) in enumerate(zip(turned, self.motion.gamma, strict=True), 1):
+                text = "(3.2): gamma of the angles is gamma"
+                formulas = self.motion.angle_formulas
+                yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
+
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
+        """No steps; the systems whose (1.1), (1.2) are proven, with |γ| = 1."""
+        return [], tuple(s.name for s in self.context.systems if self._verdict(s, about, rows) == "holds")
+
+    def _verdict(self, system: System, about: System, rows: Sequence[StatementVerdict]) -> str:
+        if system is about:
+            return verdict_of([row for row in rows if _is_of_motion(row)])
+        return verdict_of(judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting))
+
+
+def _is_of_motion(row: StatementVerdict | Statement) -> bool:
+    """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
+    return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
+
+
+def _with_constant_rotor(context: Context, clock: Clock) -> Context:
+    """The rotor as the algebra writes it, without t; raises InputError where t is left."""
+    if context.rotor is None or clock.variable not in context.rotor.free_symbols:
+        return context
+    rotor = shortest(context.rotor, setting_of(context, clock.variable), clock.domain)
+    return context.with_rotor(rotor, clock.variable not in rotor.free_symbols)
+
+
+def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> ClaimedMotion:
+    rate, domain, names, needs = clock.rate, clock.domain, context.names, context.needs | clock.needs
+
+    def reduced(formulas: Triple) -> Triple:
+        first, second, third = (shortest(formula, setting_of(context, clock.variable), domain) for formula in formulas)
+        return first, second, third
+
+    if table.angles is None and (table.omega is None or table.gamma is None):
+        raise InputError("[motion] has neither angles nor both omega and gamma.", "Give omega and gamma, or angles.")
+    phi = rates = None
+    turned: tuple[sympy.Expr, ...] = ()
+    angle_needs: frozenset[Need] = frozenset()
+    if table.angles is not None:
+        formulas = three(table.angles, names, "motion.angles")
+        phi, theta, psi = reduced(_expressions(formulas))
+        rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
+        angle_needs = needs_of(formulas)
+    gamma: Triple
+    if table.gamma is not None:
+        formulas = three(table.gamma, names, "motion.gamma")
+        gamma, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
+    else:
+        gamma, needs = turned[:3], needs | angle_needs
+    if table.omega is not None:
+        formulas = three(table.omega, names, "motion.omega")
+        omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
+    else:
+        assert rates is not None  # angles are required where Ω is not given
+        omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
+    return ClaimedMotion(
+        "smooth",
+        domain,
+        omega,
+        gamma,
+        rate,
+        phi,
+        rates,
+        needs=needs,
+        attitude=turned,
+        angle_needs=angle_needs,
+        clock=clock.values,
+    )
+
+
+def _with_times(clock: Clock, content: ClaimFile) -> Clock:
+    """With the times of the file as the first that a witness is looked for at."""
+    domain = clock.domain
+    if content.times is None:
+        return clock
+    times = tuple(sample_number(time, "times") for time in content.times)
+    if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
+        raise InputError(
+            f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
+        )
+    return replace(
+        clock, domain=replace(domain, points=(*times, *(point for point in domain.points if point not in times)))
+    )
+
+
+# Exact states on the conditions of a claim, where its file gives none: by elimination and a small search.
+#
+# A variable that occurs linearly is solved for, a polynomial in one variable gives its rational roots, and otherwise a
+# variable is given a value from a short list.  What is found is only proposed: whoever uses it proves that it lies on
+# the conditions.
+
+
+# with points of the unit circle and sphere, such as (3/5, 4/5) and (2/3, 1/3, 2/3)
+_VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
+# the last for conditions with irrational numbers, which may have rational points at 0 only
+_SCALES = (1, -1, 1, -1, 20, -20, 0)
+_MOST_STEPS = 300
+_MOST_FOUND = 24
+
+
+def states_on(
+    conditions: Sequence[sympy.Expr],
+    variables: Sequence[sympy.Symbol],
+    parameters: Mapping[sympy.Symbol, Fraction],
+) -> Iterator[dict[sympy.Symbol, Fraction]]:
+    """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters; none if not found."""
+    numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in parameters.items()}
+    # divisors that are 0 there are refused where the state is checked
+    equations = [
+        # one zero of sin u is as good as another
+        sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True).replace(sympy.sin, lambda u: u)))
+        for condition in conditions
+    ]
+    if all(is_small_polynomial(equation) and equation.free_symbols <= set(variables) for equation in equations):
+        yield from _Search(variables).states(equations)
+
+
+class _Search:
+    """Depth first, with an end to the number of steps."""
+
+    def __init__(self, variables: Sequence[sympy.Symbol]) -> None:
+        self._variables = tuple(variables)
+        self._steps = 0
+
+    def states(self, equations: Sequence[sympy.Expr]) -> Iterator[dict[sympy.Symbol, Fraction]]:
+        """What is found, up to a number."""
+        yield from islice(self._solve([sympy.expand(equation) for equation in equations], {}, 0), _MOST_FOUND)
+
+    def _solve(
+        self, equations: list[sympy.Expr], known: dict[sympy.Symbol, sympy.Expr], depth: int
+    ) -> Iterator[dict[sympy.Symbol, Fraction]]:
+        """Completions of ``known``: expressions of variables in those that are still free."""
+        self._steps += 1
+        equations = [equation for equation in equations if equation != 0]
+        if self._steps > _MOST_STEPS or any(equation.is_number for equation in equations):
+            return
+        if not equations:
+            yield from self._filled(known, depth)
+            return
+        solved = self._linear(equations)
+        if solved is not None:
+            yield from self._put(*solved, equations, known, depth)
+            return
+        shortest = min(equations, key=lambda equation: (len(equation.free_symbols), str(equation)))
+        for factor, _ in sympy.factor_list(shortest)[1]:
+            others = [factor, *(equation for equation in equations if equation is not shortest)]
+            if factor != shortest and self._linear([factor]) is not None:
+                yield from self._solve(others, known, depth)
+                continue
+            symbols = [x for x in self._variables if x in factor.free_symbols]
+            if len(symbols) == 1:
+                for value in sympy.Poly(factor, symbols[0]).ground_roots():
+                    yield from self._put(symbols[0], value, others, known, depth)
+                continue
+            # what is left is to be as simple as can be: the variable of the highest power gets a value first
+            x = max(symbols, key=lambda symbol: (sympy.degree(factor, symbol), str(symbol)))
+            for index in range(len(_VALUES)):
+                yield from self._put(x, _VALUES[(index + depth) % len(_VALUES)], others, known, depth + 1)
+
+    def _linear(self, equations: Sequence[sympy.Expr]) -> tuple[sympy.Symbol, sympy.Expr] | None:
+        """A variable that one of the equations gives as a polynomial in the others."""
+        for equation in equations:
+            for x in reversed(self._variables):
+                if x in equation.free_symbols:
+                    p = sympy.Poly(equation, x)
+                    if p.degree() == 1 and p.nth(1).is_number:
+                        return x, -p.nth(0) / p.nth(1)
+        return None
+
+    def _put(
+        self,
+        x: sympy.Symbol,
+        value: sympy.Expr,
+        equations: Sequence[sympy.Expr],
+        known: Mapping[sympy.Symbol, sympy.Expr],
+        depth: int,
+    ) -> Iterator[dict[sympy.Symbol, Fraction]]:
+        reduced = [sympy.expand(equation.subs(x, value)) for equation in equations]
+        values = {symbol: expression.subs(x, value) for symbol, expression in known.items()}
+        yield from self._solve(reduced, {**values, x: value}, depth)
+
+    def _filled(self, known: Mapping[sympy.Symbol, sympy.Expr], depth: int) -> Iterator[dict[sympy.Symbol, Fraction]]:
+        """With values for what is free: of either sign, and of several sizes."""
+        free = [x for x in self._variables if x not in known]
+        for turn, scale in enumerate(_SCALES if free else _SCALES[:1]):
+            values = {x: scale * _VALUES[(turn + i + depth) % (len(_VALUES) - 1)] for i, x in enumerate(free)}
+            numbers = {
+                x: known[x].subs(values, simultaneous=True) if x in known else values[x] for x in self._variables
+            }
+            if all(number.is_Rational for number in numbers.values()):
+                yield {x: Fraction(int(number.p), int(number.q)) for x, number in numbers.items()}
+
+
+# A first integral or an invariant relation claimed in a file as statements.
+
+
+Rate = Callable[[sympy.Expr], sympy.Expr]
+_STATES = (
+    ("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"),
+    ("1", "2", "-1", "3/5", "0", "4/5"),
+    # of other signs, and beyond the first period of an angle
+    ("-4", "-7/2", "9/2", "-2/7", "6/7", "-3/7"),
+)
+# states of our own, where a file gives none
+_ENOUGH = 3
+_BITS = 192
+# 0 at every state of a body: |γ|² - 1
+_OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
+
+
+@dataclass(frozen=True)
+class UserIntegral(FileClaim):
+    """A first integral or an invariant relation claimed in a file."""
+
+    value: Formula = field(init=False)
+    where: tuple[Formula, ...] = field(init=False)
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """Ω and γ."""
+        return tuple(STATE)
+
+    def __post_init__(self) -> None:
+        FileClaim.__post_init__(self)
+        table = self._table
+        object.__setattr__(self, "value", parse(table.value, self.context.names, "integral.value"))
+        where = tuple(parse(text, self.context.names, "integral.where") for text in table.where)
+        object.__setattr__(self, "where", where)
+        _check_states(table)
+        object.__setattr__(self, "context", self._with_constant_rotor())
+
+    def _with_constant_rotor(self) -> Context:
+        """The context; raises InputError unless the rotor is constant along the motion of the gyrostat."""
+        rotor = self.context.rotor
+        if rotor is None or not rotor.free_symbols & frozenset(STATE):
+            return self.context
+        change = self._rate(GYROSTAT)(rotor)
+        try:
+            is_constant = Field(setting_of(self.context, TIME).assumptions(0), [change]).vanishes(change)
+        except Unprovable:
+            is_constant = False
+        return self.context.with_rotor(rotor, is_constant)
+
+    @property
+    def _table(self) -> IntegralTable:
+        assert self.content.integral is not None
+        return self.content.integral
+
+    @cached_property
+    def setting(self) -> Setting:
+        """The file's assumptions; the samples are its parameters at each of the states."""
+        base = setting_of(self.context, TIME)
+        conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
+        samples = tuple({**row, **state} for row in self.context.samples for state in self._states(conditions, row))
+        relations = (*base.relations, *conditions)
+        ranges = (*base.ranges, *((component, (Fraction(-1), Fraction(1))) for component in STATE[3:]))
+        return replace(base, samples=samples, relations=(*relations, _OFF_SPHERE) if relations else (), ranges=ranges)
+
+    @property
+    def _zero(self) -> tuple[Formula, ...]:
+        """What is 0 where the claim is made."""
+        return (*self.where, self.value) if self.kind == "relation" else self.where
+
+    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
+        """The states of the file; without them states of our own, on the conditions where such are found."""
+        given = _numbers(self._table.states or _STATES)
+        if self._table.states is not None:
+            return given
+        needs = needs_of([self.value, *self.where])
+
+        def serves(state: Place) -> bool:
+            place = {**parameters, **state}
+            return all(is_exactly_zero(c, place) for c in conditions) and all(need.is_met(place) for need in needs)
+
+        if any(serves(state) for state in given):
+            return given
+        found = [*islice(filter(serves, states_on([*conditions, _OFF_SPHERE], STATE, parameters)), _ENOUGH)]
+        return found or given
+
+    def statements(self, system: System) -> list[Statement]:
+        """dF/dt = 0 along the field of ``system``, on the conditions."""
+        rate = self._rate(system)
+        needs = needs_of([self.value, *self.where]) | self.context.needs
+        if system is GYROSTAT:
+            needs |= self.context.rotor_needs
+        text = "dF/dt = 0 along the motion"
+        if self.kind == "relation":
+            text += ", where F = 0"
+        if self.where:
+            text += ", where the conditions hold"
+        value, named, names = self._with_names(rate, needs)
+        is_relation = self.kind == "relation"
+        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), is_relation, (_OFF_SPHERE,), names)
+        # a condition in simpler words is the same set
+        where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
+        rotor = (self.context.rotor,) if system is GYROSTAT and self.context.rotor is not None else ()
+        values = (*self._parts(value), *where, *rotor)
+        domain = replace(ALL, points=(Fraction(0),))
+        formulas = Formulas(values, named, sampled=needs)
+        return [
+            Statement("dF/dt", component, "smooth", domain, self._on_relations(rate(part)), text, formulas, flow)
+            for component, part in enumerate(self._parts(value), 1)
+        ]
+
+    def _rate(self, system: System) -> Rate:
+        """The derivative along the field of ``system``."""
+        rates = system.rates(self.context.parameters(system), STATE)
+        return rate_along(dict(zip(STATE, rates, strict=True)))
+
+    def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
+        """What has to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
+        if self.kind != "relation" or value.is_polynomial(*STATE):
+            return (value,)
+        return conditions_for_zero(value) or (value,)
+
+    def _kept(self, rate: Rate) -> tuple[tuple[str, sympy.Expr], ...]:
+        """The side conditions with their rates; a relation has none of its own where it is as simple as can be."""
+        simpler = {formula: conditions_for_zero(formula.expression) for formula in self._zero}
+        return tuple(
+            (str(formula.expression if len(parts) == 1 else part), self._on_relations(rate(part)))
+            for formula, parts in simpler.items()
+            for part in parts
+            if formula in self.where or parts != (self.value.expression,)
+        )
+
+    def _on_relations(self, rate: sympy.Expr) -> sympy.Expr:
+        return on_conditions(rate, (*self.setting.relations, _OFF_SPHERE))
+
+    def _with_names(
+        self, rate: Rate, needs: frozenset[Need]
+    ) -> tuple[sympy.Expr, frozenset[Need], dict[sympy.Symbol, sympy.Expr]]:
+        """(F, its needs, symbols): first integrals in F have got symbols, where nothing else of the state is left.
+
+        F is written as it is where |γ| = 1.
+        """
+        if self.kind == "relation":
+            return self.value.expression, needs, {}
+        value = all_over(self.value.expression, [_OFF_SPHERE])
+        assumptions = self.setting.assumptions(0)
+        state = frozenset(STATE)
+        names = Names(state, lambda e: _is_constant(rate(e), assumptions, self.setting.samples))
+        named = names.put_into(value)
+        if named.free_symbols & state:
+            return value, needs, {}
+        renamed = frozenset(
+            Need(need.kind, names.put_into(all_over(need.expression, [_OFF_SPHERE])), need.text) for need in needs
+        )
+        return named, renamed, names.meanings
+
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
+        """No steps; the systems that keep it, by proof."""
+        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
+        return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
+
+
+def _numbers(states: Sequence[Sequence[str]]) -> list[Place]:
+    """The states of a file, exactly."""
+    return [
+        {symbol: sample_number(text, f"states: {symbol}") for symbol, text in zip(STATE, values, strict=True)}
+        for values in states
+    ]
+
+
+def _check_states(table: IntegralTable) -> None:
+    """Raises InputError for a state that no body has: off |γ| = 1."""
+    for index, state in enumerate(_numbers(table.states or ()), 1):
+        size = sum((state[symbol] ** 2 for symbol in STATE[3:]), Fraction(0))
+        if size != 1:
+            raise InputError(
+                f"State {index} of [integral] has |gamma|^2 = {shown(size)}, not 1: gamma is a unit vector.",
+                "Give rational components such as 3/5, 0, 4/5 or 2/3, -1/3, 2/3.",
+            )
+
+
+def _is_constant(
+    rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Mapping[sympy.Symbol, Fraction]]
+) -> bool:
+    """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
+    try:
+        # what is not 0 at a sample need not be taken into the algebra
+        balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
+        if any(ball.is_finite() and not ball.contains(0) for ball in balls):
+            return False
+        field = Field(assumptions, [rate])
+    except Unprovable:
+        return False
+    return field.is_zero(rate) and all(field.tower.signs.of(p).strict for p in field.tower.divisors.values())

@@ -1,0 +1,552 @@
+"""Claims of kind `value`: published numbers of a state, against balls that are proven to hold the true ones.
+
+Each number has a verdict of its own: it is right where the ball lies within the source's tolerance of it, or within
+half a unit of its last digit; wrong where the ball lies outside; and undecided otherwise.  The balls are those of
+closed forms and validated enclosures (:mod:`heavytop.exact.bodies`), made narrower until they decide.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import msgspec
+from flint import arb
+
+from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.exact.flint.balls import (
+    FUNCTIONS,
+    ball,
+    midpoint,
+    radius,
+    radius_text,
+    require_handy,
+    whole_evaluation,
+    working_precision,
+)
+from heavytop.features.claims.audit.judge import StatementVerdict
+from heavytop.features.claims.library.entry import Entry
+from heavytop.precision import decimal_text, dot, exact, round_to
+from heavytop.top.attitude import Output
+from heavytop.top.bodies import motion_of
+from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    from heavytop.exact.bodies import BodyMotion
+    from heavytop.top.attitude import Attitude
+    from heavytop.top.bodies import Body
+    from heavytop.top.equations import Integral, Parameters, System
+
+
+# A number as it stands in print: its value, the unit of its last digit, and how many of its digits are right.
+
+
+_DECIMAL = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:\.(?P<part>[0-9]*))?(?:[eEdD](?P<power>[+-]?[0-9]{1,5}))?")
+_MINUS = "\N{MINUS SIGN}"
+_MOST_DIGITS = 1_000
+_LARGEST_POWER = 9_000
+_REMEDY = "Write it as it is printed, as text: a decimal such as 0.450, -1.5e-3 or 12; its zeros at the end count."
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedNumber:
+    """A decimal number with so many digits written; zeros at the end count, those at the front do not.
+
+    text: as it is printed.  unit: of the last digit.  digits: from the first that is not 0; of 0.000 all of them.
+    """
+
+    text: str
+    value: Fraction
+    unit: Fraction
+    digits: int
+
+    @classmethod
+    def read(cls, text: str, what: str) -> PrintedNumber:
+        """Raises InputError for what is no decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
+        plain = text.strip().replace(_MINUS, "-")
+        found = _DECIMAL.fullmatch(plain)
+        whole, part = (found["whole"], found["part"] or "") if found is not None else ("", "")
+        if found is None or not whole + part:
+            raise InputError(f"{what}: {quoted(text)} is no decimal number.", _REMEDY)
+        power = int(found["power"] or 0)
+        if len(whole + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
+            raise InputError(
+                f"{what}: {quoted(text)} is too long a number.",
+                f"Give at most {_MOST_DIGITS} digits, and exponents up to {_LARGEST_POWER}.",
+            )
+        unit = Fraction(10) ** (power - len(part))
+        size = int(whole + part)
+        digits = len(str(size)) if size else len(part) + 1
+        return cls(text.strip(), (-size if plain.startswith("-") else size) * unit, unit, digits)
+
+    def right(self, error: Fraction) -> int:
+        """How many digits are right of a number that is off by ``error`` ≥ 0: the most that are so to half a unit."""
+        room = self.unit / 2
+        count = self.digits
+        while count and error > room:
+            count, room = count - 1, room * 10
+        return count
+
+    @property
+    def half_unit(self) -> Fraction:
+        """Half a unit of the last digit: by so much the true number may be off and be printed so."""
+        return self.unit / 2
+
+
+Text = Annotated[str, msgspec.Meta(max_length=20_000)]
+Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Matrix = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
+
+SIZES = {"omega": 3, "gamma": 3, "quaternion": 4, "position": 3}
+"""Components of each quantity; a first integral has one."""
+_FIRST_BITS, _FEWEST_BITS, _MOST_BITS = 64, 20, 66_500
+"""Absolute bits of the balls: what is tried first, what is tried where that is out of reach, and where it ends."""
+_SPARE_BITS = 24
+_DOUBLINGS = 3
+_MORE_DIGITS, _WITNESS_DIGITS = 5, 20
+"""Digits of the proven value that are shown beyond those printed, and of the difference."""
+_INVARIANT = ("gamma_squared", "area", "energy", "momentum_squared")
+"""First integrals that are the same in any axes."""
+
+
+class PrincipalTopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[top]: in principal axes."""
+
+    inertia: Three
+    weight: Text
+    centre: Three
+    rotor: Text | Three | None = None
+
+
+class BodyTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[body]: in any axes; the tensor as 3, 6 or 9 numbers, or three rows."""
+
+    mass: Text
+    gravity: Text
+    centre: Three
+    inertia: Matrix
+    about: str | None = None
+    rotor: Three | None = None
+
+
+class StartTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[start]: Ω in body or space axes, and γ or an attitude; normalize: of numbers that are off by their rounding."""
+
+    omega: Three | None = None
+    omega_space: Three | None = None
+    gamma: Three | None = None
+    quaternion: list[Text] | None = None
+    matrix: Matrix | None = None
+    euler: Text | None = None
+    axis_angle: Text | None = None
+    normalize: bool = False
+
+
+class ValueTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[[value]]: one number.  component: 1, 2, 3, of a quaternion w, x, y, z 1 to 4, of a first integral none or 1."""
+
+    time: Text
+    quantity: Text
+    number: Text
+    component: Annotated[int, msgspec.Meta(ge=1, le=4)] | None = None
+    tolerance: Text | None = None
+
+
+class ValueFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole file."""
+
+    name: Annotated[str, msgspec.Meta(max_length=80)]
+    kind: Literal["value"]
+    start: StartTable
+    value: Annotated[list[ValueTable], msgspec.Meta(min_length=1, max_length=2_000)]
+    top: PrincipalTopTable | None = None
+    body: BodyTable | None = None
+    system: str | None = None
+    source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One published number, read.
+
+    time_text: as the file has it.  tolerance: that of the source; None for half a unit of the last digit.
+    """
+
+    time: Fraction
+    time_text: str
+    quantity: str
+    component: int
+    number: PrintedNumber
+    tolerance: Fraction | None
+    tolerance_text: str = ""
+
+    @property
+    def allowed(self) -> Fraction:
+        """By how much it may be off."""
+        return self.number.half_unit if self.tolerance is None else self.tolerance
+
+    @property
+    def bits(self) -> int:
+        """Absolute bits of a ball that decides it, most times."""
+        least = min(self.number.half_unit, self.allowed or self.number.half_unit)
+        return max(0, least.denominator.bit_length() - least.numerator.bit_length()) + _SPARE_BITS
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What a ball says of a number.
+
+    holds: None where it is too wide.  right: digits that are proven to be right.  decided: whether a narrower ball
+    would say no more.  middle, wide: of the ball.  off: by how much the number is off, as an interval.
+    """
+
+    holds: bool | None
+    right: int
+    decided: bool
+    middle: Fraction
+    wide: Fraction
+    off: tuple[Fraction, Fraction]
+
+
+def judge_figure(figure: Figure, known: Fraction | arb) -> Judgement:
+    """The verdict on a number whose true value is ``known``, exactly or as a ball."""
+    middle, wide = (known, Fraction(0)) if isinstance(known, Fraction) else (midpoint(known), radius(known))
+    apart = abs(figure.number.value - middle)
+    low, high = max(Fraction(0), apart - wide), apart + wide
+    holds = True if high <= figure.allowed else False if low > figure.allowed else None
+    least, most = figure.number.right(high), figure.number.right(low)
+    return Judgement(holds, least, holds is not None and least == most, middle, wide, (low, high))
+
+
+@dataclass(frozen=True)
+class ValueClaim:
+    """Published numbers of one motion."""
+
+    content: ValueFile
+    entry: Entry | None = None
+    kind: str = "value"
+    figures: tuple[Figure, ...] = field(init=False)
+    given: tuple[HeavyTop | Body, State] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "figures", tuple(_figures(self.content.value)))
+        object.__setattr__(self, "given", _given(self.content))
+
+    @property
+    def name(self) -> str:
+        """As the file has it."""
+        return self.content.name
+
+    @property
+    def source(self) -> str:
+        """As the file has it."""
+        return self.content.source
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
+
+        Raises InputError where the file names another one, or the system does not admit the body.
+        """
+        from heavytop.features.claims.audit.context import of_file
+        from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, require_no_other_rotor
+
+        usual = HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT
+        found = of_file(asked, self.content.system, usual)
+        require_no_other_rotor(found, self.given[0])
+        return found
+
+    def rows(self, about: System) -> tuple[StatementVerdict, ...]:
+        """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
+        motion = _KnownNumbers(*self.given, about)
+        motion.require(self.figures)
+        try:
+            motion.require_handy(self.figures)
+        except OutOfReach as error:
+            return tuple(_open_row(figure, "not known", f"{error.cause} {error.remedy}") for figure in self.figures)
+        found: dict[Figure, StatementVerdict] = {}
+        groups: dict[tuple[Fraction, str], list[Figure]] = {}
+        for figure in self.figures:
+            groups.setdefault((figure.time, figure.quantity), []).append(figure)
+        for group in groups.values():
+            found |= zip(group, _rows_of(group, motion), strict=True)
+        return tuple(found[figure] for figure in self.figures)
+
+
+def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
+    """The numbers of a file; raises InputError for what is none, and where one stands twice."""
+    seen: dict[tuple[Fraction, str, int], int] = {}
+    for index, table in enumerate(tables, 1):
+        where = f"value {index}"
+        time = _number(table.time, f"{where}: time")
+        size = SIZES.get(table.quantity, 1)
+        component = table.component or 1
+        if component > size or (table.component is None and size > 1):
+            lacks = "of a component that is not named" if table.component is None else f"has no component {component}"
+            raise InputError(f"{where}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
+        place = time, table.quantity, component
+        if seen.setdefault(place, index) != index:
+            raise InputError(
+                f"{where}: {table.quantity[:40]} {component} at t = {table.time[:40]} stands in value "
+                f"{seen[place]} already.",
+                "Give each number once.",
+            )
+        tolerance = None if table.tolerance is None else _number(table.tolerance, f"{where}: tolerance")
+        if tolerance is not None and tolerance < 0:
+            raise InputError(
+                f"{where}: the tolerance {table.tolerance} is negative.", "Give it as 1e-10, or not at all."
+            )
+        number = PrintedNumber.read(table.number, f"{where}: number")
+        yield Figure(time, table.time.strip(), *place[1:], number, tolerance, (table.tolerance or "").strip())
+
+
+def _number(text: str, what: str) -> Fraction:
+    try:
+        return exact(text)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+
+
+def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
+    """The body and its start; raises InputError for what is none."""
+    if (content.top is None) == (content.body is None):
+        raise InputError(
+            "A claim of kind value needs one of [top] and [body].",
+            "Give [top] with inertia, weight and centre, or [body] with mass, gravity, centre, inertia and about.",
+        )
+    if content.top is not None and isinstance(content.top.rotor, str):
+        raise InputError(
+            "top.rotor is one number.",
+            "Give [k1, k2, k3] for heavy_gyrostat; the rotor of gyrostat follows from the start, P b/(M.gamma).",
+        )
+    values = msgspec.to_builtins(content.top or content.body) | msgspec.to_builtins(content.start)
+    normalize = values.pop("normalize")
+    try:
+        body, start = motion_of(values, normalize)
+    except InputError as error:
+        raise InputError(f"top, body or start: {error.cause}", error.remedy) from None
+    if start.attitude is None:
+        start.require_unit_gamma(remedy="Give exact numbers such as 3/5, 0, 4/5, or normalize = true in [start].")
+    return body, start
+
+
+def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVerdict]:
+    """The rows of the numbers of one quantity at one time, each judged by the narrowest ball that was made."""
+    found: list[Judgement] | None = None
+    missing = "the balls that can be proven do not decide whether that is within what is allowed"
+    needed = min(_MOST_BITS, max(_FIRST_BITS, *(figure.bits for figure in group)))
+    trials = [_FIRST_BITS, *(min(_MOST_BITS, needed << doubling) for doubling in range(_DOUBLINGS + 1))]
+    while trials and not (found and all(each.decided for each in found)):
+        bits = trials.pop(0)
+        try:
+            found = _judged(group, motion.at(group[0].time, group[0].quantity, bits))
+        except OutOfReach as error:
+            missing = f"{error.cause} {error.remedy}".strip()
+            trials = [_FEWEST_BITS] if bits == _FIRST_BITS else []
+    if found is None:
+        return [_open_row(figure, motion.method, missing) for figure in group]
+    return [_row(figure, each, motion.method, missing) for figure, each in zip(group, found, strict=True)]
+
+
+def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Judgement]:
+    """What the balls say; of a quaternion with the sign that the numbers have, as q and -q are one attitude."""
+    same = [judge_figure(figure, known[figure.component - 1]) for figure in group]
+    if group[0].quantity != "quaternion":
+        return same
+    other = [judge_figure(figure, _negative(known[figure.component - 1])) for figure in group]
+
+    def rank(judged: Sequence[Judgement]) -> tuple[int, Fraction]:
+        verdicts = [each.holds for each in judged]
+        worst = 2 if False in verdicts else 1 if None in verdicts else 0
+        return worst, sum((each.off[1] ** 2 for each in judged), Fraction(0))
+
+    return min(same, other, key=rank)
+
+
+def _negative(value: Fraction | arb) -> Fraction | arb:
+    return -value if isinstance(value, Fraction) else value.neg(exact=True)
+
+
+def _row(figure: Figure, judged: Judgement, method: str, missing: str) -> StatementVerdict:
+    """The row of a number that balls were found for; missing: why none are narrower."""
+    value, wide = _texts(judged.middle, judged.wide, figure.number.digits + _MORE_DIGITS)
+    figures = _said(figure) | {"digits_right": judged.right, "proven": {"value": value, "radius": wide}}
+    witness = None
+    if judged.holds is False:
+        apart = _texts(figure.number.value - judged.middle, judged.wide, _WITNESS_DIGITS)
+        witness = {"parameters": {}, "t": figure.time_text, "value": apart[0], "radius": apart[1]}
+    residual = _off(judged) + (f"; {missing}" if judged.holds is None else "")
+    return _published(figure, judged.holds, residual, method, figures, witness)
+
+
+def _texts(middle: Fraction, wide: Fraction, digits: int) -> tuple[str, str]:
+    """(value, radius) of a ball as decimal text: the radius encloses the rounding of the value."""
+    text = decimal_text(middle, digits)
+    return text, radius_text(wide + abs(Fraction(text) - middle))
+
+
+def _off(judged: Judgement) -> str:
+    """By how much a number is off, in words."""
+    low, high = (decimal_text(round_to(part, 64), 3) if part else "0" for part in judged.off)
+    if low == high:
+        return f"off by {high}"
+    most = radius_text(judged.off[1])
+    return f"off by less than {most}" if low == "0" else f"off by {low} to {most}"
+
+
+def _open_row(figure: Figure, method: str, missing: str) -> StatementVerdict:
+    return _published(figure, None, missing, method, _said(figure), None)
+
+
+def _said(figure: Figure) -> dict[str, Any]:
+    said: dict[str, Any] = {"printed": figure.number.text}
+    if figure.tolerance is not None:
+        said["tolerance"] = figure.tolerance_text
+    return said | {"digits_printed": figure.number.digits}
+
+
+def _published(
+    figure: Figure,
+    holds: bool | None,
+    residual: str,
+    method: str,
+    figures: dict[str, Any],
+    witness: dict[str, Any] | None,
+) -> StatementVerdict:
+    name = figure.quantity if figure.quantity not in SIZES else f"{figure.quantity} {figure.component}"
+    said = "half a unit of the last digit" if figure.tolerance is None else figure.tolerance_text
+    statement = f"{name} = {figure.number.text} within {said} at t = {figure.time_text}"
+    domain = f"t={figure.time_text}"
+    return StatementVerdict(
+        figure.quantity,
+        figure.component,
+        "printed",
+        domain,
+        holds,
+        residual,
+        statement,
+        witness,
+        note=method,
+        figures=figures,
+    )
+
+
+class _KnownNumbers:
+    """The true numbers of a motion, exactly where they are rational for certain, else as balls.
+
+    body, start: as given.  system: of the motion.
+    """
+
+    def __init__(self, body: HeavyTop | Body, start: State, system: System) -> None:
+        from heavytop.exact.bodies import BodyMotion
+
+        self.body, self.start, self.system = body, start, system
+        self.motion: BodyMotion = BodyMotion(body, start, system)
+        self._exact = self.motion.resolved.uncertainty is None
+        system.parameters(self.motion.resolved.top, self.motion.resolved.start)
+
+    @cached_property
+    def method(self) -> str:
+        """How the motion is known."""
+        try:
+            return self.motion.method
+        except OutOfReach as error:
+            return error.cause
+
+    def require_handy(self, figures: Sequence[Figure]) -> None:
+        """Raises OutOfReach for fractions whose exact arithmetic takes longer than anyone waits."""
+        resolved = self.motion.resolved
+        require_handy(resolved.top, resolved.start, [figure.time for figure in figures])
+
+    def require(self, figures: Sequence[Figure]) -> None:
+        """Raises InputError for a quantity that is none, or that γ alone does not fix."""
+        for figure in figures:
+            if figure.quantity not in SIZES and figure.quantity not in self._integrals:
+                known = ", ".join((*SIZES, *self._integrals))
+                raise InputError(
+                    f"quantity = {figure.quantity[:40]!r} is none of this motion.",
+                    f"Use {known}: the first integrals are those that are constant along it.",
+                )
+            turned = figure.quantity == "quaternion" or (figure.quantity == "position" and figure.component < 3)
+            if turned and self.start.attitude is None:
+                raise InputError(
+                    f"gamma does not fix {figure.quantity} {figure.component}.",
+                    "Give the attitude of the start: quaternion, matrix, euler or axis_angle in place of gamma.",
+                )
+
+    @cached_property
+    def _integrals(self) -> dict[str, Integral]:
+        """The first integrals that are constant along the motion, by name."""
+        from heavytop.top.equations import holding
+
+        resolved = self.motion.resolved
+        found = holding(resolved.top, resolved.start, self.system)
+        return {each.name: each for each in found if self._exact or each.name in _INVARIANT}
+
+    def at(self, time: Fraction, quantity: str, bits: int) -> Sequence[Fraction | arb]:
+        """The components of a quantity, of ``bits`` bits: relative above 1, absolute below.
+
+        Raises OutOfReach where they cannot be proven.
+        """
+        if quantity in self._integrals:
+            return [self._integral(self._integrals[quantity], bits)]
+        if quantity in ("omega", "gamma"):
+            if time == 0 and self._exact:
+                return self.start.omega if quantity == "omega" else self.start.gamma
+            state = self.motion.state(time, bits)
+            return state[:3] if quantity == "omega" else state[3:6]
+        if self.start.attitude is None:
+            return self._height(self.motion.state(time, bits), bits)
+        return self._output(Output(quantity), self.motion.whole(time, bits)[1](time, bits), bits)
+
+    @whole_evaluation
+    def _height(self, state: Sequence[arb], bits: int) -> list[arb]:
+        """A position of which the third component is known."""
+        with working_precision(bits + _SPARE_BITS):
+            return [arb("nan"), arb("nan"), dot([ball(value) for value in self.body.centre], state[3:6])]
+
+    @whole_evaluation
+    def _output(self, output: Output, whole: Sequence[arb], bits: int) -> list[arb]:
+        with working_precision(bits + _SPARE_BITS):
+            found = list(output.at(whole[:3], whole[3:6], whole[6:], self.body.centre, FUNCTIONS, ball))
+        if not all(value.is_finite() for value in found):
+            raise OutOfReach(f"The {output.name} is not known to {bits} bits.")
+        return found
+
+    def _integral(self, integral: Integral, bits: int) -> Fraction | arb:
+        """A first integral at the start: exactly, or as a ball of an irrational attitude."""
+        resolved = self.motion.resolved
+        if self._exact:
+            p = self.system.parameters(resolved.top, resolved.start)
+            return exact(integral.value(p, resolved.start.flat))
+        return self._integral_in_given_axes(integral, bits)
+
+    def _integral_in_given_axes(self, integral: Integral, bits: int) -> Fraction | arb:
+        """The same where the principal axes or the attitude are irrational."""
+        from heavytop.top.equations import Parameters
+
+        body, start = self.body, self.start
+        tensor = body.inertia if isinstance(body, HeavyTop) else body.tensor
+        p = Parameters(tensor, body.moment, body.rotor or (Fraction(0),) * 3)
+        if start.attitude is None or start.attitude.exact_rows() is not None:
+            return exact(integral.value(p, start.flat))
+        return self._integral_of_balls(integral, p, start.attitude, bits)
+
+    @whole_evaluation
+    def _integral_of_balls(self, integral: Integral, p: Parameters, attitude: Attitude, bits: int) -> arb:
+        from heavytop.top.attitude import rotated, transposed
+
+        with working_precision(bits + 4 * _SPARE_BITS):
+            rows = attitude.rows(FUNCTIONS, ball)
+            omega, space = _balls(self.start.omega), self.start.omega_space
+            if space is not None:
+                omega = rotated(transposed(rows), _balls(space))
+            return arb(integral.value(type(p)(*map(_balls, p)), (*omega, *rows[2])))
+
+
+def _balls(values: Any) -> Any:
+    """Exact rationals, in tuples of any depth, as balls."""
+    return tuple(map(_balls, values)) if isinstance(values, tuple) else ball(values)

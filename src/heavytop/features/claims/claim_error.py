@@ -1,0 +1,506 @@
+"""The error of a claim in its parts, never mixed: the formula compared with the truth, and the formula compared with
+itself in floating point.  (The third, an integrator compared with the exact claim, is measured by SolutionError.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy
+from flint import arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial, hyperbolic, hyperbolic_angles
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import FUNCTIONS, ball, to_bits, whole_evaluation, working_precision
+from heavytop.exact.solution import ExactSolution
+from heavytop.features.claims.library import ershkov
+from heavytop.features.claims.library.ershkov import Branch, PartialCase, Values, partial_case
+from heavytop.measure.scalar import largest, to_ball
+from heavytop.precision import Array, Precision, Real, decimal_text, exact, number, shown
+from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
+from heavytop.top.equations import GYROSTAT, gyrostat_energy
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MODEL_BITS = 160
+
+Truth = Callable[[Fraction], tuple[list[arb], list[arb]]]
+"""time -> (six balls of the state, three of the attitude vector ξ)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelError:
+    """How far a claim is from the true motion at one time.
+
+    omega, gamma: largest component.  phi, theta, psi: modulo a turn, in [−π, π].  attitude: angle of the rotation
+    between the two attitudes, which also makes sense at the poles.  All angles in radians.
+    """
+
+    omega: arb
+    gamma: arb
+    phi: arb
+    theta: arb
+    psi: arb
+    attitude: arb
+
+
+def exact_claim(case: PartialCase, time: Fraction, branch: Branch, bits: int = MODEL_BITS) -> Values[arb]:
+    """The printed formulas (4.2)-(4.6) at ``time`` as balls of ``bits`` bits; angles are NaN at t = 0, where φ divides
+    by 0.  Raises OutOfReach where even a high working precision leaves less.
+    """
+
+    def evaluate(_working: int) -> list[arb]:
+        v = _on_balls(case, time, branch)
+        return [*v.omega, *v.gamma, *((v.phi, v.theta, v.psi) if time else ())]
+
+    o1, o2, o3, g1, g2, g3, *angles = to_bits(evaluate, bits)
+    phi, theta, psi = angles or [arb("nan")] * 3
+    return Values((o1, o2, o3), (g1, g2, g3), phi, theta, psi)
+
+
+def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values[arb]:
+    if time == 0:
+        # (4.2) is exactly 0, and the roots of (4.3), (4.5) must not see a ball that reaches below it
+        return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), arb(0), FUNCTIONS, "smooth")
+    return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), ball(time), FUNCTIONS, branch)
+
+
+@whole_evaluation
+def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> Sequence[arb]:
+    """The claimed attitude vector ξ at ``time``: on the smooth branch (4.5) continued through the pole at t = 0."""
+    if branch == "smooth":
+        angles = case.solves.angles(time, MODEL_BITS)
+    else:
+        values = exact_claim(case, time, branch)
+        angles = [values.phi, values.theta, values.psi]
+    with working_precision(MODEL_BITS + 32):
+        return attitude_from_angles(angles[0], angles[1], angles[2], FUNCTIONS)
+
+
+def model_error(case: PartialCase, time: Fraction, truth: Truth, branch: Branch = "smooth") -> ModelError:
+    """The claim, exactly evaluated, against the true heavy-top motion from its own data at t = 0."""
+    return _difference(exact_claim(case, time, branch), claim_attitude(case, time, branch), *truth(time))
+
+
+@whole_evaluation
+def _difference(claim: Values[arb], claimed_xi: Sequence[arb], state: Sequence[arb], xi: Sequence[arb]) -> ModelError:
+    with working_precision(MODEL_BITS + 32):
+        gamma = tuple(state[3:6])
+        claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
+        true = euler_angles(gamma, tuple(xi), FUNCTIONS)
+        phi, theta, psi = (_modulo_turn(a - b) for a, b in zip(claimed, true, strict=True))
+        return ModelError(
+            largest(a - b for a, b in zip(claim.omega, state[:3], strict=True)),
+            largest(a - b for a, b in zip(claim.gamma, gamma, strict=True)),
+            phi,
+            theta,
+            psi,
+            rotation_angle((claim.gamma, claimed_xi), (gamma, tuple(xi)), FUNCTIONS),
+        )
+
+
+def _modulo_turn(angle: arb) -> arb:
+    return arb.atan2(angle.sin(), angle.cos())
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationError:
+    """Absolute error of a formula evaluated in a format: a ball for each quantity, NaN where the format's value is not
+    finite.  omega: largest component.  Angles in radians."""
+
+    omega: arb
+    phi: arb
+    theta: arb
+    psi: arb
+
+
+@whole_evaluation
+def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, form: str) -> EvaluationError:
+    """The formulas evaluated in ``precision`` against themselves evaluated exactly, from the same rounded data.
+
+    form: ``printed`` for (4.2)-(4.6) to the letter, with the positive roots also for t > 0; ``stable`` for the
+    hyperbolic forms.
+    """
+    given = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
+    i1, i3, c1, t = (exact(value) for value in given)
+    alpha = number(case.alpha, precision)
+    with numpy.errstate(all="ignore"):
+        if form == "printed":
+            computed = partial_case(given[0], given[1], given[2], given[3], numpy, "printed")
+        else:
+            computed = stable_case(alpha, given[0], given[1], given[3], numpy)
+    bits = precision.bits + 64
+
+    def evaluate(_working: int) -> list[arb]:
+        if form == "printed":
+            v = partial_case(ball(i1), ball(i3), ball(c1), ball(t), FUNCTIONS, "printed" if t else "smooth")
+        else:
+            v = stable_case(ball(exact(alpha)), ball(i1), ball(i3), ball(t), FUNCTIONS)
+        return [*v.omega, v.theta, v.psi, *([v.phi] if t or form == "stable" else [])]
+
+    o1, o2, o3, theta, psi, *phi = to_bits(evaluate, bits)
+    with working_precision(bits):
+        return EvaluationError(
+            largest(to_ball(a) - b for a, b in zip(computed.omega, (o1, o2, o3), strict=True)),
+            abs(to_ball(computed.phi) - phi[0]) if phi else arb("nan"),
+            abs(to_ball(computed.theta) - theta),
+            abs(to_ball(computed.psi) - psi),
+        )
+
+
+def stable_case(alpha: Real, i1: Real, i3: Real, t: Real, lib: Library) -> Values[Real]:
+    """The same motion in the forms that lose no digits, over any ring; smooth branch."""
+    s = alpha * ((i1 - i3) / i3) * t / 2
+    omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
+    phi, theta = hyperbolic_angles(s, lib)
+    return Values(omega, gamma, phi, theta, alpha * t * ((i1 + i3) / i3) / 2)
+
+
+def first_failure(times: Sequence[Fraction], errors: Sequence[arb]) -> Fraction | None:
+    """The earliest |t| from which on no value is finite, None if the last one is."""
+    failing: Fraction | None = None
+    for time, error in zip(reversed(times), reversed(errors), strict=True):
+        if error.is_finite():
+            break
+        failing = time
+    return failing
+
+
+# When a claim departs from the truth: the first time at which Ω of the two differ by 1 % of α.
+#
+# The norm is that of every error of Ω in a report, the largest component of |ΔΩ|; the limit is α/100; the branch is
+# smooth or printed, as everywhere.  Both motions are known at any time, so the time is proven and no sample of a grid:
+# bounds of both motions over an interval show that ΔΩ cannot reach the limit there, and bisection closes in on the time
+# at which it has.
+
+
+PARTED = Fraction(1, 100)
+"""Claim and truth have parted when the largest component of |ΔΩ| reaches this, in units of α."""
+CLAIM_XI = (Fraction(0), Fraction(-1), Fraction(0))
+"""ξ at t = 0 of the claimed attitude, where φ + ψ = π/2 and θ = 0."""
+CLOSE = Fraction(1, 10**8)
+"""Relative width of the interval that the time is proven to lie in."""
+DIGITS = 6
+"""Significant digits of the time in reports."""
+_BITS = 128
+_SHORTEST = Fraction(1, 2**80)
+"""Of an interval, relative to the time: shorter ones tell nothing at this working precision."""
+_EFFORT = 20.0
+"""Seconds that a validated truth may cost."""
+
+
+@lru_cache(maxsize=4)
+def true_solution(case: PartialCase) -> DeloneHomoclinic | Validated:
+    """The heavy-top motion from the claim's own data at t = 0: in closed form for I1 = 2 I3, else enclosed."""
+    if case.i1 == 2 * case.i3:
+        return DeloneHomoclinic(case.alpha, case.i1)
+    return Validated(case.solves.top, case.solves.start, xi=CLAIM_XI, effort=_EFFORT)
+
+
+@dataclass(frozen=True, slots=True)
+class DivergenceTime:
+    """Proven: |ΔΩ| stays below the limit from 0 up to ``before`` and has reached it at ``after``; both > 0, of |t|."""
+
+    before: Fraction
+    after: Fraction
+
+    @property
+    def time(self) -> Fraction:
+        """|t| to :data:`DIGITS` significant digits."""
+        return Fraction(decimal_text((self.before + self.after) / 2, DIGITS))
+
+
+@whole_evaluation
+def divergence_time(case: PartialCase, horizon: Fraction, branch: Branch) -> DivergenceTime | None:
+    """When the claim parts from the truth on the way from 0 to ``horizon`` ≠ 0; None if it provably does not.
+
+    Raises OutOfReach where the true motion cannot be proven so far, or |ΔΩ| touches the limit without passing it.
+    """
+    # in units of 1/α nothing but I1/I3 is left of the data
+    pair = _Pair(PartialCase(Fraction(1), case.i1 / case.i3, Fraction(1)), branch, backward=horizon < 0)
+    end = abs(horizon) * case.alpha
+    before, step = Fraction(0), end
+    while before < end:
+        step = min(step, end - before)
+        if pair.below(before, step):
+            before += step
+            step *= 2
+        elif step <= CLOSE * before and pair.reached(before + step):
+            return DivergenceTime(before / case.alpha, (before + step) / case.alpha)
+        elif step <= _SHORTEST * before:
+            raise OutOfReach(
+                f"Claim and truth are 1 % of alpha apart at t = {shown(before / case.alpha)} and no more.",
+                "Ask for an earlier horizon.",
+            )
+        else:
+            step /= 2
+    return None
+
+
+class _Pair:
+    """Claim and truth in one direction of time, both a motion of a system of their own."""
+
+    def __init__(self, case: PartialCase, branch: Branch, backward: bool) -> None:
+        self.sign = -1 if backward else 1
+        # for t > 0 the printed roots give Ω1 the other sign than the smooth branch, which solves the gyrostat
+        self.first = -1 if branch == "printed" and not backward else 1
+        self.truth, self.claim = _Motion(true_solution(case), case), _Motion(case.solves, case)
+        with working_precision(_BITS):
+            self.limit = ball(case.alpha * PARTED)
+
+    def below(self, time: Fraction, step: Fraction) -> bool:
+        """Whether |ΔΩ| provably stays below the limit from ``time`` to ``time + step``: |ΔΩ| + step·sup|ΔΩ'| does."""
+        start = self.sign * time
+        gaps = self._differences(self.truth.state(start), self.claim.state(start))
+        slopes = self._differences(self.truth.rates(start, step), self.claim.rates(start, step))
+        with working_precision(_BITS):
+            return all(abs(gap) + abs(slope) * ball(step) < self.limit for gap, slope in zip(gaps, slopes, strict=True))
+
+    def reached(self, time: Fraction) -> bool:
+        """Whether |ΔΩ| has provably reached the limit at ``time``."""
+        at = self.sign * time
+        gaps = self._differences(self.truth.state(at), self.claim.state(at))
+        with working_precision(_BITS):
+            return any(abs(gap) >= self.limit for gap in gaps)
+
+    def _differences(self, truth: Sequence[arb], claim: Sequence[arb]) -> list[arb]:
+        with working_precision(_BITS):
+            return [truth[0] - self.first * claim[0], truth[1] - claim[1], truth[2] - claim[2]]
+
+
+class _Motion:
+    """A motion with bounds of its states and rates over an interval."""
+
+    def __init__(self, solution: ExactSolution, case: PartialCase) -> None:
+        self.field = solution.system.field
+        self.state = cache(lambda time: solution.state(time, _BITS))
+        given = solution.system.parameters(solution.top, solution.start)
+        with working_precision(_BITS):
+            self.parameters = given.mapped(ball)
+            # ½ I Ω² <= C1 + |P r| along the truth, and along the claim as well, which keeps (1.3)
+            most = 2 * (case.c1 + sum(map(abs, given.moment)))
+            omega = [ball(most / each).sqrt().abs_upper() for each in given.inertia]
+            everywhere = [arb(0, bound) for bound in (*omega, *[arb(1)] * 3)]
+            self.fastest = [rate.abs_upper() for rate in self.field(self.parameters, everywhere)]
+
+    def rates(self, time: Fraction, step: Fraction) -> list[arb]:
+        """Ω' and γ' over all times within ``step`` of ``time``, one ball each."""
+        state = self.state(time)
+        with working_precision(_BITS):
+            near = [y + arb(0, (ball(step) * rate).abs_upper()) for y, rate in zip(state, self.fastest, strict=True)]
+            return list(self.field(self.parameters, near))
+
+
+# What the figures draw: the paper's curves in its own formulas, and claim, gyrostat and true motion in time.
+
+
+_CURVE_BITS = 64
+RATIOS = (2, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class PaperFigure:
+    """One of Figs 2-8: ``a`` is A, ``ratio`` is I1/I3 where the paper states it; α = 1 throughout."""
+
+    number: int
+    angle: str
+    equation: str
+    a: int
+    ratio: int | None = None
+
+    @property
+    def implied_ratio(self) -> int:
+        """I1/I3 = 1 + A/√α, which (6.2) forces."""
+        return 1 + self.a
+
+    @property
+    def consistent(self) -> bool:
+        """False where the paper states an I1/I3 that its A excludes."""
+        return self.ratio in (None, self.implied_ratio)
+
+    def values(self, t: Any) -> Any:
+        """The angle at the times ``t``, with u of (4.2) for ψ and u = √Ω2 for φ and θ, as printed."""
+        u = ershkov.u(self.a, 1.0, t, numpy)
+        with numpy.errstate(divide="ignore"):
+            if self.angle == "phi":
+                return ershkov.phi_of_6_1(1.0, numpy.sqrt(u * u), numpy)
+            if self.angle == "theta":
+                return ershkov.theta_of_6_1(1.0, numpy.sqrt(u * u), numpy)
+        return ershkov.psi(float(self.ratio or self.implied_ratio), 1.0, 1.0, u, t, numpy)
+
+
+PAPER_FIGURES = (
+    PaperFigure(2, "phi", "6.1", 5),
+    PaperFigure(3, "phi", "6.1", 1),
+    PaperFigure(4, "theta", "6.1", 5),
+    PaperFigure(5, "theta", "6.1", 1),
+    PaperFigure(6, "psi", "6.2", 1, 5),
+    PaperFigure(7, "psi", "6.2", 9, 5),
+    PaperFigure(8, "psi", "6.2", 10, 5),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
+
+    times: Array
+    states: NDArray[np.float64]
+    angles: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PaperCurve:
+    """A figure of the paper over time, shapes (n,)."""
+
+    figure: PaperFigure
+    times: Array
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Truth, gyrostat and claim from the same data at t = 0, for one I1/I3, and when claim and truth part."""
+
+    ratio: int
+    truth: Curves
+    method: str
+    gyrostat: Curves
+    claim: Curves
+    parted: dict[Branch, DivergenceTime | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Portrait:
+    """M along the homoclinic motions of the gyrostat and of the heavy top, shape (n, 3).
+
+    levels: level lines of the gyrostat's energy on the sphere |M| = ``length``, each a triple of arrays.
+    """
+
+    gyrostat: Array
+    heavy_top: Array
+    levels: list[tuple[Array, Array, Array]]
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Drawings:
+    """All that the figures draw."""
+
+    papers: Iterator[PaperCurve]
+    comparisons: Iterator[Compared]
+    portrait: Iterator[Portrait]
+
+
+FIGURES = len(PAPER_FIGURES) + len(RATIOS) + 1
+
+
+def drawings() -> Drawings:
+    """Figs 2-8, the comparisons for I1/I3 = 2 and 6, the momentum sphere; each is worked out when it is asked for."""
+    return Drawings(map(_paper, PAPER_FIGURES), map(_compared, RATIOS), (_portrait() for _ in range(1)))
+
+
+def _paper(figure: PaperFigure) -> PaperCurve:
+    # beyond A t = 37 the printed logarithm loses every digit of a double
+    span = min(4, 24 / figure.a)
+    t = numpy.linspace(-span, span, 801)
+    t = t[t != 0] if figure.angle == "phi" else t
+    return PaperCurve(figure, t, figure.values(t))
+
+
+def _compared(ratio: int) -> Compared:
+    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, ratio))
+    span = Fraction(6, ratio - 1) + 2
+    times = [span * index / 200 for index in range(-200, 201)]
+    truth, method = true_curves(case, times)
+    branches: tuple[Branch, ...] = ("printed", "smooth")
+    parted = {branch: divergence_time(case, times[-1], branch) for branch in branches}
+    return Compared(ratio, truth, method, exact_curves(case.solves, times), claim_curves(case, times), parted)
+
+
+def _portrait() -> Portrait:
+    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, 2))
+    times = [Fraction(index, 10) for index in range(-140, 141)]
+    moments = numpy.array([float(moment) for moment in case.solves.top.inertia])
+    gyrostat, heavy_top = exact_curves(case.solves, times), true_curves(case, times)[0]
+    orbits = [curves.states[:, :3] * moments for curves in (gyrostat, heavy_top)]
+    return Portrait(orbits[0], orbits[1], _levels(case), float(case.alpha * case.i1))
+
+
+def _levels(case: PartialCase) -> list[tuple[Array, Array, Array]]:
+    """Level lines of the gyrostat's energy on the sphere |M| = C0."""
+    from contourpy import contour_generator
+
+    motion = case.solves
+    parameters = GYROSTAT.parameters(motion.top, motion.start)
+    moments = [float(moment) for moment in parameters.inertia]
+    p = parameters._replace(inertia=moments, rotor=float(parameters.rotor))
+    length = float(case.alpha * case.i1)
+    turn, height = numpy.meshgrid(numpy.linspace(-numpy.pi, numpy.pi, 361), numpy.linspace(-1, 1, 241))
+
+    def point(turn: Any, height: Any) -> tuple[Any, Any, Any]:
+        across = numpy.sqrt(numpy.maximum(0, 1 - height * height))
+        return length * across * numpy.cos(turn), length * height, length * across * numpy.sin(turn)
+
+    state = [m / i for m, i in zip(point(turn, height), moments, strict=True)]
+    lines = contour_generator(turn, height, gyrostat_energy(p, state))
+    low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
+    found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
+    return [point(*numpy.asarray(line).T) for line in found]
+
+
+def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
+    """The claim as printed: u = √Ω2, positive roots and arctan."""
+    t: Any = numpy.array([float(time) for time in times])
+    i1, i3, c1 = float(case.i1), float(case.i3), float(case.c1)
+    with numpy.errstate(divide="ignore"):
+        v = ershkov.partial_case(i1, i3, c1, t, numpy, "printed")
+    # at t = 0 (4.5) divides by 0 and arctan takes it to π/2; the radicand of θ can fall below 0 by rounding
+    return Curves(t, numpy.stack([*v.omega, *v.gamma], axis=1), numpy.stack([v.phi, v.theta, v.psi], axis=1))
+
+
+def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
+    """The heavy top from the claim's own data at t = 0, and the method: closed form for I1 = 2 I3, else enclosed."""
+    if case.i1 == 2 * case.i3:
+        return exact_curves(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
+    gyrostat = case.solves
+    # the γ of the true motion leaves the pole towards φ = π: with this ξ, ψ is 0 there
+    first, second, third = (-part for part in perpendicular(gyrostat.start.gamma))
+    known = Validated(gyrostat.top, gyrostat.start, xi=(first, second, third))
+    ordered = sorted({*times, Fraction(0)})
+    balls = [[*known.state(time, _CURVE_BITS), *known.attitude(time, _CURVE_BITS)] for time in ordered]
+    states = numpy.array([[float(value.mid()) for value in row] for row in balls])
+    angles = numpy.array([euler_angles(row[3:6], row[6:9], numpy) for row in states])
+    t = numpy.array([float(time) for time in ordered])
+    return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
+
+
+def _continuous(angles: NDArray[np.float64], states: NDArray[np.float64]) -> Any:
+    """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
+
+    Whole turns are taken off until φ and ψ lie within a turn of 0 there.
+    """
+    pole = int(numpy.argmax(states[:, 5]))
+    columns = [angles[:, 1]]
+    for index in (0, 2):
+        away = numpy.delete(angles[:, index], pole)
+        turned = numpy.array(unwrap(list(away), 2 * numpy.pi))
+        whole = numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2)
+        columns.append(whole - 2 * numpy.pi * numpy.floor(whole[pole] / (2 * numpy.pi) + 0.25))
+    return numpy.stack([columns[1], columns[0], columns[2]], axis=1)
+
+
+def exact_curves(motion: ErshkovPartial | DeloneHomoclinic, times: list[Fraction]) -> Curves:
+    """A motion in closed form; that of the gyrostat on its smooth branch: θ takes the sign of −t."""
+    t = numpy.array([float(time) for time in times])
+    states = numpy.array([[float(value.mid()) for value in motion.state(time, _CURVE_BITS)] for time in times])
+    angles = numpy.array([[float(value.mid()) for value in motion.angles(time, _CURVE_BITS)] for time in times])
+    return Curves(t, states, angles)

@@ -1,0 +1,220 @@
+"""Every equation of a claim, proven or refuted: of the paper as a motion of each system, and of the library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import log10
+
+from heavytop.errors import InputError, quoted
+from heavytop.features.claims.library.entry import library
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.rows import Find, PlanTable, Task, exact_row
+from heavytop.kind import Kind
+from heavytop.measure.scalar import UNRESOLVED
+from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document.document import Block, Card, Headline, In, Note, Word, clip
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
+
+NAME, LIBRARY = "audit", "library"
+EXPECTED = Quantity("as_expected")
+DIGITS = "digits_right"
+_SMOOTH = "smooth"
+_SYSTEMS = {HEAVY_TOP.name: "the heavy top", GYROSTAT.name: "the gyrostat"}
+_SECONDS = 1.5
+
+
+class AuditTable(PlanTable, tag=NAME):
+    """The claims, and the systems whose motions those of the paper are said to be.
+
+    claims: "ershkov-general", "ershkov-partial", ids of the library, or "library" for every entry of it.
+    systems: without them that of each claim, the heavy top of the paper's.  An entry of the library is about its own.
+    """
+
+    claims: list[str]
+    systems: tuple[str, ...] = ()
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row; raises InputError for an unknown claim or system, and for a system that a claim is not about."""
+        from heavytop.features.claims.audit.audit import PAPER, own_system  # loads SymPy, which no other kind needs
+
+        keys: list[RowKey] = []
+        for claim in self.claims:
+            systems = self._systems(claim)
+            for name in [claim] if claim in PAPER else _entries(claim):
+                keys += [RowKey(NAME, name, about or own_system(name), Subject("claimed", name)) for about in systems]
+        return [Task(key, "", NAME) for key in keys]
+
+    def _systems(self, claim: str) -> tuple[str, ...]:
+        """The systems of a claim's rows, "" for its own."""
+        from heavytop.features.claims.audit.audit import PAPER, own_system, paper_claim
+
+        asked = [system(name) for name in self.systems]
+        if claim in PAPER:
+            return tuple(paper_claim(claim).about(each).name for each in asked) or (HEAVY_TOP.name,)
+        if asked and claim in library() and (own := own_system(claim)) not in self.systems:
+            raise InputError(
+                f"The claim {claim} is about {own}, and systems = {quoted(list(self.systems))}.",
+                "Leave systems out: an entry of the library is about that of its file.",
+            )
+        return ("",)
+
+
+def _entries(claim: str) -> list[str]:
+    if claim == LIBRARY:
+        return list(library())
+    if claim not in library():
+        from heavytop.features.claims.audit.audit import PAPER
+
+        raise InputError(
+            f"Unknown claim {claim[:60]!r} to audit.",
+            f'Use {", ".join(PAPER)}, a name of `heavytop claims`, or "{LIBRARY}".',
+        )
+    return [claim]
+
+
+class AuditKind(Kind):
+    """1 for an equation that holds, 0 for one that is refuted, unresolved for one that is neither."""
+
+    name = NAME
+    table = AuditTable
+
+    def cost(self, task: Task) -> float:
+        """The same for all."""
+        return _SECONDS
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
+        from heavytop.features.claims.audit.audit import PAPER, paper_claim
+        from heavytop.features.claims.audit.judge import judge
+
+        if task.key.case not in PAPER:
+            return _of_entry(task)
+        claim, about = paper_claim(task.key.case), system(task.key.system)
+        asked = [each for each in claim.statements(about) if about is HEAVY_TOP or each.branch == _SMOOTH]
+        metrics = {
+            Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain): _value(row.holds)
+            for row in judge(asked, claim.setting)
+        }
+        against = Against("equations", f"the equations of {task.key.system}")
+        return exact_row(task, f"claimed: {claim.source}", against, by_name(metrics))
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Whether the claims are motions of the heavy top, and how many of each system's equations are proven; how many
+        claims of the library hold, and whether that is what is expected.
+        """
+        paper, entries = _parted(rows)
+        if any(row.system == HEAVY_TOP.name for row in paper):
+            yield _of_paper(paper)
+        elif entries:
+            yield _of_verdicts(entries)
+        for sentence in _of_library(entries):
+            yield Note(sentence, shown=In.SHORT)
+            yield Card("Library of claims (heavytop claims)", [Note(sentence)], shown=In.FULL | In.PAGE)
+        for verdict, about in dict.fromkeys((_verdict(row)[0], row.system) for row in paper):
+            found = [row.case for row in paper if (_verdict(row)[0], row.system) == (verdict, about)]
+            said = f"Ershkov's claims {', '.join(found)}: {verdict} for {_SYSTEMS.get(about, about)}."
+            yield Note(said, shown=In.SHORT)
+        if paper:
+            lines = [line for claim in sorted({row.case for row in paper}) for line in _equations(claim, paper)]
+            yield Card("Equation by equation (heavytop audit)", lines, shown=In.FULL | In.PAGE)
+
+
+def _of_paper(rows: Sequence[Row]) -> Headline:
+    """Whether the claims are motions of the heavy top."""
+    verdicts = {_verdict(row)[0] for row in rows if row.system == HEAVY_TOP.name}
+    others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
+    solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
+    instead = f" It solves {solved} instead." if others else ""
+    if verdicts == {"refuted"}:
+        return Headline(f"The claimed solution is not a motion of the heavy top.{instead}", Word("refuted"))
+    if "refuted" in verdicts:
+        return Headline(f"Some of the claimed solutions are not motions of the heavy top.{instead}", Word("refuted"))
+    if verdicts == {"holds"}:
+        return Headline("Every equation of the claim is proven for the heavy top.", Word("holds"))
+    return Headline("No equation of the claim is refuted, but not all are proven.", Word("undecided"))
+
+
+def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
+    """The verdict on one claim of the paper, and for each system how many of its equations are proven and refuted."""
+    yield Note(clip(claim), style="soft")
+    for row in rows:
+        if row.case == claim:
+            verdict, refuted, held = _verdict(row)
+            smooth = " on the smooth branch" if row.system == GYROSTAT.name else ""
+            said = f"for {clip(_SYSTEMS.get(row.system, row.system), 40)}{smooth}: "
+            said += f"{held} of {len(row.metrics)} equations proven"
+            if refuted:
+                names = dict.fromkeys(q.name for q in [q for q in refuted if q.branch == _SMOOTH] or refuted)
+                said += f", {len(refuted)} refuted: {clip(', '.join(names), 120)}"
+            yield Note(said, Word(verdict))
+
+
+def _of_entry(task: Task) -> Row:
+    """Its equations, and whether its verdict is the expected one; where the audit is stopped that alone, unresolved.
+
+    Of published numbers also how many of their digits are right.
+    """
+    from heavytop.features.claims.audit.audit import audited
+
+    entry = library()[task.key.case]
+    judged, found = audited(entry)
+    metrics: dict[Quantity, Metric] = {}
+    for row in () if found is None else found.rows:
+        where = Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain)
+        metrics[where] = _value(row.holds)
+        right = (row.figures or {}).get(DIGITS)
+        if right is not None:
+            label = f"{row.equation}{row.component}"
+            metrics[Quantity(DIGITS, label, "", row.branch, row.domain)] = Metric(
+                str(right), log10(right) if right else None, "value"
+            )
+    metrics[EXPECTED] = _value(
+        None if judged.verdict == "undecided" != entry.expects else judged.verdict == entry.expects
+    )
+    against = Against("equations", f"the equations of {task.key.system}")
+    return exact_row(task, f"claimed: {entry.source.text}", against, by_name(metrics))
+
+
+def _parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Rows of the paper and of the library."""
+    of_library = [row for row in rows if EXPECTED.text in row.metrics]
+    return [row for row in rows if EXPECTED.text not in row.metrics], of_library
+
+
+def _of_library(rows: Sequence[Row]) -> list[str]:
+    """How many claims hold and are refuted, and those whose verdict is not the expected one."""
+    if not rows:
+        return []
+    verdicts = [_verdict(row)[0] for row in rows]
+    counts = ((verdicts.count("holds"), "proven"), (verdicts.count("refuted"), "refuted"))
+    open_ones = verdicts.count("undecided")
+    said = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
+    off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
+    expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
+    return [f"Library of {len(rows)} claims: {', '.join(said)}; {expected}."]
+
+
+def _of_verdicts(rows: Sequence[Row]) -> Headline:
+    wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
+    undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
+    word = "refuted" if wrong else "undecided" if undecided else "holds"
+    return Headline(" ".join(_of_library(rows)), Word(word))
+
+
+def _value(holds: bool | None) -> Metric:
+    return (
+        Metric(UNRESOLVED, None, "value") if holds is None else Metric(str(int(holds)), 0.0 if holds else None, "value")
+    )
+
+
+def _verdict(row: Row) -> tuple[str, list[Quantity], int]:
+    """The verdict, the equations that are refuted, and how many are proven."""
+    equations = [
+        metric
+        for metric in row.metrics.values()
+        if metric.quantity != EXPECTED and (metric.quantity is None or metric.quantity.name != DIGITS)
+    ]
+    refuted = [metric.quantity or Quantity("?") for metric in equations if metric.value == "0"]
+    held = sum(metric.value == "1" for metric in equations)
+    undecided = len(equations) - held - len(refuted)
+    return ("refuted" if refuted else "undecided" if undecided or not held else "holds"), refuted, held

@@ -1,0 +1,152 @@
+"""The printed and the stable formulas (4.2)-(4.6), evaluated in a format, against themselves exactly evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
+from fractions import Fraction
+
+from msgspec.structs import replace
+
+from heavytop.exact.flint.balls import working_precision
+from heavytop.features.claims import claim_error as errors_of
+from heavytop.features.claims.kinds.claim_model import CLAIM, EVALUATION_ERROR, claim_error, claim_of, claimed
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive, signed
+from heavytop.harness.rows import Find, PlanTable, Task, exact_row, time_metric
+from heavytop.kind import Kind
+from heavytop.measure.scalar import largest, metric, of_fraction, text
+from heavytop.precision import parse, time_text
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.document.document import Block, Cell, Chart, Headline, Value, short
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.render.text import both, largest_over
+from heavytop.report.store.checks import CLOSE, sizes
+from heavytop.top.equations import GYROSTAT
+
+NAME = "claim_evaluation"
+_COUNT = "claim_evaluation"
+_WORST, _LOST, _SINCE = "max_finite", "samples_not_finite", "not_finite_from"
+_SECONDS = 0.02
+_SUMMED_UP = ("omega", "theta", "psi")
+
+
+class ClaimEvaluationTable(PlanTable, tag=NAME):
+    """rate_times: the values of k |t| at which the formulas are evaluated."""
+
+    cases: list[str]
+    precisions: list[str]
+    rate_times: list[str]
+    directions: tuple[Direction, ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = positive(self.rate_times, "rate_times")
+        tasks = []
+        for case in claimed(find, self.cases):
+            assert case.claim is not None
+            for precision in map(parse, self.precisions):
+                for direction in self.directions:
+                    signs = signed(times, direction)
+                    end = time_text(signs[-1] / case.claim.solves.rate)
+                    for form in ("printed", "stable"):
+                        subject = Subject("claimed", "(4.2)-(4.6)", form=form)
+                        key = RowKey(NAME, case.name, GYROSTAT.name, subject, precision.name, direction, end)
+                        tasks.append(Task(key, f"/{direction}", f"formula:{form}", case, signs, signs))
+        return tasks
+
+
+class ClaimEvaluation(Kind):
+    """The largest errors of a form in a format, and from when on its values are not finite.
+
+    The times of a task are values of k t of one sign.  Errors of Ω in 1/time unit, of the angles in rad.
+    """
+
+    name = NAME
+    table = ClaimEvaluationTable
+    needed = tuple(
+        quantity.text
+        for each in _SUMMED_UP
+        for quantity in (Quantity(EVALUATION_ERROR, each, _WORST), Quantity(_COUNT, each, _SINCE))
+    )
+    may_overflow = True
+    place = 90
+
+    def cost(self, task: Task) -> float:
+        """The same for all."""
+        return _SECONDS
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one form.  Raises OutOfReach where the formulas cannot be evaluated exactly."""
+        claim, precision, form = claim_of(task), task.precision, task.key.subject.form
+        times = [time / claim.solves.rate for time in task.times]
+        errors = [errors_of.evaluation_error(claim, time, precision, form) for time in times]
+        metrics: dict[Quantity, Metric] = {}
+        series: dict[str, Series] = {}
+        with working_precision(precision.bits + 64):
+            for name in (each.name for each in fields(errors_of.EvaluationError)):
+                values = [getattr(error, name) for error in errors]
+                finite = [value for value in values if value.is_finite()]
+                worst = metric(largest(finite)) if finite else Metric("missing", None)
+                metrics[Quantity(EVALUATION_ERROR, name, _WORST)] = worst
+                lost = Fraction(len(values) - len(finite))
+                metrics[Quantity(_COUNT, name, _LOST)] = of_fraction(lost, "value", str(lost))
+                failure = errors_of.first_failure(times, values)
+                metrics[Quantity(_COUNT, name, _SINCE)] = time_metric(failure, "duration")
+                quantity = Quantity(EVALUATION_ERROR, name)
+                texts = [text(value) for value in values]
+                series[quantity.text] = Series([time_text(time) for time in task.times], texts, quantity)
+        measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
+        against = Against("proven", "the same form exactly evaluated from the same rounded data")
+        row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
+        whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return replace(row, finite=whole)
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
+        for series in row.series.values():
+            component = series.quantity.component if series.quantity else ""
+            count, since = row.metric(_COUNT, component, _LOST), row.metric(_COUNT, component, _SINCE)
+            worst = row.metric(EVALUATION_ERROR, component, _WORST)
+            lost = sum(value == "nan" for value in series.values)
+            if count is not None and count.value != str(lost):
+                yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
+            if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
+                yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
+            found = sizes(series)
+            if worst is not None and worst.log10 is not None and found and abs(max(found) - worst.log10) > CLOSE:
+                yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """How far off each form is in the narrowest format, and until when it is finite; a line a form and format."""
+        bits = min(row.bits for row in rows)
+        forms: dict[str, list[Row]] = {}
+        for row in rows:
+            if row.bits == bits and row.metrics:
+                forms.setdefault(row.key.subject.form, []).append(row)
+        said = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
+        if said:
+            yield Headline(f"In {next(iter(forms.values()))[0].precision} {said}.")
+        yield Cells(
+            "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
+            ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"],
+            both((row, _cells(row)) for row in rows),
+            [f"Errors are the {largest_over(rows)}."],
+        )
+        yield Chart(claim_error)
+
+
+def _cells(row: Row) -> list[Cell]:
+    errors = (row.metric(EVALUATION_ERROR, each, _WORST) for each in _SUMMED_UP)
+    times = (row.metric(_COUNT, each, _SINCE) for each in ("psi", "omega"))
+    return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
+
+
+def _said(rows: Sequence[Row]) -> str:
+    """``is off by up to 6.7e-8 in Ω, not finite from |t| = 37``."""
+    errors = [row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text] for row in rows]
+    worst = max((error for error in errors if error.log10 is not None), default=None)
+    times = [row.metrics[Quantity(_COUNT, each, _SINCE).text] for row in rows for each in _SUMMED_UP]
+    since = min((time for time in times if time.log10 is not None), default=None)
+    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst.value)} in Ω"
+    return off + (", finite throughout" if since is None else f", not finite from |t| = {short(since.value)}")

@@ -1,0 +1,385 @@
+"""The claim (4.2)-(4.6), exactly evaluated, against the true motion of the heavy top from its own data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+from flint import arb
+
+from heavytop.cases import Case
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.flint.balls import FUNCTIONS, working_precision
+from heavytop.features.claims import claim_error as errors_of
+from heavytop.features.claims.claim_error import CLAIM_XI, divergence_time, true_solution
+from heavytop.features.claims.library.ershkov import Branch, PartialCase
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive, samples, signed
+from heavytop.harness.rows import Find, PlanTable, Task, exact_row, time_metric
+from heavytop.integrate.trajectory import Problem
+from heavytop.kind import Kind
+from heavytop.measure.scalar import largest, metric, text
+from heavytop.measure.truth import certified, compute
+from heavytop.precision import exact, time_text
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.document.document import (
+    MOST_PLOTS,
+    TIME,
+    Block,
+    Card,
+    Cell,
+    Chart,
+    Headline,
+    In,
+    Key,
+    Note,
+    Section,
+    Sources,
+    Value,
+    clip,
+    draw,
+    left_out,
+    logarithm,
+    points,
+    scientific,
+    short,
+)
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.document.svg import COLOURS, decades, finish, new_axes, spoken
+from heavytop.report.render.text import both
+from heavytop.top.attitude import attitude_from_angles
+from heavytop.top.equations import HEAVY_TOP
+
+# What the kinds about the formulas of a claim share.
+
+
+CLAIM = "claimed: (4.2)-(4.6)"
+MODEL_ERROR, EVALUATION_ERROR, INTEGRATION_ERROR = "claim_model_error", "claim_evaluation_error", "integration_error"
+"""The three errors of a claim: of its formulas, of their evaluation in a format, of an integrator on their motion."""
+
+
+def claimed(find: Find, names: list[str]) -> Iterator[Case]:
+    """The cases of these names; raises InputError for one about which nothing is claimed."""
+    for case in map(find, names):
+        if case.claim is None:
+            raise InputError(f"Nothing is claimed about the case {case.name}.", "Use a case such as ershkov-partial-2.")
+        yield case
+
+
+def claim_of(task: Task) -> PartialCase:
+    """The claim of a task about one."""
+    claim = task.given.claim
+    assert claim is not None
+    return claim
+
+
+# The section of a page about a claim: its error split in three.
+
+
+def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """The error of a claim split in three: its model, its formulas in floating point, and an integrator's."""
+    directions: dict[str, list[Direction]] = {}
+    for _, report in sources:
+        for row in report.rows:
+            if _series(row, MODEL_ERROR) or _series(row, EVALUATION_ERROR):
+                directions.setdefault(row.key.case, []).append(row.key.direction)
+    if not directions:
+        return None
+    # one direction of time is enough to draw
+    bases = [(case, "forward" if "forward" in found else found[0]) for case, found in directions.items()]
+    section = Section(
+        "claim-error",
+        "Where the claim’s error comes from",
+        [
+            "Three errors that are easily taken for one another. Model: the formulas, exactly evaluated, against the "
+            "true motion of the heavy top from the same data. Evaluation: the formulas in floating point against the "
+            "same formulas exactly evaluated. Integration: an integrator on the motion that the formulas do solve, "
+            "against that motion.",
+            "The model’s error of the attitude is the angle between the two attitudes: both motions start at the pole "
+            "γ = e3, where φ and ψ are undefined and their differences say nothing. Beside it the error of the formula "
+            "for ψ, which turns the attitude by as much.",
+            "Crosses along the top mark times at which floating point gives NaN or an infinity; an error of exactly 0 "
+            "has no place on these axes.",
+        ],
+        columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "not finite from |t|"],
+        across=2,
+        place=20,
+    )
+    left_out(section, len(bases) - MOST_PLOTS // 2, "case")
+    for number, (case, direction) in enumerate(bases[: MOST_PLOTS // 2]):
+        called = case if direction == "forward" else f"{case}/{direction}"
+        for quantity, title, unit in (("omega", "Ω", "1/time unit"), ("attitude", "attitude and of ψ", "rad")):
+            axes = new_axes(TIME, f"error of {title} ({unit})")
+            decades(axes.xaxis)
+            decades(axes.yaxis)
+            alternative: list[str] = []
+            for source, report in sources:
+                rows = [row for row in report.rows if (row.key.case, row.key.direction) == (case, direction)]
+                for key, series, scale, symbol in _claim_parts(rows, quantity, source):
+                    alternative += _claim_curve(axes, section, section.key(key), series, scale, called, symbol)
+            title = f"{clip(called, 40)}: error of {title}"
+            if alternative:
+                box = axes.dataLim
+                if math.isfinite(box.y0):
+                    axes.set_ylim(max(box.y0 - 1, _LOWEST), max(box.y1, _LOWEST) + 1)
+                section.pictures.append(finish(axes, title, spoken(alternative), f"claim-{number}-{quantity}"))
+    return section
+
+
+_LOWEST = -26
+"""No smaller error of a formula in floating point is drawn: where Ω itself tends to 0, so does its error."""
+
+
+def _series(row: Row, name: str) -> dict[str, Series]:
+    """The series of a row that are of the quantity of that name, by their components."""
+    found = [(series.quantity, series) for series in row.series.values() if series.quantity and series.times]
+    return {quantity.component: series for quantity, series in found if quantity.name == name}
+
+
+def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tuple[Key, Series, float, str]]:
+    """The curves of one case: label, series, what a unit of its times is in |t|, and what it is an error of.
+
+    quantity: omega or attitude; of formulas in floating point the part of the attitude is ψ.
+    """
+    bits = min((row.bits for row in rows if _series(row, EVALUATION_ERROR)), default=53)
+    old, suffix = source == "baseline", f", {source}" if source else ""
+    in_format = "psi" if quantity == "attitude" else quantity
+    for row in rows:
+        subject, precision = row.key.subject, clip(row.precision, 20)
+        if subject.branch == "smooth" and (found := _series(row, MODEL_ERROR).get(quantity)):
+            yield Key(f"model{suffix}", 1, "s", "", old), found, 1.0, _symbol(quantity)
+        if row.bits == bits and (found := _series(row, EVALUATION_ERROR).get(in_format)):
+            ends = [logarithm(end) for end in (row.horizon, found.times[-1])]
+            scale = 10 ** ((ends[0] or 0.0) - (ends[1] or 0.0))
+            colour, marker = (3, "D") if subject.form == "printed" else (2, "^")
+            label = f"evaluation, {clip(subject.form, 20)} form, {precision}{suffix}"
+            yield Key(label, colour, marker, "", old), found, scale, _symbol(in_format)
+        if row.bits == bits and (found := _series(row, INTEGRATION_ERROR).get(quantity)):
+            label = f"integration, {clip(row.integrator, 20)}, {precision}{suffix}"
+            yield Key(label, 0, "o", "", old), found, 1.0, _symbol(quantity)
+
+
+def _symbol(quantity: str) -> str:
+    return {"omega": "Ω", "psi": "ψ"}.get(quantity, quantity)
+
+
+def _claim_curve(
+    axes: Any, section: Section, key: Key, series: Series, scale: float, case: str, symbol: str
+) -> list[str]:
+    x, y = points(series, 0.0, scale)
+    dead = [logarithm(t) for t, v in zip(series.times, series.values, strict=False) if v == "nan"]
+    lost = sorted(t + math.log10(scale) for t in dead if t is not None)
+    if lost:
+        colour = COLOURS[key.colour]
+        axes.plot(
+            lost, [0.99] * len(lost), "x", transform=axes.get_xaxis_transform(), color=colour, ms=4, clip_on=False
+        )
+    if x:
+        draw(axes, key, x, y)
+    at_one = next((v for t, v in zip(x, y, strict=True) if abs(t) < 1e-6), None)
+    largest = scientific(max(y)) if y else "none finite"
+    section.rows.append(
+        [
+            clip(case, 40),
+            key.label,
+            symbol,
+            "" if at_one is None else scientific(at_one),
+            largest,
+            scientific(lost[0]) if lost else "",
+        ]
+    )
+    tail = f", not finite from |t| = {scientific(lost[0])}" if lost else ""
+    return [f"{key.label}: largest sample {largest}{tail}."]
+
+
+NAME = "claim_model"
+PARTS = Quantity("claim_parts_by_1_percent_at")
+_SHOWN = ("0.1", "1", "2", "5")
+_SECONDS = 1.0
+_BRANCHES: dict[Direction, tuple[Branch, ...]] = {"forward": ("smooth", "printed"), "backward": ("smooth",)}
+
+
+class ClaimModelTable(PlanTable, tag=NAME):
+    """times: where the series is taken, t > 0.  grid: the largest errors are also over a uniform grid of that many
+    points up to the last time.
+    """
+
+    cases: list[str]
+    times: list[str]
+    grid: int = 200
+    directions: tuple[Direction, ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = positive(self.times, "times")
+        every = sorted({*times, *(times[-1] * i / self.grid for i in range(1, samples(self.grid) + 1))})
+        tasks = []
+        for case in claimed(find, self.cases):
+            for direction in self.directions:
+                signs = signed(every, direction), signed(times, direction)
+                for branch in _BRANCHES[direction]:
+                    subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
+                    end = time_text(signs[1][-1])
+                    key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
+                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs))
+        return tasks
+
+
+class ClaimModel(Kind):
+    """The largest errors of the claim over the times, and from when on Ω is off by 1 % of α.
+
+    Errors of Ω in 1/time unit, of γ none, of the angles in rad.
+    """
+
+    name = NAME
+    table = ClaimModelTable
+    needed = (PARTS.text,)
+    place = 20
+
+    def cost(self, task: Task) -> float:
+        """The same for all."""
+        return _SECONDS
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
+        claim, branch = claim_of(task), _branch(task.key.subject)
+        truth, against = true_motion(claim, task.times)
+        errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}
+        metrics: dict[Quantity, Metric] = {}
+        series = {}
+        with working_precision(errors_of.MODEL_BITS):
+            for name in (each.name for each in fields(errors_of.ModelError)):
+                quantity = Quantity(MODEL_ERROR, name)
+                values = {time: getattr(error, name) for time, error in errors.items()}
+                metrics[quantity.over("max")] = metric(largest(values.values()), "value")
+                kept = [text(abs(values[time]), 12) for time in task.keep]
+                series[quantity.text] = Series([time_text(time) for time in task.keep], kept, quantity)
+            parted = divergence_time(claim, task.times[-1], branch)
+            metrics[PARTS] = time_metric(None if parted is None else parted.time, "value")
+        measured = f"{CLAIM}, {branch} branch, exactly evaluated"
+        return exact_row(task, measured, against, by_name(metrics), errors_of.MODEL_BITS, series)
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """When the claim is off by 1 %; a line a case and branch; how wrong it is, forward in time, and in full on the
+        smooth branch where there are several.
+        """
+        parted = [row for row in rows if PARTS.text in row.metrics]
+        if parted:
+            yield _headline(parted)
+        forward = [row for row in parted if row.key.direction != "backward"]
+        yield from _parting_times(forward)
+        times = [time for time in _SHOWN if any(_at(row, "omega", time) for row in rows)]
+        heads = (*(f"Ω at |t|={t}" for t in times), *(f"γ at |t|={t}" for t in times[:2]))
+        yield Cells(
+            "Claim compared with the true motion: (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0",
+            ["case", "branch", *heads, "Ω off 1 % of α at |t|"],
+            both((row, _cells(row, times)) for row in rows),
+            [
+                "Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers.",
+                "Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α = Ω3(0) I3/I1, proven, "
+                "not a sample.",
+            ],
+        )
+        truths = {row.key.case: row.against for row in rows}
+        yield from (Note(f"{case}: true motion: {text}", style="soft") for case, text in truths.items())
+        smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
+        for row in forward:
+            if row.case not in smooth or row.key.subject.branch == "smooth":
+                yield _card(row, [each for each in forward if each.case == row.case and each is not row])
+        yield Chart(claim_error)
+
+
+def _headline(rows: Sequence[Row]) -> Headline:
+    """The first time at which a claimed Ω is off by 1 %."""
+    parted = [(time, row) for row in rows if (time := row.metrics[PARTS.text].log10) is not None]
+    if parted:
+        _, row = min(parted, key=lambda each: each[0])
+        at, where = f"|t| = {short(row.metrics[PARTS.text].value)}", f"{clip(row.case, 40)}, {row.key.subject.branch}"
+        return Headline(f"The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from {at} on ({where}).")
+    horizon = short(max((row.horizon.removeprefix("-") for row in rows), key=exact))
+    return Headline(f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")
+
+
+def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
+    found: dict[str, dict[str, str]] = {}
+    for row in rows:
+        found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
+    branches = list(dict.fromkeys(branch for times in found.values() for branch in times))
+    cells = [[case, *(times.get(branch, "-") for branch in branches)] for case, times in found.items()]
+    if cells:
+        yield Cells("Ω off by 1 % of α = Ω3(0) I3/I1 at |t|", ["", *branches], cells, shown=In.SHORT)
+
+
+def _cells(row: Row, times: Sequence[str]) -> list[Cell]:
+    omega, gamma = ([short(_at(row, part, t) or "-") for t in times] for part in ("omega", "gamma"))
+    return [row.key.subject.branch, *omega, *gamma[:2], Value(row.metrics.get(PARTS.text))]
+
+
+def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_of.Truth, Against]:
+    """The true heavy-top motion from the claim's own data, and what it is: a closed form, an enclosure, or two runs.
+
+    times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
+    """
+    bits = errors_of.MODEL_BITS
+    known = true_solution(claim)
+    try:
+        proven = certified(known, max(times, key=abs), bits)
+    except OutOfReach:
+        if isinstance(known, DeloneHomoclinic):
+            raise
+        given = partial(Problem.of, known.top, known.start, xi=CLAIM_XI)
+        (computed,) = compute([given], times, bits)
+        return lambda time: (computed.state(time)[:6], computed.state(time)[6:]), computed.against
+    if proven is None:
+        raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
+    if not isinstance(known, DeloneHomoclinic):
+        return lambda time: (known.state(time, bits), known.attitude(time, bits)), proven.against
+
+    def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
+        phi, theta, psi = known.angles(time, bits)
+        with working_precision(bits):
+            xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
+        return known.state(time, bits), list(xi)
+
+    return delone, proven.against
+
+
+def _branch(subject: Subject) -> Branch:
+    return "printed" if subject.branch == "printed" else "smooth"
+
+
+def _values(row: Row, component: str) -> dict[str, str]:
+    series = row.series.get(Quantity(MODEL_ERROR, component).text)
+    return dict(zip(series.times, series.values, strict=False)) if series else {}
+
+
+def _at(row: Row, component: str, time: str) -> str | None:
+    return {abs(exact(t)): value for t, value in _values(row, component).items()}.get(exact(time))
+
+
+def _card(row: Row, others: Iterable[Row]) -> Card:
+    """The branch of a row in full, and when its other branches part from the true motion."""
+    horizon, parts_at = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
+    found = row.metric(MODEL_ERROR, "omega", "max")
+    over = f"over {row.samples} samples" if row.samples else "over the samples"
+    if parts_at == "never":
+        lines = [Note(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
+    else:
+        said = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
+        largest_error = short(found.value) if found else "missing"
+        said += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
+        lines = [Note(f"|t| = {parts_at}", style="big"), Note(said)]
+    for other in others:
+        at = short(other.metrics[PARTS.text].value)
+        when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"
+        lines.append(Note(f"On the {clip(other.key.subject.branch, 20)} branch: {when}."))
+    omega, gamma = (_values(row, component) for component in ("omega", "gamma"))
+    cells = [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega]
+    title = f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from"
+    table = Cells("Error of Ω (1/time unit) and of γ (|γ| = 1)", ("|t|", "|ΔΩ|", "|Δγ|"), cells)
+    return Card(title, lines, table, f"True motion: {row.against}")

@@ -1,0 +1,209 @@
+"""The library of claims in words, for people."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from textwrap import fill, wrap
+from typing import Protocol
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.features.claims.audit.audit import Judged
+from heavytop.features.claims.audit.judge import ABOUT, VERDICTS, Audit, StatementVerdict
+from heavytop.features.claims.audit.values import SIZES
+from heavytop.features.claims.library.entry import Entry
+
+_WIDTH = 80
+_HEADS = {"holds": "Proven", "refuted": "Refuted", "undecided": "Undecided"}
+_STYLES = {"holds": "green", "refuted": "bold red", "undecided": "yellow"}
+
+
+class Listed(Protocol):
+    """Entries with their verdicts."""
+
+    @property
+    def entries(self) -> Sequence[Entry]: ...
+
+    @property
+    def verdicts(self) -> dict[str, Judged]: ...
+
+    @property
+    def changed(self) -> Sequence[str]: ...
+
+    @property
+    def undecided(self) -> Sequence[str]: ...
+
+
+def claims_text(found: Listed) -> RenderableType:
+    """The entries by verdict: id, title and source of each."""
+    parts: list[RenderableType] = []
+    for verdict, head in _HEADS.items():
+        of_verdict = [entry for entry in found.entries if found.verdicts[entry.id].verdict == verdict]
+        if of_verdict:
+            parts += [Text(f"{head}: {len(of_verdict)}", style=_STYLES[verdict])]
+            parts += [line for entry in of_verdict for line in _lines(entry)]
+            parts.append(Text())
+    return Group(*parts, Text("heavytop audit NAME shows the proof or the witness of one."))
+
+
+def _lines(entry: Entry) -> list[Text]:
+    source = f"{', '.join(entry.source.authors)} {entry.source.year}"
+    return [Text(f"  {entry.id}"), *map(Text, _folded(f"{entry.title} ({source})", 4))]
+
+
+def _folded(text: str, indent: int) -> list[str]:
+    space = " " * indent
+    return wrap(text, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
+
+
+def unexpected_text(found: Listed) -> RenderableType:
+    """How many verdicts are the expected ones, and each that is not."""
+    off = [entry for entry in found.entries if entry.id in (*found.changed, *found.undecided)]
+    total = f"{len(found.entries) - len(off)} of {len(found.entries)} verdicts are the expected ones."
+    lines = [Text(total)]
+    for entry in off:
+        judged = found.verdicts[entry.id]
+        said = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(judged.reason)
+        lines.append(Text(fill(said, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
+    seconds = sum(each.seconds for each in found.verdicts.values())
+    return Group(*lines, Text(f"{seconds:.0f} s of audits."))
+
+
+# The audit of published numbers as a table, for people.
+
+
+_VALUE_STYLES = {True: "green", False: "bold red", None: "yellow"}
+
+
+def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
+    """A line for each number: what is printed, how many of its digits are right, and by how much it is off.
+
+    Below it the proven values, with the radius of each, and how the motion is known.
+    """
+    table = Table(box=None, pad_edge=False)
+    for name in ("number", "at", "verdict", "printed", "digits right", "allowed", "off by"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("number", "at", "verdict", "digits right"))
+    for row in rows:
+        figures = row.figures or {}
+        right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
+        cells = [label(row), row.domain, "", figures.get("printed", ""), right]
+        cells += [figures.get("tolerance", "half a unit"), row.residual.removeprefix("off by ")]
+        line: list[RenderableType] = [Text(cell) for cell in cells]
+        line[2] = Text(VERDICTS[row.holds], style=_VALUE_STYLES[row.holds])
+        table.add_row(*line)
+    proven = [row for row in rows if row.figures and "proven" in row.figures]
+    lines = [Text("Proven: the true number is within the radius of the value.")] if proven else []
+    for row in proven:
+        known = (row.figures or {})["proven"]
+        lines.append(Text(f"  {label(row)} {row.domain}: {known['value']} +/- {known['radius']}"))
+    methods = dict.fromkeys(row.note for row in rows if row.note)
+    return [table, Text(), *lines, *(Text(f"Known from {method}.") for method in methods)]
+
+
+def label(row: StatementVerdict) -> str:
+    """The quantity, with its component where it has more than one."""
+    return f"{row.equation} {row.component}" if row.equation in SIZES else row.equation
+
+
+# An audit in words and tables, for people.
+
+
+_PROVEN = {
+    "motion": "Its equations of motion are proven for",
+    "integral": "It is proven to be constant along the motions of",
+    "relation": "It is proven to be kept by the motions of",
+}
+_RESIDUAL = 20
+"""Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
+_AUDIT_STYLES = {True: "green", False: "bold red", None: "yellow"}
+
+
+def audit_text(report: Audit) -> RenderableType:
+    """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
+    head = Text(f"{report.claim} as {ABOUT[report.kind]} of {report.system}: ")
+    head.append(report.verdict, style=_AUDIT_STYLES[{"holds": True, "refuted": False}.get(report.verdict)])
+    parts: list[RenderableType] = [head]
+    if report.source:
+        parts.append(Text(report.source))
+    parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
+    if report.kind == "value":
+        return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
+    parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
+    parts += [Text(f'With assume = [..., "{bound}"] the verdict is: {verdict}.') for bound, verdict in report.deciding]
+    if report.why:
+        parts += [Text(), Text("Why, each step checked by the same algebra:")]
+        parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
+    parts += _entry(report)
+    solved = ", ".join(report.solves) or "none of the systems known here"
+    parts += [Text(), Text(f"{_PROVEN[report.kind]}: {solved}")]
+    return Group(*parts)
+
+
+def _entry(report: Audit) -> list[RenderableType]:
+    """What an entry of the library says of itself: how its source was read, the verdict expected, its note."""
+    entry = report.entry
+    if entry is None:
+        return []
+    expected = "as expected" if report.verdict == entry.expects else f"expected: {entry.expects}"
+    return [Text(), Text(f"Read: {entry.read}; {entry.status}; {expected}."), Text(" ".join(entry.note.split()))]
+
+
+def _table(report: Audit) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("equation", "branch", "domain", "verdict", "residual", "statement"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("equation", "branch", "domain", "verdict"))
+    for row in report.rows:
+        verdict = Text(VERDICTS[row.holds], style=_AUDIT_STYLES[row.holds])
+        cells = (Text(value) for value in (_label(row), row.branch, row.domain))
+        table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
+    return table
+
+
+def _in_lines(expression: str) -> str:
+    """The expression in lines of at most 20 characters, broken behind an operator or a space, never inside a name."""
+    lines = [""]
+    for part in re.findall(r"[\w.]+'*\)*|\W", expression):
+        if lines[-1] and len((lines[-1] + part).rstrip()) > _RESIDUAL:
+            lines.append("")
+        lines[-1] += part if lines[-1] else part.lstrip()
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _label(row: StatementVerdict) -> str:
+    number = row.equation if not row.equation[0].isdigit() else f"({row.equation})"
+    return f"{number} {row.component}"
+
+
+def _witnesses(report: Audit) -> list[Text]:
+    """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
+    refuted = [row for row in report.rows if row.witness is not None]
+    lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
+    for row in refuted:
+        witness = dict(row.witness or {})
+        value, radius, parameters = witness.pop("value"), witness.pop("radius"), witness.pop("parameters")
+        place = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
+        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {value} +/- {radius} at {place}"))
+    notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
+    if notes:
+        lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]
+    return lines
+
+
+def _conditions(report: Audit) -> list[Text]:
+    """What the proofs rest on, each condition once: first what is not discharged, with the rows that it leaves open."""
+    rows: dict[tuple[bool, str, str], list[str]] = {}
+    for row in report.rows:
+        if row.holds is not False:
+            for c in row.conditions:
+                rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
+    lines = [Text("Conditions of the proofs:")] if rows else []
+    for (discharged, text, reason), labels in sorted(rows.items()):
+        state = Text(
+            "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]
+        )
+        where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
+        lines.append(Text("  ").append(state).append(f": {text} ({reason}){where}"))
+    return lines

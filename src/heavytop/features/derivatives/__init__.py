@@ -1,0 +1,1 @@
+"""Jacobians computed elsewhere, scored."""

@@ -1,0 +1,200 @@
+"""How good the derivatives of a motion are that another program computed, from Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop import arguments
+from heavytop.arguments import Number, Numbers
+from heavytop.display import Tabular, TitledTable
+from heavytop.errors import InputError, quoted
+from heavytop.features.score.measurement import required
+from heavytop.features.score.trajectories.observed import MOST, bits_of, component
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.derivatives import PARAMETERS, STARTS, Derivatives, known_derivatives
+from heavytop.measure.scalar import digits_of, digits_text
+from heavytop.precision import decimal_text, exact, log10, ordered, shown
+from heavytop.top.bodies import Body
+from heavytop.top.equations import NAMES, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+_SHAPE = "Give an array of shape (n, 6, 6) with [i, j] = ∂y_i(t)/∂y_j(0), y = (Ω1, Ω2, Ω3, γ1, γ2, γ3)."
+_MORE = 6
+"""Digits of the reference beyond those that were given."""
+_EXPLAINS = 2.0
+"""Digits that another convention must have right beyond those of the Jacobian as given."""
+
+Matrix = Sequence[Sequence[Fraction]]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class DerivativeScore(Tabular):
+    """What the derivatives of a motion are worth.
+
+    outcome: ``success``, or ``non_finite`` where an entry is NaN or infinite: the times before are scored.
+    digits_right: −log10 of the largest |error|/max(1, |true value|) of an entry, over all times, at most the digits
+    of the format; None where no time was scored.  digits: the same at each of ``times`` that was scored.
+    worst: the name of the entry with that error at each, such as ``∂Ω1/∂γ2(0)``; errors: its |error|/max(1, |value|).
+    of_digits: decimal digits of what was given.  against: what it was compared with, and its largest radius.
+    diagnosis: a convention that fits better, a sentence each.
+    passed: whether as many digits are right as were required; None, which is no pass, where that is not known.
+    """
+
+    outcome: str
+    digits_right: float | None
+    times: tuple[str, ...]
+    digits: tuple[float, ...]
+    worst: tuple[str, ...]
+    errors: tuple[float, ...]
+    of_digits: int
+    against: str
+    diagnosis: tuple[str, ...]
+    passed: bool | None
+
+    def _table(self) -> TitledTable:
+        kept = "no Jacobian to score"
+        if self.digits_right is not None:
+            kept = f"{digits_text(self.digits_right)} of {self.of_digits} digits right"
+        rows = [
+            [time, digits_text(digits), name, f"{error:.2g}"]
+            for time, digits, name, error in zip(self.times, self.digits, self.worst, self.errors, strict=True)
+        ]
+        title = f"derivatives: {self.outcome}, {kept}"
+        return TitledTable(
+            title, ("t", "digits", "worst", "error"), rows, [f"compared with {self.against}", *self.diagnosis]
+        )
+
+
+def score_derivatives(
+    times: Numbers,
+    jacobians: Any,
+    *,
+    top: HeavyTop | Body,
+    start: State,
+    derivatives: str = "start",
+    system: System | str | None = None,
+    require: Number | None = None,
+) -> DerivativeScore:
+    """How many digits of the derivatives that any program computed are right: automatic, adjoint, or differences.
+
+    Arguments:
+        times: shape (n,), exact numbers in any order.
+        jacobians: shape (n, 6, 6), [i, j] = ∂y_i(t)/∂y_j(0) with y = (Ω1, Ω2, Ω3, γ1, γ2, γ3), γ0 as three independent
+            variables; an array of float64 or longdouble, or lists of numbers of any format or of text.  NaN and
+            infinities are an outcome, not an error.
+        top, start: what the program was given, exactly: they are not rounded to a format.
+        derivatives: "start", or "data" for [i, j] = ∂y_i(t)/∂θ_j with θ = (I1, I2, I3, n1, n2, n3), n = P r.
+        system: as in :func:`heavytop.reference`.
+        require: digits that must be right, as ``passed`` of the result says; None asks that every entry is finite.
+
+    Returns:
+        A :class:`DerivativeScore`.
+
+    Raises:
+        InputError: for what is no motion, time or number, and for arrays of another shape.
+        OutOfReach: where the derivatives cannot be proven to so many digits.
+    """
+    needed = None if require is None else required(require)
+    body, state = arguments.motion(top, start, of_any_size=True)
+    about, instants = arguments.system(system, body), arguments.any_times(times)
+    if not isinstance(derivatives, str) or derivatives not in ("start", "data"):
+        raise InputError(f"derivatives = {quoted(derivatives)} cannot be scored.", 'Give "start" or "data".')
+    matrices = _matrices(jacobians, len(instants))
+    of_digits = digits_of(max(bits_of(value) for matrix in matrices for row in matrix for value in row))
+    given = [[[component(value) for value in row] for row in matrix] for matrix in matrices]
+    finite = next((i for i, m in enumerate(given) if any(v is None for row in m for v in row)), len(given))
+    outcome = Outcome.SUCCESS if finite == len(given) else Outcome.NON_FINITE
+    if not finite:
+        return DerivativeScore(outcome.value, None, (), (), (), (), of_digits, "nothing", (), None)
+    known = known_derivatives(body, state, instants[:finite], of_digits + _MORE, about, derivatives)
+    return _scored(outcome, instants[:finite], given[:finite], known, of_digits, state, needed)
+
+
+def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
+    """The entries as they were given; raises InputError that says the shape."""
+    shape = getattr(jacobians, "shape", None)
+    if shape is not None and (len(shape) != 3 or tuple(shape[1:]) != (6, 6)):
+        raise InputError(f"The Jacobians have the shape {tuple(shape)}.", _SHAPE)
+    found = []
+    for i, matrix in enumerate(ordered(jacobians, "jacobians", _SHAPE)):
+        rows = [
+            ordered(row, f"jacobians[{i}][{j}]", _SHAPE)
+            for j, row in enumerate(ordered(matrix, f"jacobians[{i}]", _SHAPE))
+        ]
+        if len(rows) != 6 or any(len(row) != 6 for row in rows):
+            raise InputError(
+                f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE
+            )
+        found.append([list(row) for row in rows])
+    if len(found) != count:
+        raise InputError(f"There are {count} times and {len(found)} Jacobians.", "Give one Jacobian for each time.")
+    if count > MOST:
+        raise InputError(f"{count} Jacobians are too many to score.", f"Give at most {MOST}.")
+    return found
+
+
+def _scored(
+    outcome: Outcome,
+    times: list[Fraction],
+    given: list[Any],
+    known: Derivatives,
+    of_digits: int,
+    start: State,
+    needed: Fraction | None,
+) -> DerivativeScore:
+    columns = PARAMETERS if known.start is None else STARTS
+    balls = known.start or known.data or []
+    true = [[[exact(ball.value) for ball in row] for row in matrix] for matrix in balls]
+    radii = [[[exact(ball.radius) for ball in row] for row in matrix] for matrix in balls]
+    found = [_worst(*each) for each in zip(given, true, radii, strict=True)]
+    digits = tuple(_digits(error, of_digits) for error, _ in found)
+    names = tuple(f"∂{NAMES[i]}/∂{columns[j]}" for _, (i, j) in found)
+    right = min(digits)
+    passed = True if outcome is Outcome.SUCCESS else None
+    if needed is not None and exact(right) < needed:
+        passed = False
+    radius = max(r for matrix in radii for row in matrix for r in row)
+    return DerivativeScore(
+        outcome.value,
+        right,
+        tuple(shown(time) for time in times),
+        digits,
+        names,
+        tuple(float(decimal_text(error, 17)) for error, _ in found),
+        of_digits,
+        f"{known.method}, largest radius {decimal_text(radius, 3)}",
+        tuple(_diagnoses(given[-1], true[-1], radii[-1], start)) if known.start is not None else (),
+        passed,
+    )
+
+
+def _worst(given: Matrix, true: Matrix, radii: Matrix) -> tuple[Fraction, tuple[int, int]]:
+    """The largest |error|/max(1, |true value|) that an entry may have, and which it is."""
+    errors = (
+        ((abs(given[i][j] - true[i][j]) + radii[i][j]) / max(Fraction(1), abs(true[i][j])), (i, j))
+        for i in range(len(true))
+        for j in range(len(true[i]))
+    )
+    return max(errors, key=lambda each: each[0])
+
+
+def _digits(error: Fraction, most: int) -> float:
+    size = log10(error)
+    return float(most) if size is None or not math.isfinite(size) else min(float(most), -size)
+
+
+def _diagnoses(given: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
+    """Conventions under which the last Jacobian fits much better than as it was given."""
+    size, gamma = range(6), (Fraction(0), Fraction(0), Fraction(0), *start.gamma)
+    flat = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
+    projected = [[sum((true[i][k] * flat[k][j] for k in size), Fraction(0)) for j in size] for i in size]
+    said = {
+        "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],
+        "gamma0 was held on the unit sphere: here it counts as three independent variables.": projected,
+    }
+    own = _digits(_worst(given, true, radii)[0], 10**6)
+    return [text for text, other in said.items() if _digits(_worst(given, other, radii)[0], 10**6) > own + _EXPLAINS]

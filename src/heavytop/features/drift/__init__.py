@@ -1,0 +1,1 @@
+"""Drift of the first integrals and distance to the true motion, over one run."""

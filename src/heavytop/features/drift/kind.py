@@ -1,0 +1,177 @@
+"""Drift of every first integral over a horizon, and the distance from the true motion where that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import msgspec
+
+from heavytop.exact.bodies import resolve
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive, uniform
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.integrate.trajectory import Place, Problem, Trajectory
+from heavytop.kind import Kind, with_explanation
+from heavytop.measure.attitude_error import AttitudeScorer
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.rounding_noise import Reruns
+from heavytop.measure.scorer import Scorer
+from heavytop.measure.truth import truth
+from heavytop.precision import DOUBLE, exact, number, parse, time_text
+from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row, RowKey
+from heavytop.report.document.document import Block, Chart
+from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
+from heavytop.report.render.plots import digits, growth
+from heavytop.report.render.text import DIGITS, NOISE_BAND, largest_over
+
+NAME = "drift"
+
+
+class Extent(NamedTuple):
+    """What is measured of a run beside the usual, or not."""
+
+    attitude: bool = False
+    noise: bool = True
+
+
+class DriftRun(msgspec.Struct, forbid_unknown_fields=True):
+    """One format with its horizon; ``samples`` uniform samples."""
+
+    precision: str
+    horizon: str
+    samples: int = 1000
+
+
+class DriftTable(PlanTable, tag=NAME):
+    """integrator: any that `heavytop list` shows.
+
+    attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too: of an integrator
+    that declares that it carries the attitude; others are given Ω and γ alone, and the flag of the row says so.
+    noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
+    """
+
+    cases: list[str]
+    runs: list[DriftRun]
+    integrator: str = HEYOKA
+    attitude: bool = False
+    noise: bool = True
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        runs = []
+        for run in self.runs:
+            (horizon,) = positive([run.horizon], "horizon")
+            runs.append((parse(run.precision).name, time_text(horizon), uniform(horizon, run.samples)))
+        subject = computed(self.integrator)
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
+                "",
+                self.integrator,
+                case,
+                *times,
+                options=Extent(self.attitude, self.noise),
+            )
+            for case in map(find, self.cases)
+            for precision, horizon, times in runs
+        ]
+
+
+class DriftKind(Kind):
+    """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
+
+    name = NAME
+    table = DriftTable
+    noise_factor = 5.0
+    place = 30
+
+    def noise_is_reruns(self, metric: Metric) -> bool:
+        """All bands."""
+        return True
+
+    def cost(self, task: Task) -> float:
+        """The reruns that tell the rounding noise and the truth take about a second."""
+        return (0.8 if task.options.noise else 0.1) + task.run_seconds
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
+        place reached with other flags.
+        """
+        if task.options.attitude and task.integrator.carries_attitude:
+            return _with_attitude(task)
+        case, precision = task.given, task.precision
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        # samples are taken at the rounded times, so the series must be asked for by these
+        keep = [exact(number(time, precision)) for time in task.keep]
+        scorer = Scorer(problem, truth(problem, [exact(number(time, precision)) for time in task.times]), keep)
+        before = saved.load()
+        if before is not None:
+            scorer.restore(before["measures"])
+            _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], before["run"]["samples"])
+
+        def mark(place: Place) -> None:
+            if saved.due():
+                saved.save({"run": place.content(precision), "measures": scorer.content()})
+
+        going_on: dict[str, Any] = {}
+        if task.integrator.supports_ensemble:
+            going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
+        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
+        return _row(task, run, scorer)
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""
+        if (found := digits_headline(rows)) is not None:
+            yield found
+        yield from digits_columns(rows)
+        yield from attitude_columns(rows)
+        yield motions(
+            "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals",
+            rows,
+            [
+                f"Both absolute, {largest_over(rows)}: a conserved integral does not prove the trajectory correct.",
+                DIGITS,
+                NOISE_BAND,
+            ],
+        )
+        yield from (Chart(digits), Chart(growth))
+
+
+def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:
+    noise, alone = task.options.noise, task.options.attitude and run.problem.xi is None
+    left_out = ({} if noise else {NOISE: NOT_MEASURED}) | (NOT_CARRIED if alone else {})
+    metrics = _banded(task, run, scorer) if noise else scorer.metrics()
+    marked = replace(run, flags=run.flags | left_out)
+    row = computed_row(task, marked, metrics, scorer.series(time_text), scorer.against)
+    return with_explanation(row, task, run, scorer)
+
+
+def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
+    assert task.case is not None
+    plain = Problem.of(task.case.top, task.given.start, DOUBLE, task.given.system)
+    return Reruns(plain, task.integrator, task.seed).drift_bands(run, task.times, scorer.metrics(), scorer.truth)
+
+
+def _with_attitude(task: Task) -> Row:
+    """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
+    case, precision, integrator = task.given, task.precision, task.integrator
+    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
+    xi = resolve(case.body or case.top, case.given_start or case.start).xi
+    problem = Problem.of(case.top, case.start, precision, case.system, xi)
+    known = truth(replace(problem, xi=None), times)
+    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
+    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
+    return _row(task, run, scorer)
+
+
+def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:
+    """Raises ValueError unless the scorer has taken in the first so many of the samples."""
+    known = scorer.truth
+    for each in scorer.running().values():
+        error = scorer.error is not None and each in scorer.error.running.values()
+        seen = [time for time in times[:samples] if not error or isinstance(known, str) or known.covers(time)]
+        if each.count != len(seen) or list(each.kept) != [time for time in seen if time in scorer.drift.keep]:
+            raise ValueError("the place of the run is not that of what was measured of it")

@@ -1,0 +1,298 @@
+"""Events from Python: times at which a function of the state changes sign, and Poincaré sections."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import Any, overload
+
+from heavytop import arguments
+from heavytop.arguments import Number
+from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.exact.bodies import Resolved, resolve
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import require_handy, value_text
+from heavytop.features.events.dense import dense
+from heavytop.features.events.functions import (
+    PROVEN,
+    EventFunction,
+    Events,
+    ReferenceEvents,
+    Section,
+    event_function,
+    first_term,
+    turned,
+)
+from heavytop.features.events.located import locate
+from heavytop.features.events.proven import proven_events
+from heavytop.integrate.registry import Setup, named
+from heavytop.measure.reference import DIGITS, Ball
+from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
+from heavytop.top.amplification import amplification
+from heavytop.top.bodies import Body
+from heavytop.top.equations import HEAVY_TOP, System, area, energy
+from heavytop.top.heavy_top import HeavyTop, State
+
+_DATA_BITS = 192
+Function = str | Callable[[Any, Any], Any]
+"""Text such as "omega1" or "gamma3 = 1/2", or a callable of (Ω, γ) that gives a number."""
+Reached = Callable[[Fraction], None]
+
+
+@overload
+def events(
+    top: HeavyTop | Body,
+    start: State,
+    until: Number,
+    function: Function = "omega1",
+    direction: int = 0,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str = "heyoka",
+    digits: None = None,
+    system: System | str | None = None,
+    tolerance: Number | None = None,
+    step_limit: int | None = None,
+    limit: int | None = None,
+    reached: Reached | None = None,
+) -> Events: ...
+
+
+@overload
+def events(
+    top: HeavyTop | Body,
+    start: State,
+    until: Number,
+    function: Function = "omega1",
+    direction: int = 0,
+    *,
+    digits: int,
+    system: System | str | None = None,
+    limit: int | None = None,
+    reached: Reached | None = None,
+) -> ReferenceEvents: ...
+
+
+def events(
+    top: HeavyTop | Body,
+    start: State,
+    until: Number,
+    function: Function = "omega1",
+    direction: int = 0,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str = "heyoka",
+    digits: int | None = None,
+    system: System | str | None = None,
+    tolerance: Number | None = None,
+    step_limit: int | None = None,
+    limit: int | None = None,
+    reached: Reached | None = None,
+) -> Events | ReferenceEvents:
+    """The times strictly between 0 and ``until`` at which a function of the state changes sign, and the states there.
+
+    Arguments:
+        top, start: as in :func:`propagate`; of a body in its own axes the function and the states are of those axes.
+        until: an exact number of either sign, not 0.
+        function: a rational function as text, ``"omega1"``, ``"gamma3 = 1/2"``, ``"omega1*gamma2 - omega2*gamma1"``; or
+            a callable of (Ω, γ), called once with indeterminates. One that needs numbers (``math.sin``, ``abs``) is
+            sampled.
+        direction: 1 for events at which it rises with time, −1 where it falls, 0 for all.
+        precision, system, tolerance, step_limit: as in :func:`propagate`.
+        integrator: "heyoka" or the multi-word integrator; others hand over no polynomial of their steps.
+        digits: None for a computed motion; 1 to 20,000 for proven events of the true motion, in place of ``precision``
+            and ``integrator``.
+        limit: stop after so many events.
+        reached: called with the times on the way.
+
+    Returns:
+        :class:`Events`: ``times`` (n,), ``states`` (n, 6) and ``directions`` (n,), each time and state rounded once
+        from the Taylor polynomial of its step, and ``guarantee``; or with ``digits`` :class:`ReferenceEvents`, whose
+        times and states are balls. t = 0 is no event, also where the function vanishes there; a zero that is only
+        touched is none.
+
+    Raises:
+        InputError: for what is no motion, time or function; where the function is zero along the motion, or raises.
+        OutOfReach: for more than 1e8 steps; with ``digits`` beyond the reach of the enclosure, and where it is not
+            decided whether the function changes sign or only touches zero.
+    """
+    which, way = event_function(function), require_direction(direction)
+    most = arguments.count(limit, "limit")
+    arguments.callback(reached, "reached")
+    if digits is None:
+        form = arguments.precision(precision)
+        body, state = arguments.motion(top, start, form)
+        return computed_events(
+            body,
+            state,
+            _until(until),
+            which,
+            way,
+            form,
+            integrator,
+            arguments.system(system, body),
+            arguments.tolerance(tolerance, form),
+            arguments.steps(step_limit),
+            most,
+            reached,
+        )
+    if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
+        raise InputError(
+            "Proven events (digits) know no precision, integrator, tolerance or step_limit.",
+            "Leave these out, or digits.",
+        )
+    body, state = arguments.motion(top, start, of_any_size=True)
+    return known_events(
+        body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system, body), most, reached
+    )
+
+
+def computed_events(
+    top: HeavyTop | Body,
+    start: State,
+    until: Fraction,
+    function: EventFunction,
+    direction: int,
+    form: Precision,
+    integrator: str,
+    system: System = HEAVY_TOP,
+    tolerance: Fraction | None = None,
+    step_limit: int | None = None,
+    limit: int | None = None,
+    reached: Reached | None = None,
+) -> Events:
+    """Events of a motion that was checked; ``reached`` is called with the time of each step."""
+    setup = Setup.of(top, start, form, system)
+    axes = None if setup.frame is None else setup.frame.axes
+    if function.rational:
+        own = function if axes is None else turned(function, axes)
+        first_term(own, system, system.parameters(setup.top, setup.start), setup.start.flat)
+    name = named(integrator)
+    run = dense(name, setup.problem, until, tolerance, step_limit)
+    return locate(run, str(name), function, direction, limit, reached, axes)
+
+
+def known_events(
+    top: HeavyTop | Body,
+    start: State,
+    until: Fraction,
+    function: EventFunction,
+    direction: int,
+    digits: int,
+    system: System = HEAVY_TOP,
+    limit: int | None = None,
+    reached: Reached | None = None,
+) -> ReferenceEvents:
+    """Proven events of a motion that was checked."""
+    if digits not in DIGITS:
+        raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
+    if not function.rational:
+        raise InputError(
+            f"The function {quoted(function.name)} is no rational function of Ω and γ, so nothing is proven of it.",
+            "Write it with +, -, * and / alone, or leave digits out: then it is sampled.",
+        )
+    resolved = _resolved(top, start, until, digits, system)
+    require_handy(resolved.top, resolved.start, [until])
+    method = "validated: Taylor enclosure" + (" of irrational data" if resolved.uncertainty else "")
+    solution = Validated(resolved.top, resolved.start, system, method=method, uncertainty=resolved.uncertainty)
+    try:
+        found = proven_events(solution, until, function, direction, digits, limit, reached, resolved)
+    except OutOfReach as error:
+        remedy = f"{error.remedy} Computed ones reach further: leave digits out, and ask for quad or real:BITS."
+        raise OutOfReach(error.cause, remedy) from None
+    return ReferenceEvents(
+        function=function.name,
+        direction=direction,
+        guarantee=PROVEN,
+        method=solution.method,
+        digits=digits,
+        system=system.name,
+        until=exact_text(until),
+        times=[Ball(*value_text(event.time, digits + 1)) for event in found],
+        directions=[1 if event.rising else -1 for event in found],
+        states=[[Ball(*value_text(value, digits + 1)) for value in event.state] for event in found],
+    )
+
+
+def _resolved(top: HeavyTop | Body, start: State, until: Fraction, digits: int, system: System) -> Resolved:
+    """The motion in principal axes; irrational data to as many bits as the motion loses until then, and more."""
+    found = resolve(top, start)
+    if found.uncertainty is None:
+        return found
+    lost = amplification(system, system.parameters(found.top, found.start), found.start.flat, until)
+    return resolve(top, start, _DATA_BITS + math.ceil(digits * math.log2(10) + 2 * math.log2(max(1.0, lost))))
+
+
+def poincare(
+    top: HeavyTop | Body,
+    starts: State | Iterable[State],
+    until: Number,
+    function: Function = "omega1",
+    direction: int = 1,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str = "heyoka",
+    digits: int | None = None,
+    system: System | str | None = None,
+    limit: int | None = None,
+) -> Section:
+    """The Poincaré section of one or several motions of a top: their states where a function changes sign.
+
+    Arguments:
+        starts: one or several; on one level of energy and M·γ their points lie on one surface.
+        direction: 1 (rising), −1 or 0, as in :func:`events`; 1 here, for a section is crossed in one direction.
+        until, function, precision, integrator, digits, system, limit: as in :func:`events`, for each start.
+
+    Returns:
+        A :class:`Section`: ``events``, those of each start; ``points(x, y)``, two components of each as arrays of shape
+        (n, 2); ``energies``, ``areas`` and ``on_one_level``.
+
+    Raises:
+        InputError, OutOfReach: as :func:`events`, naming the start.
+    """
+    listed = arguments.listed(starts, State, "starts")
+    if not listed:
+        raise InputError("There are no starts.", "Give at least one State.")
+    found: list[Events | ReferenceEvents] = []
+    for place, start in enumerate(listed):
+        try:
+            found.append(
+                events(
+                    top, start, until, function, direction, precision, integrator=integrator, system=system, limit=limit
+                )
+                if digits is None
+                else events(top, start, until, function, direction, digits=digits, system=system, limit=limit)
+            )
+        except InputError as error:
+            raise InputError(f"Start {place}: {error.cause}", error.remedy) from None
+    about = arguments.system(system, top)
+    own = [resolve(top, start) for start in listed]
+    parameters = [about.parameters(each.top, each.start) for each in own]
+    levels = [
+        tuple(_as_float(integral(p, each.start.flat)) for p, each in zip(parameters, own, strict=True))
+        for integral in (energy, area)
+    ]
+    return Section(tuple(found), *levels)
+
+
+def _as_float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def _until(value: Number) -> Fraction:
+    found = physical(exact(value), "until")
+    if found == 0:
+        raise InputError("until = 0 leaves no time for an event.", "Give a time of either sign.")
+    return found
+
+
+def require_direction(value: int) -> int:
+    """1, -1 or 0; raises InputError for any other."""
+    found = whole(value, "direction")
+    if found not in (-1, 0, 1):
+        raise InputError(f"direction = {quoted(found)} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")
+    return found

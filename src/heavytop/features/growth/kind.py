@@ -1,0 +1,271 @@
+"""How drift and the distance from the true motion grow over an ensemble of random starts: laws and their intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import msgspec
+
+from heavytop.cases import Case
+from heavytop.errors import InputError
+from heavytop.harness.case_text import ensemble_of, one_motion
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.rows import Find, PlanTable, Task, computed, input_rounding
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.kind import Kind
+from heavytop.measure.attitude_error import AttitudeScorer
+from heavytop.measure.integrator import HEYOKA, Ended, complete, growing
+from heavytop.measure.scalar import of_fraction
+from heavytop.measure.scorer import DRIFT, Scorer
+from heavytop.measure.truth import EnsembleReference, reference
+from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
+from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.document.document import Block, Cell, Chart, computed_by, short
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.render.page import laws_headline
+from heavytop.report.render.plots import digits
+from heavytop.report.render.plots import growth as over_time
+from heavytop.report.render.terminal import laws_in_short
+from heavytop.top.attitude import perpendicular
+from heavytop.top.heavy_top import HeavyTop, State
+
+NAME = "growth"
+FAILED = Quantity("starts_failed")
+_MOST_BITS = 900
+"""Errors of more bits underflow in the floats that laws of growth are fitted with."""
+_BAND_OF_ONE = 0.75
+"""Decades, times 1/√n for n starts: 1.96/(√2 ln 10) = 0.60 for errors that are normal, and more for longer tails.  From
+24 starts on it is below the 2 bits that every error may grow by."""
+_LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
+
+
+class GrowthRun(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One format with its horizon, and how its ensemble is made.
+
+    samples: a decade, over ``decades`` decades before the horizon.  starts: random ones, the same for the same seed.
+    tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
+    in the reference: a planted fault.  reference: a format whose bits the runs have at least that stand for the truth
+    where no closed form is known; None for 30 bits more than those of ``precision``, which they have in any case.
+    attitude: whether ξ rides along, and the laws of the errors of the attitude and of the centre of mass are found too:
+    of an integrator that declares that it carries the attitude, as a row of drift.
+    """
+
+    precision: str
+    horizon: str
+    starts: int = 64
+    seed: int = 1
+    samples: int = 16
+    decades: int = 5
+    tolerance: str | None = None
+    high_accuracy: bool = False
+    bias: str | None = None
+    reference: str | None = None
+    attitude: bool = False
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those of the integrator."""
+        tolerance = {} if self.tolerance is None else {"tolerance": exact(self.tolerance)}
+        return tolerance | ({"high_accuracy": True} if self.high_accuracy else {})
+
+
+class GrowthTable(PlanTable, tag=NAME):
+    """integrator: any that `heavytop list` shows."""
+
+    cases: list[str]
+    runs: list[GrowthRun]
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
+
+
+def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
+    """One row; raises InputError for an impossible value."""
+    precision = parse(run.precision)
+    if precision.bits > _MOST_BITS:
+        raise InputError(f"An ensemble in {precision.name}.", f"Laws of growth are fitted up to real:{_MOST_BITS}.")
+    for name, limits in _LIMITS.items():
+        if (value := getattr(run, name)) not in limits:
+            raise InputError(f"{name} = {value} in a growth run.", f"Give {limits[0]} to {limits[-1]}.")
+    horizon = physical(exact(run.horizon), "horizon")
+    if horizon <= 0:
+        raise InputError(f"horizon = {run.horizon} in a growth run.", "Give a positive number.")
+    if run.tolerance is not None:
+        usable_tolerance(run.tolerance, precision)
+    if run.bias is not None and abs(exact(run.bias)) >= 1:
+        raise InputError(f"bias = {run.bias} in a growth run.", "Give a relative error between -1 and 1.")
+    if run.reference is not None and parse(run.reference).bits <= precision.bits:
+        raise InputError(f"{run.reference} is no reference for {run.precision}.", "Name a format with more bits.")
+    steps = range(-run.samples * run.decades, 1)
+    times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
+    asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
+    subject = computed(integrator, seed=run.seed, **asked)
+    key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
+    return Task(key, "", f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
+
+
+class _Done(msgspec.Struct):
+    """What of a row is done, by the index of the start: its text is the place of a row in progress."""
+
+    motions: dict[int, Ended]
+
+
+class Growth(Kind):
+    """The law of each error, its interval, its detection power.  Each metric is a root mean square over the starts."""
+
+    name = NAME
+    table = GrowthTable
+    noise_factor = 6.0
+    place = 50
+
+    def carries_band(self, metric: Metric) -> bool:
+        """Every error; how many starts failed is none."""
+        return super().carries_band(metric) and metric.quantity != FAILED
+
+    def least_band(self, starts: int) -> float:
+        """Of a root mean square over a few starts, of which none may have drawn the tail that those of a rerun do."""
+        return _BAND_OF_ONE / math.sqrt(starts)
+
+    def cost(self, task: Task) -> float:
+        """Of all starts, a few of them side by side."""
+        return 5.0 + int(task.options.starts) * task.run_seconds / 2
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """A start that ``saved`` holds is not computed again.
+
+        Raises InputError for data outside the range of the format, OutOfReach where a first integral is not resolved.
+        """
+        case, precision, run = task.given, task.precision, task.options
+        members = ensemble_of(case, run.starts, run.seed)
+        true = [Problem.of(*member, precision, case.system) for member in members]
+        turned = run.attitude and task.integrator.carries_attitude
+        posed = [_posed(problem, *member) if turned else problem for problem, member in zip(true, members, strict=True)]
+        given = [_biased(problem, run.bias) for problem in posed]
+        times = [exact(number(time, precision)) for time in task.times]
+        before = saved.load()
+        done = _Done({}) if before is None else msgspec.convert(before, _Done, strict=False)
+
+        def save() -> None:
+            if saved.due():
+                saved.save(msgspec.to_builtins(done, str_keys=True))
+
+        began = perf_counter()
+        compared = reference(tuple(true), tuple(times), parse(run.reference).bits if run.reference else 0)
+        ready = perf_counter()
+        scorers = [
+            AttitudeScorer(problem, motion, *member, times, times) if turned else Scorer(problem, motion, times)
+            for problem, motion, member in zip(posed, compared.motions, members, strict=True)
+        ]
+        complete(done.motions, given, times, scorers, save, task.integrator, run.options)
+        motions = [done.motions[index] for index in range(len(members))]
+        seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
+        rounding = max(input_rounding(*member, p) for member, p in zip(members, true, strict=True))
+        return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """The laws, whether the planted faults are distinguished from them; the laws in short; a line for each law."""
+        if (found := laws_headline(rows)) is not None:
+            yield found
+        yield from laws_in_short(rows)
+        chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
+        notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]
+        if chaotic:
+            notes.append("Rate: the median over the starts of their finite-time rates.")
+        lacking = dict.fromkeys(row.key.subject.name for row in rows if NOT_CARRIED.items() <= row.flags.items())
+        notes += [f"No attitude, which it does not carry: {', '.join(lacking)}."] if lacking else []
+        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+        columns.append("lost at |t|")
+        title = "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
+        cells = [_cells(row, law) for row in rows for law in row.laws.values()]
+        yield Cells(title, columns, cells, notes)
+        yield from (Chart(digits), Chart(over_time))
+
+
+def _cells(row: Row, law: Law) -> list[Cell]:
+    return [
+        f"{row.case}{computed_by(row)} {row.key.subject.variant}".rstrip(),
+        row.precision,
+        _label(law),
+        f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
+        law.growth,
+        _exponent(law),
+        short(law.detects or "-", 2),
+        short(law.lost_at or "-", 2),
+    ]
+
+
+def _posed(problem: Problem, top: HeavyTop, start: State) -> Problem:
+    """The problem with the ξ that a start without attitude has."""
+    return Problem.of(top, start, problem.precision, problem.system, perpendicular(start.gamma))
+
+
+def _biased(problem: Problem, bias: str | None) -> Problem:
+    """The problem with its first moment of inertia off by the relative ``bias``: the planted fault."""
+    if bias is None:
+        return problem
+    first, *rest = problem.parameters.inertia
+    off = exact(number(first * (1 + exact(bias)), problem.precision))
+    return replace(problem, parameters=problem.parameters._replace(inertia=(off, *rest)))
+
+
+def _row(
+    task: Task,
+    starts: Sequence[Any],
+    motions: Sequence[Ended],
+    scorers: Sequence[Scorer],
+    compared: EnsembleReference,
+    seconds: dict[str, float],
+    rounding: Fraction,
+) -> Row:
+    """Where the motions ended, and what they come to together."""
+    precision, first = task.precision, motions[0]
+    alone = task.options.attitude and not task.integrator.carries_attitude
+    failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
+    reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
+    distance = math.sqrt(sum(float(part) ** 2 for part in task.given.top.centre))
+    found = growing(starts, task.times, motions, scorers, compared, time_text, distance)
+    metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
+    of = "roundings of one motion" if one_motion(task.given, task.options.seed) else "random starts"
+    who = f"computed: {first.integrator} in {precision.name}"
+    return Row(
+        case=task.title,
+        integrator=f"{first.integrator} {task.key.subject.variant}".rstrip(),
+        bits=precision.bits,
+        outcome=failed[0].outcome if failed else first.outcome,
+        time_reached=time_text(reached),
+        steps=sum(motion.steps for motion in motions),
+        finite=not failed and not any(m.value in ("nan", "missing") for m in metrics.values()),
+        metrics=by_name(metrics),
+        key=task.key,
+        reference=compared.against,
+        measured=f"{who}, {len(motions)} {of}, root mean square over them",
+        order=first.order,
+        flags=first.flags | {"bias": task.options.bias or "none"} | (NOT_CARRIED if alone else {}),
+        input_rounding=decimal_text(rounding, 3),
+        series=found.series,
+        samples=len(task.times),
+        starts=len(motions),
+        laws=found.laws,
+        seconds=seconds,
+    )
+
+
+def _label(law: Law) -> str:
+    """What a law is about."""
+    quantity = law.quantity or Quantity("")
+    if quantity.name == DRIFT:
+        return quantity.component
+    return f"error {quantity.component or quantity.name.removesuffix('_error')}"
+
+
+def _exponent(law: Law) -> str:
+    if law.exponent is None:
+        return "-"
+    return f"{law.exponent:.3f}" + ("" if law.low is None or law.high is None else f" [{law.low:.3f}, {law.high:.3f}]")

@@ -1,0 +1,1 @@
+"""Runs along homoclinic motions, and the law of their escape times."""

@@ -1,0 +1,230 @@
+"""The law drawn from the escape times of a run: how they grow with the bits of the format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+
+import numpy
+from msgspec.structs import replace
+
+from heavytop.cases import CASES
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome
+from heavytop.kind import Kind
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document.document import (
+    DASHED,
+    Block,
+    Cell,
+    Chart,
+    Headline,
+    Key,
+    Section,
+    Sources,
+    Table,
+    Value,
+    clip,
+    draw,
+    left_out,
+    logarithm,
+    short,
+)
+from heavytop.report.document.svg import COLOURS, MARKERS, finish, new_axes, spoken
+from heavytop.report.render.text import both
+from heavytop.report.store.checks import CLOSE
+
+NAME = "break_away_law"
+ESCAPE = Quantity("break_away_time")
+SLOPE, EXPECTED, OFF_BY = (Quantity("break_away_slope", statistic=part) for part in ("", "expected", "off_by"))
+_AGAINST = Against("proven", "ln 2 / rate of the saddle")
+_LAW = Key("law, ln 2 / rate per bit", 5, "", "6 3")
+_LARGEST = 150.0
+"""log10 of the longest time that is drawn."""
+
+
+def break_away_law(rows: Sequence[Row]) -> list[Row]:
+    """For each homoclinic case with two formats or more: how the escape time grows with the bits.
+
+    Least squares over the formats; expected slope ln 2/rate, for the errors of p-bit arithmetic leave the saddle
+    like 2^-p e^(rate t).
+    """
+    found: dict[tuple[str, Subject], list[Row]] = {}
+    for row in rows:
+        if row.outcome == Outcome.SUCCESS.value and row.metrics[ESCAPE.text].log10 is not None:
+            found.setdefault((row.case, row.key.subject), []).append(row)
+    laws = []
+    for members in found.values():
+        if len(members) < 2:
+            continue
+        bits = [float(row.bits) for row in members]
+        times = [float(Fraction(row.metrics[ESCAPE.text].value)) for row in members]
+        slope = float(numpy.polyfit(bits, times, 1)[0])
+        expected = float(numpy.log(2)) / CASES[members[0].key.case].rate
+        bands = [row.metrics[ESCAPE.text].band or 0.0 for row in members]
+        noise = [time * (10**band - 1) for time, band in zip(times, bands, strict=True)]
+        weights = numpy.subtract(bits, numpy.mean(bits)) / (len(bits) * numpy.var(bits))
+        off = float(numpy.linalg.norm(weights * noise))
+        laws.append(_law_row(members, Fraction(slope), Fraction(expected), off))
+    return laws
+
+
+def _law_row(members: Sequence[Row], slope: Fraction, expected: Fraction, noise: float) -> Row:
+    """noise: by how much rounding noise moves the slope, through the escape times."""
+    off_by = abs(slope / expected - 1)
+    first, horizon = members[0], max((row.horizon for row in members), key=lambda t: abs(Fraction(t)))
+    formats = ",".join(row.precision for row in members)
+    metrics = {
+        SLOPE: _with_band(of_fraction(slope, "value"), noise / float(slope)),
+        EXPECTED: of_fraction(expected, "value"),
+        OFF_BY: _with_band(of_fraction(off_by), noise / float(expected * off_by or 1)),
+    }
+    return Row(
+        case=first.case,
+        integrator=first.integrator,
+        bits=max(row.bits for row in members),
+        outcome=Outcome.SUCCESS.value,
+        time_reached=max((row.time_reached for row in members), key=lambda t: abs(Fraction(t))),
+        steps=sum(row.steps for row in members),
+        finite=True,
+        metrics=by_name(metrics),
+        key=RowKey(NAME, first.key.case, first.system, first.key.subject, formats, first.key.direction, horizon),
+        reference=_AGAINST,
+        measured="time units of escape gained per bit, least squares over the formats",
+    )
+
+
+def _with_band(metric: Metric, relative: float) -> Metric:
+    return replace(metric, band=round(math.log10(1 + abs(relative)), 4))
+
+
+_Place = tuple[str, Direction, str]
+"""Case, direction, source."""
+
+
+def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Escape time against the bits of the format, with the law of the saddle."""
+    found: dict[_Place, dict[int, Fraction]] = {}
+    slopes: dict[_Place, tuple[str, str]] = {}
+    for source, report in sources:
+        for row in report.rows:
+            place = _case(row), row.key.direction, source
+            if row.outcome == "success" and (metric := row.metrics.get(ESCAPE.text)):
+                if metric.log10 is not None and metric.log10 < _LARGEST:
+                    found.setdefault(place, {})[row.bits] = exact(metric.number)
+            elif row.key.kind == NAME and row.metrics:
+                slopes[place] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
+    if not found:
+        return None
+    section = Section(
+        "break-away",
+        "Escape time against bits",
+        [
+            "A homoclinic motion tends to a saddle, which multiplies every rounding error by e^(rate·|t|). No "
+            "integrator stays on it: more digits buy time in proportion. Dashed: the law, ln 2 / rate time units per "
+            "bit, through the mean of the points."
+        ],
+        columns=["case", "escape |t| per format", "slope (time per bit)", "ln 2 / rate"],
+        place=40,
+    )
+    axes = new_axes("format (bits)", "escape |t| (time units of the data)", 3.0)
+    merged = _both_directions(found)
+    left_out(section, len(merged) - len(COLOURS) * max(1, len(sources)), "case")
+    alternative, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]
+    for name, place, source in merged:
+        if name not in bases:
+            continue
+        old, number = source == "baseline", bases.index(name)
+        label = f"{clip(name, 40)}, {source}" if source else clip(name, 40)
+        key = section.key(Key(label, number, MARKERS[number], "", old, False))
+        pairs = sorted(found[place].items())
+        bits, times = [float(b) for b, _ in pairs], [float(t) for _, t in pairs]
+        draw(axes, key, bits, times, 5.5)
+        measured, expected = slopes.get(place, ("", ""))
+        if logarithm(expected) is not None and not old:
+            slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
+            line = [middle[1] + slope * (b - middle[0]) for b in bits]
+            axes.plot(bits, line, color=COLOURS[number], lw=1.2, ls=DASHED, label=_LAW.label)
+        listed = ", ".join(f"{t:g} at {b:g}" for b, t in zip(bits, times, strict=True))
+        alternative.append(f"{label}: {listed} bits.")
+        section.rows.append([label, listed, short(measured), short(expected)])
+    if slopes:
+        section.key(_LAW)
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=0)
+    section.pictures.append(finish(axes, "Escape time against bits", spoken(alternative), "break-away"))
+    return section
+
+
+def _case(row: Row) -> str:
+    return row.key.case if row.key.subject.name == HEYOKA else f"{row.key.case} ({row.key.subject.name})"
+
+
+def _both_directions(found: dict[_Place, dict[int, Fraction]]) -> list[tuple[str, _Place, str]]:
+    """(name, place, source): a case that escapes at the same times forward and backward is named once."""
+    result: list[tuple[str, _Place, str]] = []
+    for (case, direction, source), times in found.items():
+        other = found.get((case, "backward" if direction == "forward" else "forward", source))
+        if direction and other == times:
+            if direction == "forward":
+                result.append((case, (case, direction, source), source))
+        else:
+            name = f"{case}/{direction}" if direction else case
+            result.append((name, (case, direction, source), source))
+    return result
+
+
+class BreakAwayLaw(Kind):
+    """Rows drawn from those of homoclinic motions; no plan asks for them."""
+
+    name = NAME
+    needed = (SLOPE.text, EXPECTED.text, OFF_BY.text)
+    noise_factor = 8.0
+    place = 70
+
+    def carries_band(self, metric: Metric) -> bool:
+        """The slope, and how far it is off."""
+        return super().carries_band(metric) or metric.quantity == SLOPE
+
+    def noise_is_added(self, metric: Metric) -> bool:
+        """To slopes."""
+        return True
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """The three numbers say the same."""
+        found = [metric.value for metric in _numbers(row)]
+        if len(found) < 3:
+            return
+        try:
+            slope, expected, off = map(exact, found)
+        except InputError:
+            return
+        if expected == 0 or abs(abs(slope / expected - 1) - off) > CLOSE / 100:
+            yield f"{OFF_BY.text}: {found[2]}, where the slope is {found[0]} and {found[1]} is expected"
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """What a bit of the format buys, and how far that is from the law; a line a case."""
+        slopes, off = ([float(row.metrics[each.text]) for row in rows if row.metrics] for each in (SLOPE, OFF_BY))
+        if slopes:
+            low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
+            buys = f"A bit of the format buys {low if low == high else f'{low} to {high}'} time units before the escape"
+            yield Headline(f"{buys}: ln 2 / rate within {100 * max(off):.2g} %.")
+        yield Table(
+            "Escape time gained per bit of the format",
+            ("case", "measured", "ln 2 / rate", "off by"),
+            both((row, _cells(*found)) for row in rows if (found := _numbers(row))),
+        )
+        yield Chart(escape_times)
+
+
+def _numbers(row: Row) -> list[Metric]:
+    """The slope, the expected one and by how much it is off."""
+    return [row.metrics[each.text] for each in (SLOPE, EXPECTED, OFF_BY) if each.text in row.metrics]
+
+
+def _cells(slope: Metric, expected: Metric, off_by: Metric) -> list[Cell]:
+    return [Value(slope), Value(expected), f"{float(off_by):.1%}"]

@@ -1,0 +1,267 @@
+"""Integrators on a homoclinic motion, against its closed form, until they escape from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+from functools import lru_cache
+
+from msgspec.structs import replace
+
+from heavytop.cases import Case
+from heavytop.errors import OutOfReach
+from heavytop.features.claims.kinds.claim_model import INTEGRATION_ERROR, claim_error
+from heavytop.features.homoclinic.break_away_law import ESCAPE, break_away_law, escape_times
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import samples, signed
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, time_metric
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.kind import Kind
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.rounding_noise import Reruns, banded, escape_band
+from heavytop.measure.scalar import GUARD_BITS
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
+from heavytop.measure.truth import Truth, certified
+from heavytop.precision import DOUBLE, exact, parse, time_text
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.compare.verdicts import size
+from heavytop.report.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip, short
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.render.page import in_columns
+from heavytop.report.render.text import NOISE_BAND, both, drifts
+
+NAME = "homoclinic"
+ESCAPED = Fraction(1, 1000)
+"""A computed homoclinic motion has escaped when Ω is wrong by this, in units of α."""
+WINDOW = 10
+"""The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
+_AS_LONG, _WORSE = 0.05, 2.0
+"""Decades of the escape time, and of an error."""
+_CERTIFIED_AT = 4
+"""The closed form of a homoclinic case is certified at this |t|."""
+
+
+class HomoclinicTable(PlanTable, tag=NAME):
+    """samples: samples in one unit of 1/rate.  integrator: any that `heavytop list` shows."""
+
+    cases: list[str]
+    precisions: list[str]
+    samples: int = 8
+    directions: tuple[Direction, ...] = ("forward", "backward")
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        tasks = []
+        for case in map(find, self.cases):
+            spacing = Fraction(round(64 / (samples(self.samples) * case.rate)) or 1, 64)
+            for precision in map(parse, self.precisions):
+                end = _end(case, precision.bits)
+                times = [spacing * i for i in range(1, int(end / spacing) + 1)]
+                keep = times[self.samples - 1 :: self.samples]
+                for direction in self.directions:
+                    signs = signed(times, direction)
+                    subject = computed(self.integrator)
+                    name, horizon = precision.name, time_text(signs[-1])
+                    key = RowKey(NAME, case.name, case.system.name, subject, name, direction, horizon)
+                    tasks.append(Task(key, f"/{direction}", self.integrator, case, signs, signed(keep, direction)))
+        return tasks
+
+
+class Homoclinic(Kind):
+    """When a run leaves a homoclinic motion, and its error and drift before.
+
+    Errors of Ω in 1/time unit, of γ none.
+    """
+
+    name = NAME
+    table = HomoclinicTable
+    needed = (ESCAPE.text,)
+    noise_factor = 8.0
+    largest_amplification = 10 * math.exp(WINDOW)
+    concludes = True
+    place = 60
+
+    def carries_band(self, metric: Metric) -> bool:
+        """Every error, and the time."""
+        return super().carries_band(metric) or metric.quantity == ESCAPE
+
+    def noise_is_reruns(self, metric: Metric) -> bool:
+        """All bands."""
+        return True
+
+    def series_has_more(self, quantity: Quantity | None) -> bool:
+        """Near a saddle, errors are taken early, and the series goes on."""
+        return quantity is None or quantity.name != DRIFT
+
+    def conclude(self, rows: Sequence[Row]) -> list[Row]:
+        """How the escape time grows with the bits."""
+        return break_away_law(rows)
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """The case has a homoclinic closed form, and the format takes its data exactly; the times are uniform.
+
+        Raises OutOfReach where the closed form is not certified for the format.
+        """
+        case, precision = task.given, task.precision
+        closed = case.homoclinic
+        assert closed is not None
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        given = case.system.parameters(case.top, case.start)
+        exactly = given.mapped(Fraction)
+        if (problem.parameters, problem.start) != (exactly, case.start):
+            raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
+        early = Fraction(_CERTIFIED_AT if task.times[-1] > 0 else -_CERTIFIED_AT)
+        known = certified(closed, early, precision.bits + GUARD_BITS)
+        if known is None:
+            raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
+        truth = known.truth.remembered()
+        scorer = _scorer(case, problem, truth, task.keep)
+        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
+        metrics = _with_bands(task, run, _metrics(scorer))
+        error = scorer.error
+        assert error is not None
+        series = error.series(time_text) | scorer.drift.series(time_text)
+        return computed_row(task, run, metrics, series, known.against)
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """A motion escapes before the run ends."""
+        away = row.metrics.get(ESCAPE.text)
+        if away is not None and away.log10 is not None and abs(exact(away.number)) > abs(exact(row.horizon)):
+            yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Until when they stay; the escape times, and what these do not show; a line for each case and format."""
+        known = [row for row in rows if row.outcome == Outcome.SUCCESS.value and ESCAPE.text in row.metrics]
+        if known:
+            yield _headline(known)
+        shown = [row for row in rows if row.key.direction != "backward" and ESCAPE.text in row.metrics]
+        title = "Escape from a homoclinic motion at |t|"
+        yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
+        yield from (Note(said, shown=In.SHORT) for said in _hidden(shown))
+        yield Cells(
+            "Integrators on a homoclinic motion, against its closed form",
+            ["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"],
+            both((row, _cells(row)) for row in rows),
+            [
+                "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first "
+                "integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost. α: the "
+                "angular velocity of the rotation that the motion tends to; of none, the largest |Ωi| at the start.",
+                NOISE_BAND,
+            ],
+        )
+        yield from (Chart(claim_error), Chart(escape_times))
+
+
+def _headline(known: Sequence[Row]) -> Headline:
+    """Until when the narrowest and the widest format stay; of third-party integrators where there are any."""
+    theirs = [row for row in known if row.key.subject.name != HEYOKA]
+    name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
+    on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
+    said = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
+    ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
+    return Headline(f"{said}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}.")
+
+
+def _cells(row: Row) -> list[Cell]:
+    error, *others = _errors(row).values()
+    escape = Value(row.metrics.get(ESCAPE.text), noise=True)
+    return [row.precision, Value(error, noise=True), *map(Value, others), escape, row.outcome]
+
+
+def _errors(row: Row) -> dict[str, Metric | None]:
+    """The errors of Ω and γ, and the largest drift of a first integral, by what is said of them."""
+    names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
+    name = next(names, SOLUTION_ERROR)
+    drift = max((metric for _, metric in drifts(row)), key=size, default=None)
+    found = {f"error of {symbol}": row.metric(name, part, "max") for part, symbol in (("omega", "Ω"), ("gamma", "γ"))}
+    return found | {"drift": drift}
+
+
+def _hidden(rows: Iterable[Row]) -> Iterator[str]:
+    """What an escape time does not show: a run that stays as long as heyoka's and is worse in another way."""
+    ours = {(row.key.case, row.precision): row for row in rows if _by(row, HEYOKA)}
+    for row in rows:
+        own = ours.get((row.key.case, row.precision), row)
+        if _stayed(row) < _stayed(own) - _AS_LONG:
+            continue
+        pairs = zip(_errors(row).items(), _errors(own).values(), strict=True)
+        worse = [(size(mine) - size(known), what, mine, known) for (what, mine), known in pairs if mine and known]
+        lost, what, mine, known = max(worse, key=lambda each: each[0], default=(0.0, "", None, None))
+        if lost > _WORSE:
+            yield f"{row.key.case}: the {what} of {row.key.subject.name} is {Value(mine)}, heyoka's {Value(known)}."
+
+
+def _stayed(row: Row) -> float:
+    """log10 of the escape time; of none that of the horizon."""
+    return math.log10(abs(exact(_until(row))))
+
+
+def _until(row: Row) -> str:
+    time = row.metrics[ESCAPE.text]
+    return row.horizon if time.log10 is None else time.value
+
+
+def _by(row: Row, name: str) -> bool:
+    return row.key.subject.name == name
+
+
+def _stays(rows: Iterable[Row]) -> str:
+    """``12 to 63 in double, 62 to 321 in real:237``: escape times of the narrowest and the widest format."""
+    formats: dict[tuple[int, str], list[Fraction]] = {}
+    for row in rows:
+        formats.setdefault((row.bits, row.precision), []).append(abs(exact(_until(row))))
+    found = []
+    for _, name in dict.fromkeys((min(formats), max(formats))):
+        low, high = (f"{float(pick(formats[_, name])):.3g}" for pick in (min, max))
+        found.append(f"{low if low == high else f'{low} to {high}'} in {name}")
+    return ", ".join(found)
+
+
+def _end(case: Case, bits: int) -> float:
+    """|t| by which a run with so many bits has escaped."""
+    return (1.1 * bits * math.log(2) + 4) / case.rate
+
+
+def _scorer(case: Case, problem: Problem, truth: Truth, keep: Sequence[Fraction] = ()) -> Scorer:
+    name = INTEGRATION_ERROR if case.claim else SOLUTION_ERROR
+    until = WINDOW / case.rate
+    return Scorer(problem, truth, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
+
+
+def _metrics(scorer: Scorer) -> dict[str, Metric]:
+    assert scorer.error is not None
+    escape = time_metric(scorer.error.escape, "duration")
+    return by_name({ESCAPE: escape}) | scorer.error.metrics() | scorer.drift.metrics()
+
+
+def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict[str, Metric]:
+    """``metrics`` of a row with their bands, that of the escape time from the times of the reruns."""
+    case = task.case
+    assert case is not None
+    reruns = Reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.integrator, task.seed)
+    if run.outcome is not Outcome.SUCCESS or not reruns.possible:
+        return metrics
+    times = tuple(time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits))
+    # another package's integrator may not do the same again
+    again = _again if reruns.integrator.supports_ensemble else _again.__wrapped__
+    found, escaped = again(case, reruns, times)
+    metrics = banded(run, metrics, found)
+    escapes = [abs(each) for each in escaped if each is not None]
+    own = metrics[ESCAPE.text]
+    if own.log10 is not None and len(escapes) == len(escaped):
+        band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+        metrics = metrics | {ESCAPE.text: replace(own, band=band)}
+    return metrics
+
+
+@lru_cache(maxsize=16)
+def _again(
+    case: Case, reruns: Reruns, times: tuple[Fraction, ...]
+) -> tuple[list[dict[str, Metric]], list[Fraction | None]]:
+    """Metrics and escape times of the reruns, the same for every format that the case is measured in."""
+    assert case.homoclinic is not None
+    truth = Truth(Against("proven", case.homoclinic.method), case.homoclinic.state).remembered()
+    scorers = reruns.of(times, lambda given: _scorer(case, given, truth))
+    return [each.metrics() for each in scorers], [each.error.escape for each in scorers if each.error is not None]

@@ -1,0 +1,163 @@
+"""`heavytop.hunt`: the search for the motion that breaks an integrator."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from shlex import quote
+from typing import Any
+
+from heavytop import arguments
+from heavytop.arguments import Number
+from heavytop.errors import InputError, quoted
+from heavytop.features.hunt.measured import FAMILIES, Family
+from heavytop.features.hunt.search import Advance, Asked, Hunted, documents
+from heavytop.features.hunt.search import hunt as search
+from heavytop.features.hunt.text import hunt_text
+from heavytop.integrate import registry
+from heavytop.integrate.peers.command import close_all
+from heavytop.integrate.registry import IntegratorSource, named
+from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, physical, time_text, whole
+
+_MOST = 1_000_000
+_MOST_SECONDS = 10**7
+_BUDGET = 'Give a number of motions, "5000", or seconds, "60s".'
+
+
+@dataclass(frozen=True, slots=True)
+class Hunt:
+    """What a hunt came to; prints as `heavytop hunt` does.
+
+    found: a dict each, worst first: exact texts of ``inertia``, ``weight``, ``centre``, ``omega`` and ``gamma`` after
+    shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one was aborted),
+    ``outcome``, ``class``, ``command`` that shows it again, ``toml`` ready to paste.
+    motions: that were tried, shrinking left out.  seed: of the search.
+    hunted: everything that was measured; again: the command that searches so again.
+    """
+
+    found: list[dict[str, Any]]
+    motions: int
+    seed: int
+    hunted: Hunted
+    again: str
+
+    def __str__(self) -> str:
+        return hunt_text(self.hunted, self.found, self.again)
+
+    def document(self) -> dict[str, Any]:
+        """What `heavytop hunt --json` prints."""
+        return {"found": self.found, "motions": self.motions, "seed": self.seed}
+
+
+def hunt(
+    integrator: str | Callable[..., Any] = "heyoka",
+    precision: Precision | str = "double",
+    horizon: Number = 100,
+    budget: int | str = "5000",
+    family: Family = "any",
+    against: str | Callable[..., Any] | None = None,
+    limit: Number | None = None,
+    seed: int = 1,
+    advance: Advance | None = None,
+) -> Hunt:
+    """Search bodies and starts for the motion on which an integrator is most wrong, or fails.
+
+    Arguments:
+        integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
+        precision, horizon: the format, and the time up to which errors count; negative for backwards.
+        budget: a number of motions, or seconds such as "60s", which become a number by the cost of the first 64.
+        family: "any", or tops that are all "euler", "lagrange" or "kovalevskaya", or tops with a rotor,
+            "heavy_gyrostat".
+        against: an integrator; then the ratio to its error is searched for.
+        limit: what counts as found: an error in eps T^1.5, or with ``against`` a ratio.  None for two decades beyond
+            what the integrator's own law and the motion's amplification explain.
+        seed: the same seed and number of motions search the same.
+        advance: called with (motions done, motions in all) after each 64.
+
+    Returns:
+        A :class:`Hunt`.
+
+    Raises:
+        InputError: for an unknown integrator or family, an impossible budget, horizon, limit or seed.
+    """
+    which = named(integrator)
+    form = arguments.precision(precision)
+    asked = asked_for(which, form, horizon, budget, family, against, limit, seed)
+    try:
+        hunted = search(asked, arguments.callback(advance, "advance"))
+    finally:
+        close_all()
+    name = integrator if isinstance(integrator, str) else asked.integrator.name
+    again = _again(asked, name, against, hunted.planned)
+    return Hunt(documents(hunted, name), hunted.motions, asked.seed, hunted, again)
+
+
+def asked_for(
+    which: str | IntegratorSource,
+    form: Precision,
+    horizon: Number,
+    budget: int | str,
+    family: str,
+    against: str | Callable[..., Any] | None,
+    limit: Number | None,
+    seed: int,
+) -> Asked:
+    """The search, checked; raises InputError as :func:`hunt` does."""
+    registry.require(which)
+    other = None if against is None else named(against)
+    if other is not None:
+        registry.require(other)
+    if not isinstance(family, str) or family not in FAMILIES:
+        raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
+    time = physical(exact(horizon), "horizon")
+    if not time:
+        raise InputError("horizon = 0 is no time.", "Give a time other than 0, such as 100.")
+    if which == "heyoka" and form == DOUBLE_DOUBLE:
+        raise InputError("heyoka has no double-double.", "Use --integrator multiword, or another format.")
+    number, seconds = _budget(budget)
+    beyond = None if limit is None else float(physical(exact(limit), "limit"))
+    if beyond is not None and not beyond > 0:
+        raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
+    if other is not None and other == which:
+        raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
+    one, two = _integrator(which), None if other is None else _integrator(other)
+    families: dict[str, Family] = {each: each for each in FAMILIES}
+    return Asked(one, form, time, families[family], two, beyond, number, seconds, _seed(seed))
+
+
+def _integrator(which: str | IntegratorSource) -> ChosenIntegrator:
+    return ChosenIntegrator(which) if isinstance(which, str) else ChosenIntegrator(which.name, source=which)
+
+
+def _seed(value: int) -> int:
+    found = whole(value, "seed")
+    if not 0 <= found <= 10**9:
+        raise InputError(f"There is no seed {quoted(found)}.", "Give a number from 0 to 1000000000.")
+    return found
+
+
+def _budget(value: int | str) -> tuple[int | None, float | None]:
+    """A number of motions, or seconds."""
+    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= _MOST:
+        return value, None
+    text = value.strip() if isinstance(value, str) else ""
+    if re.fullmatch(r"[0-9]{1,9}", text) and 1 <= int(text) <= _MOST:
+        return int(text), None
+    if re.fullmatch(r"[0-9]{1,7}(\.[0-9]{1,3})?s", text) and 0 < float(text[:-1]) <= _MOST_SECONDS:
+        return None, float(text[:-1])
+    raise InputError(f"budget = {quoted(value)} is none.", _BUDGET)
+
+
+def _again(asked: Asked, name: str, against: str | Callable[..., Any] | None, planned: int) -> str:
+    """The command that searches so again, with the number of motions in the place of seconds."""
+    parts = [f"heavytop hunt --integrator {quote(name)} --precision {asked.precision.name}"]
+    parts.append(f"--horizon {time_text(asked.horizon)} --budget {planned} --seed {asked.seed}")
+    if asked.family != "any":
+        parts.append(f"--family {asked.family}")
+    if asked.against is not None:
+        parts.append(f"--against {quote(against if isinstance(against, str) else asked.against.name)}")
+    if asked.limit is not None:
+        parts.append(f"--limit {asked.limit:.17g}")
+    return " ".join(parts)

@@ -1,0 +1,668 @@
+"""How wrong an integrator is on many motions, and how much of it the motions themselves explain.
+
+The truth is a run in about twice the digits of the format, double-double in lanes for double; a second one from a start
+moved by 2^-17 roundings tells how much the motion amplifies, for a hundredth of the cost of
+:mod:`heavytop.top.amplification`, which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|)
+over the samples, with the :func:`heavytop.top.amplification.rate` of the motion.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from random import Random as Generator
+from typing import Any, Literal, NamedTuple, TypeVar
+
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed
+from heavytop.exact.catalogue import matches
+from heavytop.harness.sweeps import Random
+from heavytop.integrate import registry
+from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.peers.command import Command, begin_row
+from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
+from heavytop.processes import GuardedProcess
+from heavytop.records import FAILED, OUT_OF_TIME
+from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
+from heavytop.top.equations import system_of
+from heavytop.top.heavy_top import HeavyTop, State
+
+# A Python third-party integrator in a process of its own, which is ended when one motion exceeds its time limit.
+
+
+SECONDS = 10.0
+"""Of one motion, as of a row of a gate whose integrator keeps running out of time."""
+_BEGIN = 60.0
+
+
+class IntegratedRun(NamedTuple):
+    """How a run ended, and its states, one a time, in native numbers; said: why it was aborted."""
+
+    outcome: str
+    states: Sequence[Any]
+    said: str = ""
+
+
+def follow(
+    integrator: ChosenIntegrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
+) -> IntegratedRun:
+    """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
+    try:
+        if integrator.supports_ensemble or isinstance(integrator.source, Command):
+            run = integrator.propagate(top, start, times, precision, system_of(None, top), again=False)
+        else:
+            which: Any = integrator.which
+            run = _ready(which)(top, start, times, precision, system=system_of(None, top))
+    except InputError:
+        raise
+    except HeavyTopError as error:
+        return IntegratedRun(FAILED, (), error.cause)
+    short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
+    return IntegratedRun((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
+
+
+@lru_cache(maxsize=4)
+def _ready(which: Any) -> registry.Peer:
+    """The integrator, looked up once."""
+    return registry.ready(which)
+
+
+class Apart:
+    """A process with that integrator; a motion that it does not finish within ``seconds`` ends it, and another begins.
+
+    What the integrator started ends with its process.
+    """
+
+    def __init__(self, integrator: ChosenIntegrator, seconds: float = SECONDS) -> None:
+        self._integrator, self._seconds = integrator, seconds
+        self._process: GuardedProcess | None = None
+
+    def follow(self, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> IntegratedRun:
+        """One motion; one that ends its process or takes too long is an outcome."""
+        try:
+            process = self._process or self._begin()
+            asked = process.submit(follow, self._integrator, top, start, times, precision)
+            if isinstance(
+                asked.exception(timeout=self._seconds), KeyboardInterrupt
+            ):  # of the integrator, not of a user
+                return IntegratedRun(FAILED, (), f"{self._integrator.name} raised KeyboardInterrupt")
+            return asked.result()
+        except TimeoutError:
+            self.end()
+            return IntegratedRun(OUT_OF_TIME, (), f"{self._integrator.name} was stopped after {self._seconds:.3g} s")
+        except BrokenProcessPool:
+            self.end()
+            return IntegratedRun(FAILED, (), f"{self._integrator.name} ended its whole process")
+
+    def _begin(self) -> GuardedProcess:
+        self._process = process = GuardedProcess()
+        try:
+            process.guard(process.submit(_hello, self._integrator).result(timeout=_BEGIN))
+        except TimeoutError:
+            self.end()
+            raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
+        return process
+
+    def end(self) -> None:
+        """Kill the process and whatever it started."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
+
+
+def _hello(integrator: ChosenIntegrator) -> int:
+    """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
+    begin_row()
+    with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
+        follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], _double())
+    return os.getpid()
+
+
+def _double() -> Precision:
+    from heavytop.precision import DOUBLE
+
+    return DOUBLE
+
+
+# Motions that a hunt tries: drawn at random in ways that integrators find hard, and changed from the worst so far.
+#
+# Everything is exact and depends on the seeds of :class:`Dice` alone.
+
+
+Family = Literal["any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat"]
+FAMILIES: tuple[Family, ...] = ("any", "euler", "lagrange", "kovalevskaya", "heavy_gyrostat")
+Motion = tuple[HeavyTop, State]
+MOST_TURNS = 20_000
+"""Motions of more radians, the rate times the horizon, are not tried: they cost what thousands of others do."""
+_MOST_RATIO = 10**6
+_LARGEST = 10**30
+_BITS = 40
+_UNIT_BITS = 60
+_PLAIN_EVERY = 2
+"""Of the first motions every second is a plain random top: the law of the integrator is measured on them."""
+_POLES = [tuple(Fraction(sign * (i == j)) for j in range(3)) for i in range(3) for sign in (1, -1)]
+_T = TypeVar("_T")
+
+
+class Dice:
+    """Draws of one seed; the same on every machine, as of Python's generator random() alone is promised to stay."""
+
+    def __init__(self, seed: str) -> None:
+        self._random = Generator(seed).random
+
+    def below(self, count: int) -> int:
+        """An integer from 0 to count − 1."""
+        return int(count * self._random())
+
+    def pick(self, things: Sequence[_T]) -> _T:
+        """One of them."""
+        return things[self.below(len(things))]
+
+    def part(self) -> Fraction:
+        """Of (−1, 1), in thousandths."""
+        return Fraction(2 * self.below(1000) - 999, 1000)
+
+    def power(self, least: int, most: int) -> Fraction:
+        """1 to 9.9 times a power of ten from 10^least to 10^most."""
+        return Fraction(10 + self.below(90), 10) * Fraction(10) ** (least + self.below(most - least + 1))
+
+    def direction(self) -> Vector:
+        """A rational unit vector, uniform on the sphere but for rounding."""
+        while True:
+            p, q, r = (self.part() for _ in range(3))
+            if 0 < p * p + q * q + r * r <= 1:
+                return unit((p, q, r))
+
+
+def unit(values: Sequence[Fraction]) -> Vector:
+    """A rational point of the unit sphere within 2^-58 of the direction of ``values``, which are not all 0."""
+    return State((0, 0, 0), values).normalized(_UNIT_BITS).gamma
+
+
+def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
+    """Number ``index`` of the random motions: every second one of the first 64 and every eighth beyond are plain."""
+    case = Random("random", seed, index + 1, "any" if family == "heavy_gyrostat" else family).cases()[index]
+    plain = case.top, case.start
+    if family == "heavy_gyrostat":
+        plain = _rotored(plain, Dice(f"{seed}/rotor/{index}"))
+    if is_plain(index):
+        return plain
+    dice = Dice(f"{seed}/hunt/{index}")
+    return possible(dice.pick(_WAYS)(plain, dice), family, horizon) or plain
+
+
+def is_plain(index: int) -> bool:
+    """Whether that random motion is one of a sweep of random tops."""
+    return index % (_PLAIN_EVERY if index < 64 else 8) == 0
+
+
+def changed(one: Motion, other: Motion, seed: str, family: Family, horizon: Fraction) -> Motion:
+    """``one`` with one to three changes; ``other`` may give it its body or its start."""
+    dice = Dice(seed)
+    found = one
+    for _ in range(1 + dice.below(3)):
+        found = _crossed(found, other, dice) if dice.below(8) == 0 else dice.pick(_CHANGES)(found, dice)
+    if found[0].rotor is not None and dice.below(3) == 0:
+        found = _rotored(found, dice)
+    return possible(found, family, horizon) or one
+
+
+def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None:
+    """The motion in that family with numbers of 40 bits; None where no body has its moments, its data are beyond
+    1e30, or it turns more than :data:`MOST_TURNS` radians.
+    """
+    top, start = motion
+    inertia, centre = list(top.inertia), list(top.centre)
+    if family == "euler":
+        centre = [Fraction(0)] * 3
+    elif family == "lagrange":
+        inertia[1], centre[:2] = inertia[0], [Fraction(0)] * 2
+    elif family == "kovalevskaya":
+        inertia[:2], centre[2] = [2 * inertia[2]] * 2, Fraction(0)
+    rotor = list(map(_short, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
+    inertia, centre, omega = (list(map(_short, each)) for each in (inertia, centre, start.omega))
+    weight = _short(top.weight)
+    if min(inertia) <= 0 or 2 * max(inertia) > sum(inertia) or max(inertia) > _MOST_RATIO * min(inertia):
+        return None
+    sizes = [abs(value) for value in (*inertia, weight, *centre, *omega, *(rotor or ())) if value]
+    if max(sizes) > _LARGEST or min(sizes) * _LARGEST < 1:
+        return None
+    found = HeavyTop(inertia, weight, centre, rotor), State(omega, start.gamma)
+    return found if turns(found, horizon) <= MOST_TURNS else None
+
+
+def turns(motion: Motion, horizon: Fraction) -> float:
+    """How many radians the motion turns until the horizon, at most: its rate times the time."""
+    top, start = motion
+    system = system_of(None, top)
+    return float(rate(system, system.parameters(top, start), start.flat) * abs(horizon))
+
+
+def _short(value: Fraction) -> Fraction:
+    """The value, or the nearest of 40 bits where it needs more than twice as many."""
+    long = value.numerator.bit_length() + value.denominator.bit_length() > 2 * _BITS
+    return round_to(value, _BITS) if long else value
+
+
+def _simple(motion: Motion, dice: Dice) -> Motion:
+    """Small numbers, zeros and equal moments."""
+    moments = dice.pick([(1, 1, 1), (2, 2, 1), (2, 1, 1), (3, 2, 1), (1, 1, 2), (4, 4, 1), (4, 3, 2), (3, 4, 2)])
+    by = dice.below(3)
+    inertia = moments[by:] + moments[:by]
+    centre = [Fraction(dice.below(5) - 2, 2) for _ in range(3)]
+    omega = [Fraction(dice.below(9) - 4, 2) for _ in range(3)]
+    top = with_data(motion[0], inertia, 1 + dice.below(3), centre)
+    return top, State(omega, dice.pick([*_POLES, motion[1].gamma]))
+
+
+def _edge(motion: Motion, dice: Dice) -> Motion:
+    """Moments at the edge of the triangle inequality: almost a rod or a disc, or exactly."""
+    second = [1 + abs(dice.part()) for _ in range(3)]
+    for place in range(1 + dice.below(2)):
+        second[(place + dice.below(3)) % 3] *= dice.pick([Fraction(0), dice.power(-5, -2)])
+    x, y, z = second
+    inertia = (y + z, z + x, x + y)
+    return (with_data(motion[0], inertia=inertia) if min(inertia) else motion[0]), motion[1]
+
+
+def _equal(motion: Motion, dice: Dice) -> Motion:
+    """Two moments in a small ratio, exactly or nearly."""
+    inertia = list(motion[0].inertia)
+    i, j = dice.pick([(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)])
+    near = dice.pick([Fraction(0), dice.power(-9, -3)])
+    inertia[i] = inertia[j] * dice.pick([Fraction(1), Fraction(1), Fraction(2), Fraction(3, 2)]) * (1 + near)
+    inertia[3 - i - j] = (inertia[i] + inertia[j]) * (2 + dice.part()) / 3
+    return with_data(motion[0], inertia=inertia), motion[1]
+
+
+def _spun(motion: Motion, dice: Dice) -> Motion:
+    """One component of Ω many times as large, or small; or alone."""
+    top, start = motion
+    omega = [Fraction(0)] * 3 if dice.below(3) == 0 else list(start.omega)
+    place = dice.below(3)
+    omega[place] = (start.omega[place] or Fraction(1)) * dice.power(-4, 2)
+    return top, State(omega, start.gamma)
+
+
+def _slow(motion: Motion, dice: Dice) -> Motion:
+    """Ω of any smallness, or none."""
+    top, start = motion
+    factor = dice.pick([Fraction(0), dice.power(-14, -1)])
+    return top, State([value * factor for value in start.omega], start.gamma)
+
+
+def _weighed(motion: Motion, dice: Dice) -> Motion:
+    """A tiny or huge weight."""
+    return with_data(motion[0], weight=motion[0].weight * dice.power(-12, 4)), motion[1]
+
+
+def _scaled(motion: Motion, dice: Dice) -> Motion:
+    """Other units of mass, and the centre as far as it has to be."""
+    top, start = motion
+    mass, length = dice.power(-12, 11), dice.power(-6, 5)
+    inertia, centre = [mass * value for value in top.inertia], [length * value for value in top.centre]
+    return with_data(top, inertia, top.weight * mass / length, centre, rotor_times=mass), start
+
+
+def _faster(motion: Motion, dice: Dice) -> Motion:
+    """The same path at another pace: Ω times s, the weight times s²."""
+    top, start = motion
+    pace = dice.power(-6, 1)
+    omega = [pace * value for value in start.omega]
+    return with_data(top, weight=top.weight * pace**2, rotor_times=pace), State(omega, start.gamma)
+
+
+def _poled(motion: Motion, dice: Dice) -> Motion:
+    """γ along an axis of the body, or near it."""
+    top, start = motion
+    near, pole = dice.pick([Fraction(0), dice.power(-12, -1)]), dice.pick(_POLES)
+    return top, State(start.omega, unit([a + near * dice.part() for a in pole]))
+
+
+def _balanced(motion: Motion, dice: Dice) -> Motion:
+    """Near an equilibrium: Ω = w γ is a permanent rotation, w = 0 rest, where P r = w² I γ + c γ; which of them are
+    saddles, and have separatrices near them, chance decides.
+    """
+    top, start = motion
+    gamma = dice.pick([dice.pick(_POLES), start.gamma])
+    speed = dice.pick([Fraction(0), Fraction(0), Fraction(1), dice.power(-2, 1)])
+    along = dice.pick([Fraction(1), Fraction(-1), Fraction(0), dice.part()])
+    near = dice.pick([Fraction(0), dice.power(-14, -2)])
+    centre = [(speed**2 * i * g + along * g) / (top.weight or 1) for i, g in zip(top.inertia, gamma, strict=True)]
+    return with_data(top, centre=centre), State([speed * g + near * dice.part() for g in gamma], gamma)
+
+
+def _pendulum(motion: Motion, dice: Dice) -> Motion:
+    """A plane pendulum near its separatrix: from below, Ω² = 4 P|r|/I."""
+    i, j, k = dice.pick([(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+    near = dice.pick([Fraction(0), dice.power(-14, -2)]) * dice.pick([1, -1])
+    across = dice.pick([Fraction(0), dice.power(-14, -4)])
+    centre, omega, gamma = ([Fraction(0)] * 3 for _ in range(3))
+    centre[i], gamma[i], omega[j], omega[k] = Fraction(1), Fraction(-1), 2 + near, across
+    return with_data(motion[0], weight=motion[0].inertia[j], centre=centre), State(omega, gamma)
+
+
+def _nudged(motion: Motion, dice: Dice) -> Motion:
+    """Every number a little other."""
+    top, start = motion
+    size = dice.power(-8, -1) / 10
+
+    def near(values: Sequence[Fraction]) -> list[Fraction]:
+        return [value * (1 + size * dice.part()) for value in values]
+
+    gamma = unit([value + size * dice.part() for value in start.gamma])
+    (weight,) = near([top.weight])
+    return with_data(top, near(top.inertia), weight, near(top.centre)), State(near(start.omega), gamma)
+
+
+def _without(motion: Motion, dice: Dice) -> Motion:
+    """A component of the centre or of Ω is 0, or has the other sign."""
+    top, start = motion
+    centre, omega = list(top.centre), list(start.omega)
+    dice.pick([centre, omega])[dice.below(3)] *= dice.pick([0, -1])
+    return with_data(top, centre=centre), State(omega, start.gamma)
+
+
+def _turned(motion: Motion, dice: Dice) -> Motion:
+    """The axes of the body or of the start called otherwise."""
+    top, start = motion
+    by = 1 + dice.below(2)
+
+    def cycled(values: Vector) -> list[Fraction]:
+        return [values[(i + by) % 3] for i in range(3)]
+
+    if dice.below(2):
+        rotor = None if top.rotor is None else cycled(top.rotor)
+        return HeavyTop(cycled(top.inertia), top.weight, cycled(top.centre), rotor), start
+    return top, State(cycled(start.omega), cycled(start.gamma))
+
+
+def _crossed(one: Motion, other: Motion, dice: Dice) -> Motion:
+    return (one[0], other[1]) if dice.below(2) else (other[0], one[1])
+
+
+def _rotored(motion: Motion, dice: Dice) -> Motion:
+    """A rotor of any size along any of the axes, or none."""
+    top, start = motion
+    size = max(top.inertia) * dice.pick([Fraction(0), Fraction(1), Fraction(1), Fraction(1), dice.power(-12, 1)])
+    rotor = [size * dice.pick([Fraction(0), dice.part(), dice.part()]) for _ in range(3)]
+    return HeavyTop(top.inertia, top.weight, top.centre, rotor), start
+
+
+def with_data(
+    top: HeavyTop,
+    inertia: Sequence[Any] | None = None,
+    weight: Fraction | int | None = None,
+    centre: Sequence[Any] | None = None,
+    rotor_times: Fraction | int = 1,
+) -> HeavyTop:
+    """The top with other data; a rotor that it has times a number."""
+    rotor = None if top.rotor is None else [rotor_times * value for value in top.rotor]
+    return HeavyTop(inertia or top.inertia, top.weight if weight is None else weight, centre or top.centre, rotor)
+
+
+Way = Callable[[Motion, Dice], Motion]
+_WAYS: tuple[Way, ...] = (
+    _simple, _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _balanced, _pendulum,
+)  # fmt: skip
+_CHANGES: tuple[Way, ...] = (
+    _edge, _equal, _spun, _slow, _weighed, _scaled, _faster, _poled, _balanced, _nudged, _nudged, _without, _turned,
+)  # fmt: skip
+
+
+SAMPLES = 10
+_MORE_BITS = 17
+"""The second start is so many bits nearer than a rounding of the format: its distance stays small on the way."""
+_WHERE = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
+"""The direction of the second start, a unit vector nearly, in no plane that a symmetric body knows."""
+_STEP_LIMIT = 1_000_000
+_LEAST = 1e-300
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredMotion:
+    """A motion and what an integrator made of it.
+
+    outcome: of its run; "" where the truth is unknown, and nothing can be said.  error: infinite of a run that did not
+    reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
+    other: the error of the integrator that it is compared with, None where there is none.
+    """
+
+    motion: Motion
+    outcome: str
+    error: float
+    amplification: float
+    turns: float
+    other: float | None = None
+    said: str = ""
+
+    def explained(self, eps: float) -> float:
+        """The error of a stable method whose every radian costs an eps: eps times amplification, times √turns."""
+        return eps * self.amplification * math.sqrt(1 + self.turns)
+
+
+class Meter:
+    """Measures motions with one integrator, and with the one that it is compared with."""
+
+    def __init__(
+        self, integrator: ChosenIntegrator, precision: Precision, horizon: Fraction, against: ChosenIntegrator | None
+    ) -> None:
+        self.integrator, self.precision, self.horizon, self.against = integrator, precision, horizon, against
+        self.times = [exact(number(horizon * i / SAMPLES, precision)) for i in range(1, SAMPLES + 1)]
+        self._fine = DOUBLE_DOUBLE if precision == DOUBLE else real(2 * precision.bits)
+        python = is_third_party(integrator.name) and not isinstance(integrator.source, Command)
+        self._shift = Fraction(1, 2 ** (precision.bits + _MORE_BITS))
+        self._apart = Apart(integrator, SECONDS) if python else None
+
+    def close(self) -> None:
+        """End the process of a third-party integrator."""
+        if self._apart is not None:
+            self._apart.end()
+
+    def measure(self, motions: Sequence[Motion]) -> list[MeasuredMotion]:
+        """Each of them, in order; the bits of one do not depend on the others."""
+        if not motions:
+            return []
+        problems = [Problem.of(*motion, self.precision, system_of(None, motion[0])) for motion in motions]
+        rates = [rate(each.system, each.parameters, each.start.flat) for each in problems]
+        truths = self._truths(problems, rates)
+        runs = self._runs(self.integrator, problems, motions, self._apart)
+        others = [] if self.against is None else self._runs(self.against, problems, motions, None)
+        found = []
+        for i, (motion, unit, (true, grown), run) in enumerate(zip(motions, rates, truths, runs, strict=True)):
+            turns = float(unit * abs(self.horizon))
+            other = self._error(others[i], true, unit) if others and true else None
+            if not true:
+                found.append(MeasuredMotion(motion, "", 0.0, grown, turns))
+            else:
+                error = self._error(run, true, unit)
+                outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
+                found.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
+        return found
+
+    def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> IntegratedRun:
+        """One run of the integrator that is hunted, or of another."""
+        if integrator == self.integrator and self._apart is not None:
+            return self._apart.follow(*motion, self.times, self.precision)
+        return follow(integrator, *motion, self.times, self.precision)
+
+    def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
+        """The same with the amplification over all directions, from the start on and from each sample on: what is
+        rounded on the way may grow by more than what is rounded at the start.
+        """
+        problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
+        largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
+        (states,) = self._finely([replace(problem, precision=self._fine)])
+        for time, state in zip(self.times[:-1], states or (), strict=False):
+            # of a motion that is lost anyway no more is asked
+            if largest > FOLLOWED:
+                break
+            later = amplification(problem.system, problem.parameters, tuple(state), self.horizon - time)
+            largest = max(largest, later)
+        return replace(found, amplification=max(largest, found.amplification))
+
+    def _runs(
+        self, integrator: ChosenIntegrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
+    ) -> list[IntegratedRun]:
+        if integrator.supports_ensemble:
+            runs = integrator.propagate_many(problems, self.times, threads=1)
+            return [IntegratedRun(run.outcome.value, run.states) for run in runs]
+        if apart is not None:
+            return [apart.follow(*motion, self.times, self.precision) for motion in motions]
+        return [follow(integrator, *motion, self.times, self.precision) for motion in motions]
+
+    def _truths(
+        self, problems: Sequence[Problem], rates: Sequence[Fraction]
+    ) -> list[tuple[list[list[Fraction]] | None, float]]:
+        """The true states and the amplification of each; None where no run reached the horizon."""
+        fine = [replace(each, precision=self._fine) for each in problems]
+        moved = [
+            replace(each, start=_moved(each.start, unit, self._shift)) for each, unit in zip(fine, rates, strict=True)
+        ]
+        runs = self._finely([*fine, *moved])
+        found: list[tuple[list[list[Fraction]] | None, float]] = []
+        for i, unit in enumerate(rates):
+            one, two = runs[i], runs[len(fine) + i]
+            if one is None:
+                found.append((None, math.inf))
+                continue
+            grown = math.inf if two is None else _growth(one, two, unit, self._shift)
+            found.append((one, max(1.0, grown)))
+        return found
+
+    def _finely(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
+        times = [number(time, self._fine) for time in self.times]
+        try:
+            runs = propagate_words_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
+        except OutOfReach:
+            return [None] * len(problems)
+        done = [run.outcome is Outcome.SUCCESS for run in runs]
+        return [
+            [[exact(value) for value in state] for state in run.states] if reached else None
+            for run, reached in zip(runs, done, strict=True)
+        ]
+
+    def _error(self, run: IntegratedRun, true: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
+        """The largest over the samples; infinite where the run did not reach the last, or is not a number."""
+        if _failed(run):
+            return math.inf
+        try:
+            states = [[exact(value) for value in state[:6]] for state in run.states]
+        except InputError:  # nan and infinity
+            return math.inf
+        return max(map(lambda one, two: _distance(one, two, unit), states, true))
+
+
+def _failed(run: IntegratedRun) -> bool:
+    return run.outcome != Outcome.SUCCESS.value
+
+
+def _moved(start: State, unit: Fraction, shift: Fraction) -> State:
+    scale = [unit or Fraction(1)] * 3 + [Fraction(1)] * 3
+    flat = [value + shift * size * by for value, size, by in zip(start.flat, scale, _WHERE, strict=True)]
+    return State(flat[:3], flat[3:])
+
+
+def _growth(
+    one: Sequence[Sequence[Fraction]], two: Sequence[Sequence[Fraction]], unit: Fraction, shift: Fraction
+) -> float:
+    """How many times as far apart the two runs are as at the start, at most over the samples."""
+    scale = [float(unit or 1)] * 3 + [1.0] * 3
+    largest = 0.0
+    for first, second in zip(one, two, strict=True):
+        parts = [float(a - b) / size for a, b, size in zip(first, second, scale, strict=True)]
+        largest = max(largest, math.hypot(*parts))
+    return largest / float(shift) / math.hypot(*map(float, _WHERE))
+
+
+def _distance(one: Sequence[Any], two: Sequence[Any], unit: Fraction) -> float:
+    apart = [abs(a - b) for a, b in zip(one, two, strict=True)]
+    return max(float(max(apart[:3]) / (unit or 1)), float(max(apart[3:])), _LEAST)
+
+
+# What is special about a motion, in sentences, and the name of its class.
+
+
+NO_CLASS = "no closed form"
+_NEAR = 1e-3
+_FEW = 3.0
+_FAST = 20.0
+
+
+def class_of(top: HeavyTop, start: State) -> str:
+    """The closed form that the motion has."""
+    try:
+        found = next(matches(top, start, system_of(None, top)), None)
+    except HeavyTopError:
+        return NO_CLASS
+    return NO_CLASS if found is None else found.method
+
+
+def special(found: MeasuredMotion) -> list[str]:
+    """Sentences: moments, spin, equilibrium, separatrix, energy, what the motion amplifies; the telling ones alone."""
+    top, start = found.motion
+    return [each for each in (*_moments(top), *_start(top, start), *_growth_text(found)) if each]
+
+
+def _moments(top: HeavyTop) -> list[str]:
+    said = []
+    for i, j in ((0, 1), (1, 2), (0, 2)):
+        a, b = sorted((top.inertia[i], top.inertia[j]), reverse=True)
+        ratio = round(a / b)
+        off = float(a / b / ratio - 1)
+        if ratio <= 3 and abs(off) < _NEAR * 20:
+            names = (i, j) if top.inertia[i] == a else (j, i)
+            near = "" if off == 0 else f" but for {abs(off):.1g}"
+            said.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{near}")
+    slack = float((sum(top.inertia) - 2 * max(top.inertia)) / max(top.inertia))
+    if slack < _NEAR * 20:
+        said.append("at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""))
+    stiff = float(max(top.inertia) / min(top.inertia))
+    if stiff > _FAST:
+        said.append(f"moments of very different size, 1 : {stiff:.3g}")
+    return said
+
+
+def _start(top: HeavyTop, start: State) -> list[str]:
+    system = system_of(None, top)
+    parameters = system.parameters(top, start)
+    pull = dot(top.moment, top.moment)
+    spin = math.sqrt(dot(start.omega, start.omega))
+    own = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
+    said = []
+    if spin == 0 or own == 0:
+        said.append("Ω = 0" if spin == 0 else "no torque of the weight")
+    elif spin > _FAST * own:
+        said.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
+    elif own > _FAST * spin:
+        said.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
+    field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
+    unit = spin + own or 1.0
+    speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
+    if not any(field):
+        said.append("an equilibrium")
+    elif speed < _NEAR:
+        said.append(f"near an equilibrium: the field is {speed:.1g} of what it could be")
+    energy = dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma)
+    height = math.sqrt(pull)
+    if height and abs(float(energy) / height - 1) < _NEAR:
+        said.append("near a separatrix: its energy is that of rest with the centre of mass above")
+    return [*said, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
+
+
+def _growth_text(found: MeasuredMotion) -> list[str]:
+    eaten = digits_eaten(found.amplification)
+    chaotic = found.amplification > 100 * (1 + found.turns)
+    kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
+    said = [f"{found.turns:.3g} radians until the horizon"]
+    return (
+        [*said, f"the motion itself amplifies by {found.amplification:.2g}{kind}"] if eaten >= _FEW or chaotic else said
+    )

@@ -1,0 +1,1 @@
+"""Error of single steps."""

@@ -1,0 +1,1 @@
+"""Motions computed elsewhere: reading their files, scoring them, explaining their errors."""

@@ -1,0 +1,416 @@
+"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits right."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, NamedTuple, cast
+
+from heavytop import arguments
+from heavytop.arguments import Number, Numbers
+from heavytop.display import Tabular, TitledTable
+from heavytop.errors import InputError, quoted
+from heavytop.features.score.measurement import Assessment, assess, passed, required
+from heavytop.features.score.text import diagnosis_text, score_report, to_json
+from heavytop.features.score.trajectories.observed import (
+    GivenTrajectory,
+    of_arrays,
+    of_observed_arrays,
+    raw_start,
+    require_system,
+)
+from heavytop.integrate.trajectory import Trajectory
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR, WIDTHS, Convention
+from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Drift
+from heavytop.precision import Precision, ordered, vector
+from heavytop.records import Metric, Peer, Report, Row
+from heavytop.report.document.document import short
+from heavytop.top.attitude import Attitude
+from heavytop.top.bodies import Body
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State, check_times
+
+PathLike = str | os.PathLike[str]
+
+# Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.
+
+
+_BODY = "Give heavytop.HeavyTop(inertia, weight, centre) or heavytop.Body(...), and heavytop.State(...)."
+_SHAPES = {"quaternion": "(n, 4)", "matrix": "(n, 3, 3)"}
+
+
+def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[str, list[list[Any]]]:
+    """The rows of every array that is given, in the order in which they are scored; ``states`` are Ω and γ.
+
+    Raises InputError for another shape, and for what is given twice.
+    """
+    found = {name: _observed_rows(values, name) for name, values in arrays.items() if values is not None}
+    if states is not None:
+        for name, part in (("omega", slice(0, 3)), ("gamma", slice(3, 6))):
+            if name in found:
+                raise InputError(f"states and {name} both give it.", "Give either of them.")
+            found[name] = [row[part] for row in states]
+    if not found:
+        raise InputError("There is nothing to score.", "Give states, quaternions, positions or another array.")
+    return {name: found[name] for name in WIDTHS if name in found}
+
+
+def _observed_rows(values: Any, name: str) -> list[list[Any]]:
+    remedy = f"Give an array of shape {_SHAPES.get(name, '(n, 3)')}."
+    found = []
+    for i, row in enumerate(ordered(values, name, remedy)):
+        numbers = ordered(row, f"{name}[{i}]", remedy)
+        if name == "matrix" and len(numbers) == 3:
+            numbers = [value for part in numbers for value in ordered(part, f"{name}[{i}]", remedy)]
+        if len(numbers) != WIDTHS[name]:
+            raise InputError(f"{name}[{i}] has {len(numbers)} numbers, not {WIDTHS[name]}.", remedy)
+        found.append(numbers)
+    return found
+
+
+def is_plain(top: object, start: object, arrays: Mapping[str, Any], states: bool) -> bool:
+    """Whether these are Ω and γ of a top in principal axes alone."""
+    return states and set(arrays) == {"omega", "gamma"} and isinstance(top, HeavyTop) and _attitude(start) is None
+
+
+def _attitude(start: object) -> Attitude | None:
+    return start.attitude if isinstance(start, State) else None
+
+
+def convention(
+    order: str,
+    quaternion: str,
+    matrix: str,
+    sequence: str,
+    angles: str,
+    up: str,
+    pivot: Numbers,
+    point: Numbers | None,
+) -> Convention:
+    """The conventions of the arrays; raises InputError for a word that is not known."""
+    words = {"quaternion_order": order, "quaternion": quaternion, "matrix": matrix, "angles": angles, "up": up}
+    for name, word in {**words, "sequence": sequence}.items():
+        if not isinstance(word, str):
+            raise InputError(f"{name} = {quoted(word)} is not text.", "Give a str.")
+    where = None if point is None else vector(point, "point")
+    return Convention(**words, sequence=sequence.upper(), pivot=vector(pivot, "pivot"), point=where)
+
+
+def observed_arrays(
+    top: object,
+    start: object,
+    system: System,
+    said: Convention,
+    times: list[Fraction],
+    arrays: Mapping[str, list[list[Any]]],
+    form: Precision | None,
+    names: tuple[str, str],
+    normalize: bool,
+) -> GivenTrajectory:
+    """The trajectory of these arrays.  Raises InputError for what is no body and no start, and as the reading does."""
+    if not isinstance(top, HeavyTop | Body):
+        raise InputError(f"top = {quoted(top)} is no body.", _BODY)
+    if not isinstance(start, State):
+        raise InputError(f"start = {quoted(start)} is not a State.", _BODY)
+    if "euler" in arrays and not said.sequence:
+        raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
+    require_system(system)
+    flag = bool(arguments.flag(normalize, "normalize"))
+    return of_observed_arrays(top, raw_start(start), said, times, arrays, form, names, flag)
+
+
+_PARTS = ("omega", "gamma", "along", "across")
+_LABELS = {
+    "omega": "error of Ω",
+    "gamma": "error of γ",
+    "along": "along the flow",
+    "across": "across the flow",
+    "attitude": "error of the attitude (rad)",
+    "position": "error of the position",
+    "position_relative": "error of the position, relative",
+}
+_HEADER = ("", "largest", "rms", "final")
+_STATES = "Give an array of shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3."
+
+
+class Summary(NamedTuple):
+    """A measured size over the samples: the largest, the root mean square, and that of the last one.
+
+    Each has ``value`` (decimal text), ``log10``, and compares and converts as a float.
+    """
+
+    max: Metric
+    rms: Metric
+    final: Metric
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Score(Tabular):
+    """What a motion is worth.
+
+    outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
+    drift: |I(t) − I(0)| by the name of the first integral, in its units.
+    distance: from the known motion, by ``omega`` (1/time unit), ``gamma``, ``along`` the flow (phase) and ``across``
+    it, and where it has such columns by ``attitude`` (an angle in radians), ``position`` (a length) and
+    ``position_relative``; empty without a reference.
+    digits_kept: −log10 of the largest |error|/max(1, |value|) of Ω and γ over the samples; None without a reference.
+    against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
+    of_digits: decimal digits of the format.  peer: heyoka's own run over the same times in the same format; None
+    without a reference, and where heyoka does not get there.  diagnosis: what explains the error, a sentence each.
+    passed: whether as many digits are right as were required; None, which is no pass, where the run ended early or that
+    is not known.
+    used: which columns were scored, in a sentence, where these are not Ω and γ in principal axes.
+    assessment, needed, sha256: what all of it is made of, the digits required, and the checksum of the file.
+    """
+
+    outcome: str
+    drift: dict[str, Summary]
+    distance: dict[str, Summary]
+    digits_kept: float | None
+    against: str
+    row: Row = field(repr=False)
+    of_digits: int
+    peer: Peer | None
+    diagnosis: tuple[str, ...]
+    passed: bool | None
+    used: str
+    assessment: Assessment = field(repr=False)
+    needed: Fraction | None = field(repr=False)
+    sha256: str = field(repr=False)
+
+    @property
+    def exit_code(self) -> int:
+        """0, 1 where fewer digits are right than were required, 3 where that is not known or the run ended early."""
+        return 3 if self.passed is None else 0 if self.passed else 1
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `score --json`."""
+        return to_json(self.assessment) | ({} if self.needed is None else {"passed": self.passed})
+
+    def to_html(self) -> str:
+        """The page of `score --html`."""
+        from heavytop.features.kinds import KINDS
+        from heavytop.report.render.page import report_page
+
+        return report_page(self.report(), KINDS)
+
+    def report(self) -> Report:
+        """A report with the row alone, as `score --out` writes it."""
+        from heavytop.report.store.store import environment
+
+        return score_report(self.assessment, environment(), self.sha256)
+
+    @property
+    def digits_right(self) -> float | None:
+        """How many digits are right at every sample."""
+        return self.digits_kept
+
+    def _table(self) -> TitledTable:
+        row = self.row
+        kept = "no reference" if self.row.samples else "no state to score"
+        if self.digits_kept is not None:
+            kept = f"{digits_text(self.digits_kept)} of {self.of_digits} digits right"
+            if self.peer is not None:
+                kept += f" ({self.peer.integrator} keeps {digits_text(self.peer.digits_right)})"
+        until = f" before t = {short(self.row.reference.until)}" if self.row.reference.until else ""
+        sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
+        sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
+        title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
+        return TitledTable(
+            title,
+            _HEADER,
+            _lines(sizes),
+            [*([self.used] if self.used else []), f"compared with {self.against}", *self.diagnosis],
+        )
+
+
+def score(
+    times: Numbers,
+    states: Any = None,
+    *,
+    top: HeavyTop | Body,
+    start: State,
+    precision: Precision | str | None = None,
+    system: System | str | None = None,
+    name: str = "given",
+    integrator: str = "given",
+    require: Number | None = None,
+    omega: Any = None,
+    omega_space: Any = None,
+    gamma: Any = None,
+    quaternions: Any = None,
+    matrices: Any = None,
+    euler: Any = None,
+    positions: Any = None,
+    quaternion_order: str = "wxyz",
+    quaternion: str = "body_to_space",
+    matrix: str = "body_to_space",
+    sequence: str = "",
+    angles: str = "radians",
+    up: str = "z",
+    pivot: Numbers = (0, 0, 0),
+    point: Numbers | None = None,
+    normalize: bool = False,
+) -> Score:
+    """A motion that any program computed, scored like our own.
+
+    Arguments:
+        times: shape (n,), exact numbers of one sign, strictly monotone away from 0.
+        states: shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3: an array of float64 or longdouble, or lists of numbers of
+            any format, or of decimal, fraction or hexadecimal text.  NaN and infinities are an outcome, not an error.
+            None where other arrays fix the motion.
+        top, start: what the program was given; rounded to the format first.  A Body has Ω and γ in its own axes.
+        precision: the format in which it computed; None for the narrowest that holds every number as it is given.
+        system: as in :func:`propagate`.
+        name, integrator: what the row is called.
+        require: digits that must be right, as ``passed`` of the result says; None asks that the run reached its end.
+        omega, omega_space, gamma, positions: shape (n, 3): Ω in body axes, Ω in axes of space, γ, and where ``point``
+            (in body axes; the centre of mass if None) stands in the axes of space, the fixed point at ``pivot``.
+        quaternions: shape (n, 4), in ``quaternion_order`` "wxyz" or "xyzw"; ``quaternion`` says what they do,
+            "body_to_space" or "space_to_body".  matrices: shape (n, 3, 3), ``matrix`` in the same words.
+        euler: shape (n, 3), intrinsic angles of ``sequence``, in ``angles`` "radians" or "degrees".
+        up: the axis of space that points up: "z", "-z", "y", ...
+        normalize: take quaternions and matrices of any length for their directions.
+
+    Returns:
+        A :class:`Score`.
+
+    Raises:
+        InputError: for what is no motion, time or number, and for arrays of another shape.
+        Contradiction: where two proofs of the known motion exclude each other.
+    """
+    needed = None if require is None else required(require)
+    form = None if precision is None else arguments.precision(precision)
+    body = top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
+    about, instants = arguments.system(system, body), list(check_times(times))
+    names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
+    arrays = columns(
+        {
+            "omega": omega,
+            "omega_space": omega_space,
+            "gamma": gamma,
+            "quaternion": quaternions,
+            "matrix": matrices,
+            "euler": euler,
+            "position": positions,
+        },
+        None if states is None else _rows(states),
+    )
+    if is_plain(top, start, arrays, states is not None):
+        body, state = arguments.motion(top, start)
+        given = of_arrays(cast(HeavyTop, body), state, about, instants, _rows(states), form, *names)
+    else:
+        said = convention(quaternion_order, quaternion, matrix, sequence, angles, up, pivot, point)
+        given = observed_arrays(top, start, about, said, instants, arrays, form, names, normalize)
+    return scored(given, needed)
+
+
+def read_trajectory(
+    path: PathLike, case: str | None = None, *, require: Number | None = None, normalize: bool = False
+) -> tuple[GivenTrajectory, Fraction | None]:
+    """What :func:`scored` takes, from the file of a trajectory (`heavytop docs score`).
+
+    Arguments:
+        path: a .json or .csv file; ``-`` for standard input.
+        case: a built-in case of its top and start.
+        require, normalize: as in :func:`score`.
+
+    Raises:
+        InputError: for a file that is no trajectory, an unknown case, and digits that are no positive number.
+    """
+    from heavytop.cases import case as case_named
+    from heavytop.features.score.trajectories.files import read
+
+    needed = None if require is None else required(require)
+    about = None if case is None else case_named(arguments.text(case, "case"))
+    return read(arguments.path(path, "path"), about, bool(arguments.flag(normalize, "normalize"))), needed
+
+
+def scored(given: GivenTrajectory, needed: Fraction | None, progress: Callable[[], None] = lambda: None) -> Score:
+    """The score of a trajectory of any source.  progress: called twice for each of its states, as they are compared."""
+    found = assess(given, progress)
+    row = found.row
+    distance = {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS}
+    for name, label in ((ATTITUDE_ERROR, "attitude"), (POSITION_ERROR, "position")):
+        for part, size in _summaries(row.metrics, name).items():
+            distance[f"{label}_{part}" if part else label] = size
+    return Score(
+        row.outcome,
+        _summaries(row.metrics, DRIFT),
+        distance,
+        digits_kept(row),
+        row.against,
+        row,
+        found.of_digits,
+        found.peer,
+        tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
+        passed(row, needed),
+        found.used,
+        found,
+        needed,
+        given.sha256,
+    )
+
+
+class Drifts(Tabular, dict[str, Summary]):
+    """The drift of each first integral by its name."""
+
+    def _table(self) -> TitledTable:
+        return TitledTable("Drift of the first integrals", _HEADER, _lines(self))
+
+
+def _lines(sizes: Mapping[str, Summary]) -> list[list[str]]:
+    return [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
+
+
+def drift(run: Trajectory) -> Drifts:
+    """How far the first integrals of a computed motion move from their values at the start.
+
+    Arguments:
+        run: what :func:`heavytop.propagate` returned, with its states.
+
+    Returns:
+        |I(t) − I(0)| by the name of each integral that holds for the exact top and start, in the units of the
+        integral: largest, root mean square and last over the samples.  With an attitude also |ξ|² and ξ·γ.
+
+    Raises:
+        InputError: for what is no trajectory, and for one whose states went to an observer.
+
+    Source:
+        (1.3) of the paper, and the integrals of the classical cases.
+    """
+    if not isinstance(run, Trajectory):
+        raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")
+    if len(run.states) != len(run.times):
+        raise InputError("The states of this run went to its observer.", "Propagate without an observer.")
+    computed = run.principal or run
+    measure = Drift(run.problem, run.problem.integrals())
+    beside: Any = computed.attitude if computed.attitude is not None else [()] * len(run.times)
+    for time, state, xi in zip(run.times, computed.states, beside, strict=True):
+        measure(time, [*state, *xi])
+    return Drifts(_summaries(measure.metrics(), DRIFT))
+
+
+def _rows(states: Any) -> list[list[Any]]:
+    """The states as rows of six; raises InputError that says the shape."""
+    shape = getattr(states, "shape", None)
+    if shape is not None and (len(shape) != 2 or shape[1] != 6):
+        raise InputError(f"states has the shape {tuple(shape)}.", _STATES)
+    rows = [ordered(row, f"states[{i}]", _STATES) for i, row in enumerate(ordered(states, "states", _STATES))]
+    for i, row in enumerate(rows):
+        if len(row) != 6:
+            raise InputError(f"states[{i}] has {len(row)} numbers.", _STATES)
+    return rows
+
+
+def _summaries(metrics: dict[str, Metric], name: str) -> dict[str, Summary]:
+    """Largest, root mean square and last of each component of the quantity of that name."""
+    quantities = [metric.quantity for metric in metrics.values() if metric.quantity]
+    return {
+        quantity.component: Summary(*(metrics[quantity.over(each).text] for each in Summary._fields))
+        for quantity in quantities
+        if (quantity.name, quantity.statistic) == (name, "rms")
+    }

@@ -1,0 +1,433 @@
+"""Mistakes of convention in files with attitudes, positions or Ω in space, each told by trying it.
+
+A supposition is a reading of the columns, of the start, or of both, or other data of the body: the motion that follows
+from it is computed and compared with the columns.  It is told if the error falls by two decades, by three where a
+number was fitted; where several do about as well the simplest is told, and the others are named beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import permutations, product
+
+import numpy
+
+from heavytop.features.score.diagnose.readings import (
+    Array,
+    Beginning,
+    BodyData,
+    Course,
+    Reading,
+    Seen,
+    Square,
+    error,
+    nearest_rotation,
+    simulate,
+    turning,
+    with_tensor,
+)
+from heavytop.features.score.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, named, notable
+from heavytop.precision import decimal_text
+from heavytop.top.attitude import SEQUENCES
+
+MOST_SAMPLES = 24
+_TURNS = 60.0
+_FEW = 6
+_WORTH_ASKING = 1e-10
+"""Relative errors below it are no mistake of this kind."""
+_MOST_OTHERS = 3
+_SAME = 1e-9
+"""A rotation that was fitted is a renaming of the axes within that."""
+_UNITS_OF_OMEGA = {"degrees": 180 / numpy.pi, "turns": 0.5 / numpy.pi, "rpm": 30 / numpy.pi}
+_LENGTHS = {"1000": 1e3, "100": 1e2, "1/1000": 1e-3, "1/100": 1e-2, "1/0.3048": 1 / 0.3048, "0.3048": 0.3048}
+_GRAVITIES = {
+    "9.81": 9.81,
+    "9.80665": 9.80665,
+    "1/9.81": 1 / 9.81,
+    "1/9.80665": 1 / 9.80665,
+    "9.80665/9.81": 9.80665 / 9.81,
+    "9.81/9.80665": 9.81 / 9.80665,
+    "9.8/9.81": 9.8 / 9.81,
+    "10/9.81": 10 / 9.81,
+    **_LENGTHS,
+}
+_INERTIAS = {f"1e{power}": 10.0**power for power in (-9, -7, -6, -4, -3, -2, 2, 3, 4, 6, 7, 9)}
+
+BOTH, COLUMNS, START = "start and columns", "columns", "start"
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """What explains the columns.
+
+    kind: which; docs/score.md lists them.  numbers: what fits, by name, as text.  error, left: the largest error
+    relative to the size of each quantity, before and after it is mended.  others: kinds that explain them as well.
+    """
+
+    kind: str
+    numbers: dict[str, str]
+    error: float
+    left: float
+    others: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    """One supposition: how columns and start are read, and the body.  drop: how far the error must fall."""
+
+    kind: str
+    numbers: dict[str, str] = field(default_factory=dict)
+    columns: Reading | None = None
+    start: Reading | None = None
+    body: BodyData | None = None
+    drop: float = DROP
+
+
+def sampled(seen: Seen) -> Seen:
+    """At most :data:`MOST_SAMPLES` samples over the first turns of the body, or a few where they lie far apart."""
+    rate = turning(seen.body, seen.start.begin(seen.said, seen.body.tensor))
+    early = sum(abs(float(time)) * rate <= _TURNS for time in seen.times)
+    last = max(early, min(len(seen.times), _FEW))
+    return seen.at(sorted({round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}))
+
+
+class _Courses:
+    """The motions that were computed, by what they follow from."""
+
+    def __init__(self, seen: Seen) -> None:
+        self.seen = seen
+        self.made: dict[tuple[bytes, ...], Course | None] = {}
+
+    def of(self, start: Reading | None = None, body: BodyData | None = None) -> Course | None:
+        seen = self.seen
+        which = body or seen.body
+        begin = seen.start.begin(start or seen.said, which.tensor)
+        return self.motion(which, begin)
+
+    def motion(self, body: BodyData, begin: Beginning) -> Course | None:
+        data = numpy.array([body.force])
+        key = tuple(a.tobytes() for a in (body.tensor, body.centre, data, begin.rotation, begin.omega))
+        if key not in self.made:
+            self.made[key] = simulate(body, begin, self.seen.times)
+        return self.made[key]
+
+
+def mistake(seen: Seen) -> Mistake | None:
+    """The simplest mistake among those that explain the columns about as well as the best; None where none does."""
+    with numpy.errstate(all="ignore"):  # what overflows explains nothing
+        courses = _Courses(seen)
+        own = error(seen, courses.of(), seen.said, seen.body)
+        own = own if numpy.isfinite(own) else 1.0
+        if own <= _WORTH_ASKING:
+            return None
+        tried = [(each, _left(seen, courses, each)) for each in _suppositions(seen, courses)]
+        found = _best(tried, own)
+        if found is None:
+            pairs = [(each, _left(seen, courses, each)) for each in _pairs(seen)]
+            found = _best(pairs, own)
+        return found
+
+
+def _left(seen: Seen, courses: _Courses, each: _Try) -> float:
+    body = each.body or seen.body
+    course = courses.of(each.start, body)
+    moved = replace(seen, point=body.centre) if each.body is not None and seen.point is seen.body.centre else seen
+    return error(moved, course, each.columns or seen.said, body)
+
+
+def _best(tried: Sequence[tuple[_Try, float]], own: float) -> Mistake | None:
+    explained = [(each, left) for each, left in tried if left * each.drop <= own]
+    if not explained:
+        return None
+    best = min(max(left, FLOOR) for _, left in explained)
+    alike = [(each, left) for each, left in explained if left <= ALIKE * best]
+    first, left = alike[0]
+    # with a number that was fitted more can be explained
+    equal = [each for each, _ in alike if each.drop <= first.drop]
+    others = tuple(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))
+    return Mistake(first.kind, first.numbers, own, left, others[:_MOST_OTHERS])
+
+
+def _suppositions(seen: Seen, courses: _Courses) -> Iterator[_Try]:
+    """The simplest first, those with a fitted number last."""
+    for kind, numbers, reading in _readings(seen):
+        yield from _scopes(seen, kind, numbers, reading)
+    # before the axis that points up: where both fit, the third axis points down
+    yield _Try("gravity_sign", body=replace(seen.body, gravity=-seen.body.gravity))
+    for kind, numbers, reading in _axes_of_space(seen):
+        yield from _scopes(seen, kind, numbers, reading)
+    for kind, numbers, body in _bodies(seen):
+        yield _Try(kind, numbers, body=body)
+    yield from _positions(seen)
+    yield from _renamed(seen)
+    course = courses.of()
+    if course is not None:
+        yield from _fitted(seen, course)
+
+
+def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[_Try]:
+    """The reading of start and columns, of the columns, of the start: as far as each is another than was said."""
+    inertia = seen.body.tensor
+    before, after = (seen.start.begin(each, inertia) for each in (seen.said, reading))
+    moved = not (numpy.array_equal(before.rotation, after.rotation) and numpy.array_equal(before.omega, after.omega))
+    if moved:
+        yield _Try(kind, {**numbers, "of": BOTH}, reading, reading)
+    yield _Try(kind, {**numbers, "of": COLUMNS}, reading)
+    if moved:
+        yield _Try(kind, {**numbers, "of": START}, start=reading)
+
+
+def _forms(seen: Seen) -> set[str]:
+    return {*seen.columns, seen.start.form}
+
+
+Named = tuple[str, dict[str, str], Reading]
+
+
+def _readings(seen: Seen) -> Iterator[Named]:
+    """Readings without a number, the likeliest first."""
+    said, forms = seen.said, _forms(seen)
+    if "quaternion" in forms:
+        order, other = "wxyz" if said.scalar_last else "xyzw", _other(said.conjugate)
+        yield "scalar_last", {"quaternion_order": order}, replace(said, scalar_last=not said.scalar_last)
+        yield "conjugate", {"quaternion": other}, replace(said, conjugate=not said.conjugate)
+    if "matrix" in forms:
+        yield "transposed", {"matrix": _other(said.transposed)}, replace(said, transposed=not said.transposed)
+    if "euler" in forms:
+        yield from _angles(said)
+    yield from _vectors(said, forms)
+    if "quaternion" in forms:
+        both = replace(said, scalar_last=not said.scalar_last, conjugate=not said.conjugate)
+        yield "scalar_last_conjugate", {}, both
+
+
+def _other(inverse: bool) -> str:
+    """The direction that is not said."""
+    return "body_to_space" if inverse else "space_to_body"
+
+
+def _axes_of_space(seen: Seen) -> Iterator[Named]:
+    """Another axis points up, or one is reversed."""
+    said = seen.said
+    for up in ("y", "z", "x", "-z", "-y", "-x"):
+        if up != said.up:
+            yield "up", {"up": up}, replace(said, up=up)
+    for axis in range(3):
+        for pseudo in (True, False):
+            numbers = {"axis": "xyz"[axis]}
+            yield "left_handed", numbers, replace(said, mirror=axis, pseudo=pseudo)
+
+
+def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
+    if forms & {"omega", "omega_space"}:
+        yield "omega_frame", {}, replace(said, swapped=True)
+        for unit, factor in _UNITS_OF_OMEGA.items():
+            yield f"omega_in_{unit}", {}, replace(said, omega=factor)
+        yield "omega_reversed", {}, replace(said, omega=-1.0)
+        yield "momentum", {}, replace(said, momentum=True)
+    if forms & {"gamma", "rows"}:
+        yield "gamma_down", {}, replace(said, gamma=-1.0)
+
+
+def _angles(said: Reading) -> Iterator[Named]:
+    """Of Euler angles: another unit, another sequence, about axes of space, other signs, and two of these."""
+    yield "degrees", {"unit": "radians" if said.degrees else "degrees"}, replace(said, degrees=not said.degrees)
+    yield "extrinsic", {"sequence": said.sequence}, replace(said, extrinsic=True)
+    yield "angles_negated", {}, replace(said, negated=True)
+    others = [each for each in SEQUENCES if each != said.sequence]
+    for sequence in others:
+        yield "sequence", {"sequence": sequence}, replace(said, sequence=sequence)
+    for sequence in others:
+        yield "extrinsic", {"sequence": sequence}, replace(said, sequence=sequence, extrinsic=True)
+    yield "angles_of_inverse", {}, replace(said, negated=True, extrinsic=True)
+
+
+def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
+    """Other data of the body."""
+    body = seen.body
+    if body.mass and body.steiner.any():
+        where = "fixed point" if body.about_centre else "centre of mass"
+        yield "inertia_about", {"about": where}, replace(body, about_centre=not body.about_centre)
+    off = body.inertia - numpy.diag(numpy.diag(body.inertia))
+    if off.any():
+        yield "products_of_inertia", {}, with_tensor(body, body.inertia - 2 * off)
+    for name, factor in _GRAVITIES.items():
+        yield "gravity_unit", {"factor": name}, replace(body, gravity=body.gravity * factor)
+    yield "centre_reversed", {}, replace(body, centre=-body.centre)
+    yield from _in_space_axes(seen)
+    for name, factor in _INERTIAS.items():
+        yield "inertia_unit", {"factor": name}, with_tensor(body, body.inertia * factor)
+    for name, factor in _LENGTHS.items():
+        yield "centre_unit", {"factor": name}, replace(body, centre=body.centre * factor)
+    for order in list(permutations(range(3)))[1:]:
+        places, numbers = list(order), {"axes": "".join(str(i + 1) for i in order)}
+        turned = body.inertia[numpy.ix_(places, places)]
+        yield "inertia_axes", numbers, with_tensor(body, turned)
+        yield "centre_axes", numbers, replace(body, centre=body.centre[places])
+        yield "body_data_axes", numbers, replace(body, inertia=turned, centre=body.centre[places])
+    for signs in list(product((1.0, -1.0), repeat=3))[1:-1]:
+        numbers = {"centre": ", ".join(f"{value:.6g}" for value in body.centre * signs)}
+        yield "centre_signs", numbers, replace(body, centre=body.centre * signs)
+
+
+def _in_space_axes(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
+    """Tensor, centre or both given in the axes of space at the start, or turned the other way."""
+    body = seen.body
+    plain = seen.start.begin(replace(seen.said, up="z"), body.tensor).rotation
+    for turn in (plain, plain.T):
+        turned, centre = turn.T @ body.inertia @ turn, turn.T @ body.centre
+        yield "inertia_in_space_axes", {}, with_tensor(body, turned)
+        yield "centre_in_space_axes", {}, replace(body, centre=centre)
+        yield "data_in_space_axes", {}, replace(body, inertia=turned, centre=centre)
+
+
+def _positions(seen: Seen) -> Iterator[_Try]:
+    """Positions that are displacements, of another unit or sign."""
+    if "position" not in seen.columns:
+        return
+    said = seen.said
+    yield _Try("displacement", columns=replace(said, displaced=True))
+    yield _Try("position_reversed", columns=replace(said, scale=-1.0))
+    for name, factor in _LENGTHS.items():
+        yield _Try("position_unit", {"factor": name}, replace(said, scale=factor))
+        yield _Try("position_unit", {"factor": name}, replace(said, scale=factor, displaced=True))
+    if seen.body.centre.any() and not numpy.array_equal(seen.point, seen.body.centre):
+        yield _Try("position_of_centre", columns=replace(said, point=_triple(seen.body.centre)))
+
+
+def _renamed(seen: Seen) -> Iterator[_Try]:
+    """Axes of the body or of space in another order or reversed, without a mirror image."""
+    for matrix, axes in _rotations():
+        for part, kind in (("space", "space_axes"), ("body", "body_axes")):
+            reading = replace(seen.said, space=matrix) if part == "space" else replace(seen.said, body=matrix)
+            yield from _scopes(seen, kind, {"axes": axes}, reading)
+
+
+def _rotations() -> Iterator[tuple[Square, str]]:
+    """The 23 renamings of determinant 1, with their names: component k of the file is ±(axis of that number)."""
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            matrix = numpy.zeros((3, 3))
+            matrix[range(3), order] = signs
+            if numpy.linalg.det(matrix) > 0 and not numpy.array_equal(matrix, numpy.eye(3)):
+                names = ",".join(("-" if s < 0 else "") + str(i + 1) for i, s in zip(order, signs, strict=True))
+                yield _square(matrix), names
+
+
+def _square(matrix: Array) -> Square:
+    return tuple(map(tuple, matrix.tolist()))
+
+
+def _triple(vector: Array) -> tuple[float, float, float]:
+    return float(vector[0]), float(vector[1]), float(vector[2])
+
+
+def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
+    """Constant rotations of space and body axes, another point, another place of the pivot, factors."""
+    if len(seen.times) < 3:
+        return
+    yield from _turned(seen, course)
+    yield from _scaled(seen, course)
+    if "position" not in seen.columns:
+        return
+    said, point = seen.said, seen.point
+    given = said.vectors(seen.columns["position"] - seen.pivot)
+    true = course.rotation @ point
+    size = float((true * true).sum())
+    if size:
+        yield from _near(
+            "position_unit", "factor", float((given * true).sum()) / size, lambda value: replace(said, scale=value)
+        )
+    offset = (given - true).mean(axis=0)
+    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=_triple(offset)), drop=FITTED_DROP)
+    own = numpy.einsum("nji,nj->ni", course.rotation, given).mean(axis=0)
+    yield _Try("point", {"point": _list(own)}, replace(said, point=_triple(own)), drop=FITTED_DROP)
+    both = _point_and_offset(course, given)
+    if both is not None:
+        reading = replace(said, point=_triple(both[:3]), offset=_triple(both[3:]))
+        numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
+        yield _Try("point_and_pivot", numbers, reading, drop=FITTED_DROP)
+
+
+def _point_and_offset(course: Course, given: Array) -> Array | None:
+    design = numpy.concatenate([course.rotation, numpy.tile(numpy.eye(3), (len(given), 1, 1))], axis=2)
+    if not numpy.isfinite(design).all() or not numpy.isfinite(given).all() or len(given) < 4:
+        return None
+    found: Array = numpy.linalg.lstsq(design.reshape(-1, 6), given.reshape(-1), rcond=None)[0]
+    return found
+
+
+def _turned(seen: Seen, course: Course) -> Iterator[_Try]:
+    """A rotation of the axes of space, or of the body, that is the same in every sample."""
+    for form in ("quaternion", "matrix", "euler"):
+        if form not in seen.columns:
+            continue
+        given = seen.said.rotation(form, seen.columns[form])
+        if not numpy.isfinite(given).all():
+            return
+        space = nearest_rotation((given @ course.rotation.transpose(0, 2, 1)).mean(axis=0))
+        body = nearest_rotation((course.rotation.transpose(0, 2, 1) @ given).mean(axis=0))
+        plain = replace(seen.said, up="z")
+        if seen.said.up == "z":
+            text = _angle(space)
+            yield _Try("space_turned", {"angle": text}, replace(plain, space=_square(space)), drop=FITTED_DROP)
+        turned = replace(seen.said, body=_square(body.T))
+        yield _Try("body_turned", {"angle": _angle(body)}, turned, drop=FITTED_DROP)
+        return
+
+
+def _angle(matrix: Array) -> str:
+    cosine = max(-1.0, min(1.0, (float(numpy.trace(matrix)) - 1) / 2))
+    return f"{numpy.degrees(numpy.arccos(cosine)):.6g}"
+
+
+def _scaled(seen: Seen, course: Course) -> Iterator[_Try]:
+    for name in ("omega", "omega_space"):
+        if name not in seen.columns:
+            continue
+        true = course.omega_space if name == "omega_space" else course.omega
+        given = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
+        size = float((true * true).sum())
+        if size:
+            fitted = float((given * true).sum()) / size
+            yield from _near("omega_scaled", "factor", fitted, lambda value: replace(seen.said, omega=value))
+
+
+def _near(kind: str, name: str, fitted: float, reading: object) -> Iterator[_Try]:
+    """The fitted factor, rounded as far as that does no harm."""
+    if not numpy.isfinite(fitted) or not fitted:
+        return
+    factor = named(fitted, 1e-9 * abs(fitted))
+    if factor and notable(factor, Fraction(1)):
+        made = reading(float(factor))  # type: ignore[operator]
+        yield _Try(kind, {name: decimal_text(factor, 8)}, made, drop=FITTED_DROP)
+
+
+def _list(values: Array) -> str:
+    return ", ".join(decimal_text(named(float(v), 1e-9 * max(1e-3, float(numpy.abs(values).max()))), 8) for v in values)
+
+
+def _pairs(seen: Seen) -> Iterator[_Try]:
+    """Two readings at once."""
+    singles = [each for each in _readings(seen) if each[0] != "extrinsic"] + list(_axes_of_space(seen))
+    for i, (kind, numbers, one) in enumerate(singles):
+        for other, more, two in singles[i + 1 :]:
+            if kind == other:
+                continue
+            both = _merged(seen.said, one, two)
+            if both is not None:
+                yield from _scopes(seen, f"{kind}+{other}", {**numbers, **more}, both)
+
+
+def _merged(said: Reading, one: Reading, two: Reading) -> Reading | None:
+    """Both changes; None where they are of the same thing."""
+    changes = {}
+    for name in Reading.__dataclass_fields__:
+        values = [getattr(each, name) for each in (one, two) if getattr(each, name) != getattr(said, name)]
+        if len(values) > 1:
+            return None
+        if values:
+            changes[name] = values[0]
+    return replace(said, **changes)

@@ -1,0 +1,335 @@
+"""What went wrong in a motion that is off, told by trying it: a supposition counts only if it explains the states.
+
+Every supposition is a motion that is computed and compared with the states.  It is told if the error falls by two
+decades with it, by three where a number was fitted to the states; otherwise nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from sys import float_info
+
+import numpy
+
+from heavytop.features.score.diagnose import hypotheses
+from heavytop.features.score.diagnose.samples import (
+    ALIKE,
+    DROP,
+    FITTED_DROP,
+    FLOOR,
+    Array,
+    Examined,
+    Frame,
+    Units,
+    examined,
+)
+from heavytop.measure.scalar import EXPLAINS, Rounding, explains, rounding
+from heavytop.precision import Precision, decimal_text
+from heavytop.top.equations import System, holding
+from heavytop.top.heavy_top import HeavyTop, State
+
+_WORTH_ASKING = 1e-10
+"""Relative errors below it are no mistake of this kind."""
+_WRONG = 1e-3
+"""Smaller ones are not those of other equations."""
+_TOO_FAR = 1.0
+"""Taken for the error where heyoka does not get to the times."""
+_CONSTANT = 100.0
+"""Integrals are constant but off if they are off by so many times what they vary by, ..."""
+_OFF = 1e-3
+"""... and by so much of what they may be; they vary if they vary by as much."""
+VARIES, AS_AT_START = "varies", "that of the start"
+"""What is said of first integrals that do not keep another value."""
+_FEWEST_ROWS = 4
+_FEWEST_STILL = 3
+_ALONE = 1000.0
+"""States are alone in being off if they are off by so many times as much as any other, ..."""
+_RIGHT = 1e-2
+"""... which is off by no more than that, ..."""
+_FEW_OF, _MOST_ALONE = 4, 8
+"""... and if they are at most one in four of all, and so many."""
+_LONG = 1.5
+"""The last interval between times is no measure of a state if it is so many times the longest other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """A mistake that explains the states.
+
+    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
+    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
+    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
+    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
+    """
+
+    kind: str
+    numbers: dict[str, str] = field(default_factory=dict)
+    error: float | None = None
+    left: float | None = None
+    looked_at: tuple[int, int, str] | None = None
+
+
+def diagnose(
+    top: HeavyTop,
+    start: State,
+    system: System,
+    times: Sequence[Fraction],
+    states: Sequence[Sequence[Fraction | None]],
+    precision: Precision,
+    relative_error: float | None,
+    errors: Sequence[float] = (),
+    frame: Frame | None = None,
+) -> list[Diagnosis]:
+    """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
+
+    relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
+    errors: that of each state relative to the size of Ω and γ, up to where the reference ends; empty without one.
+    """
+    measured, written = numpy.array(errors, dtype=float), rounding(states, precision)
+    if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= _WORTH_ASKING:
+        return _rounded(written, relative_error)
+    with numpy.errstate(all="ignore"):  # what overflows explains nothing
+        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
+        truth = None if given is None else given.supposed(given.times)
+        if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
+            return _rounded(written, relative_error)
+        mistake = _still(given, states, relative_error) or _off_alone(given, times, measured)
+        if mistake is None and given is not None and given.rows:
+            error = _TOO_FAR if truth is None else given.error(truth)
+            mistake = _mistake(given, truth, error) if error > _WORTH_ASKING else None
+    return [mistake] if mistake else []
+
+
+def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
+    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
+    if written is None or error is None or not explains(written, error):
+        return []
+    return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
+
+
+def _only_rounded(written: Rounding | None, error: float | None, given: Examined | None) -> bool:
+    """Whether every component that is looked at is the true one, rounded as it is written."""
+    if written is None or (error is not None and error > EXPLAINS * written.error):
+        return False
+    truth = None if given is None or not given.rows else given.supposed(given.times)
+    if given is None or truth is None:
+        return error is not None
+    units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(given.units.time), given.rate))
+    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * _WORTH_ASKING * sizes
+    return bool((numpy.abs(given.states - truth) <= allowed).all())
+
+
+def _mistake(given: Examined, truth: Array | None, error: float) -> Diagnosis | None:
+    """The simplest mistake among those that explain the states about as well as the best."""
+    explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
+    if not explained and error > _WRONG:
+        others = hypotheses.suppositions(given, truth)
+        explained = [(*each, FITTED_DROP) for each in others if each[2] * FITTED_DROP <= error]
+    if not explained:
+        every = given.widened()
+        return _looked_at(every, _lost_row(every)) or _looked_at(given, _integrals_off(given, error))
+    best = min(max(left, FLOOR) for *_, left, _ in explained)
+    kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
+    return _looked_at(given, Diagnosis(kind, numbers, error, left))
+
+
+def _still(
+    given: Examined | None, states: Sequence[Sequence[Fraction]], relative_error: float | None
+) -> Diagnosis | None:
+    """From some time on every state is the same, which are three at least, though the motion moves there."""
+    same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
+    right = relative_error is not None and relative_error <= _WRONG
+    if given is None or right or same < _FEWEST_STILL or not _moves(given, len(states) - same):
+        return None
+    if same == len(states):
+        return Diagnosis("constant")
+    first = _text(given.all_times[-same], given.units.time)
+    return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
+
+
+def _moves(given: Examined, row: int) -> bool:
+    """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
+    true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
+    pairs = [(here, given.follows(row))] + ([] if true is None else [(true[0], true[1])])
+    return any(after is not None and _apart(given, after, before) > _WRONG for before, after in pairs)
+
+
+def _apart(given: Examined, one: Array, other: Array) -> float:
+    """How far two states are apart, relative to the size of Ω and of γ."""
+    return float((numpy.abs(one - other) / numpy.repeat([given.rate, 1.0], [3, len(one) - 3])).max())
+
+
+def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
+    """A few states that are off while all others are right.
+
+    errors: as far as they were measured; where there are none, those of what heyoka reaches.
+    """
+    every = given.widened() if given is not None and not len(errors) else None
+    truth = None if every is None or not every.rows else every.supposed(every.times)
+    if every is not None and truth is not None:
+        errors = every.errors(truth)
+    order = numpy.argsort(-errors, kind="stable")
+    most = max(1, min(_MOST_ALONE, len(errors) // _FEW_OF)) if len(errors) > 2 else 0
+    found = [n for n in range(1, most + 1) if _gap(errors[order[n - 1]], errors[order[n]])]
+    off = sorted(map(int, order[: found[-1]])) if found else []
+    last = len(errors) - 1
+    if not off or (last in off and (len(off) > 1 or not _jumps(given, times, last, errors))):
+        return None
+    error, left = (min(float(errors[row]), float_info.max) for row in (order[0], order[len(off)]))
+    where = ", ".join(decimal_text(times[row], 6) for row in off)
+    which = ", ".join(str(row + 1) for row in off)
+    looked_at = None if len(errors) == len(times) else (len(errors), len(times), decimal_text(times[last], 6))
+    numbers = {"t": where, "state": f"{which} of {len(errors)}"}
+    return Diagnosis("one_state" if len(off) == 1 else "some_states", numbers, error, left, looked_at)
+
+
+def _gap(error: float, other: float) -> bool:
+    """Whether an error is that of a state that is off, and the other that of one that is right."""
+    return bool(error > _WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
+
+
+def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
+    """Whether the last state is not that of the motion through the one before, nor much later than that."""
+    spans = [abs(b - a) for a, b in zip([Fraction(0), *times[: last - 1]], times[:last], strict=True)]
+    if given is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
+        return False
+    expected = given.follows(last - 1)
+    if expected is None:
+        return False
+    return _apart(given, given.all_states[last], expected) >= errors[last] / 2
+
+
+def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
+    """The same, with how many of the states it was found in, where that is not all of them."""
+    looked, all_of_them = len(given.rows), len(given.all_times)
+    if found is None or looked == all_of_them:
+        return found
+    return replace(found, looked_at=(looked, all_of_them, _text(given.times[-1], given.units.time)))
+
+
+Supposition = tuple[str, dict[str, str], float, float]
+"""Kind, numbers, the error that is left, and how far it must have fallen."""
+
+
+def _suppositions(given: Examined, truth: Array | None) -> Iterator[Supposition]:
+    """The simplest first, those with a fitted number last."""
+    reading = None if truth is None else hypotheses.reading(given, truth)
+    if reading is not None and reading[0].changes == 1:
+        yield _of_reading(*reading)
+    for data, left in hypotheses.without_numbers(given):
+        yield data.kind, dict(data.numbers), left, DROP
+    clock = hypotheses.clock(given)
+    if clock is not None and not clock[0].fitted:
+        yield _of_clock(*clock, given.units)
+    if reading is not None and reading[0].changes > 1:
+        yield _of_reading(*reading)
+    if truth is not None:
+        yield from ((*each, FITTED_DROP) for each in hypotheses.scaled(given, truth))
+    if clock is not None and clock[0].fitted:
+        yield _of_clock(*clock, given.units)
+    fits = (
+        hypotheses.all_scaled,
+        hypotheses.another_weight,
+        hypotheses.another_start,
+        hypotheses.another_top,
+    )
+    for supposed in fits:
+        found = supposed(given)
+        if found is not None:
+            data, left = found
+            yield data.kind, dict(data.numbers), left, max(FITTED_DROP, data.required)
+
+
+def _of_reading(reading: hypotheses.ColumnsHypothesis, left: float) -> Supposition:
+    numbers: dict[str, str] = {}
+    if reading.meaning:
+        numbers["meaning"] = reading.meaning
+    if reading.axes != (1, 2, 3):
+        numbers |= {"axes": ",".join(map(str, reading.axes)), "of": reading.of}
+    if reading.swapped:
+        numbers["order"] = "gamma before omega"
+    if len(numbers) == 1 and reading.meaning:
+        return reading.meaning, {}, left, DROP
+    if reading.swapped and len(numbers) == 1:
+        return "columns_swapped", {}, left, DROP
+    return ("axes_permuted" if "meaning" not in numbers and not reading.swapped else "columns"), numbers, left, DROP
+
+
+def _of_clock(clock: hypotheses.TimesHypothesis, left: float, units: Units) -> Supposition:
+    numbers = {"shift": _text(clock.shift, units.time)} if clock.kind == "times_shifted" else {}
+    if clock.kind == "time_unit":
+        steps = hypotheses.steps_of_interval(clock.factor)
+        numbers = {"factor": f"{clock.factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
+    return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
+
+
+def _lost_row(every: Examined) -> Diagnosis | None:
+    """States that are right up to a time, and from there on those of the next sample, or of the one before."""
+    times = every.times
+    if len(times) < _FEWEST_ROWS:
+        return None
+    ends = {"row_missing": [*times[1:], 2 * times[-1] - times[-2]], "row_twice": [Fraction(0), *times[:-1]]}
+    found = [(kind, every.supposed(moved)) for kind, moved in ends.items()]
+    truth = every.supposed(times)
+    if truth is None:
+        return None
+    own = every.errors(truth)
+    for kind, moved_truth in found:
+        if moved_truth is None:
+            continue
+        moved = every.errors(moved_truth)
+        left = [max(own[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
+        row = int(numpy.argmin(left))
+        if left[row] * _ALONE <= own.max():
+            return Diagnosis(kind, {"t": _text(times[row + 1], every.units.time)}, float(own.max()), float(left[row]))
+    return None
+
+
+def _integrals_off(given: Examined, error: float) -> Diagnosis | None:
+    """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
+    if len(given.rows) < 3 or not given.is_whole:
+        return None
+    p = given.system.parameters(given.top, given.start)
+    start = [float(value) for value in given.start.flat]
+    vectors = given.states.reshape(len(given.states), -1, 3) @ given.frame.axes
+    numbers: dict[str, str] = {}
+    for integral in holding(given.top, given.start, given.system):
+        if integral.name not in (sizes := _sizes(given)):
+            continue
+        size, unit = sizes[integral.name]
+        values = numpy.array([float(integral.value(p, [*omega, *gamma])) for omega, gamma, *_ in vectors])
+        at_start = float(integral.value(p, start))
+        off, varies = abs(float(values.mean()) - at_start), float(values.max() - values.min())
+        if not varies <= _OFF * size:
+            numbers[integral.name] = VARIES
+        elif off > max(_CONSTANT * varies, _OFF * size):
+            numbers[integral.name] = f"{_text(values.mean(), unit)}, not {_text(at_start, unit)}"
+        elif off <= _OFF * size:
+            numbers[integral.name] = AS_AT_START
+    told = set(numbers.values()) - {VARIES, AS_AT_START}
+    return Diagnosis("integrals_off", numbers, error) if told else None
+
+
+def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
+    """What the integrals that are looked at may be, and their units."""
+    p = given.system.parameters(given.top, given.start)
+    inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
+    rotor = max(abs(float(value)) for value in given.top.rotor or (0,))
+    area, energy = inertia * given.rate + rotor, inertia * given.rate**2 + moment
+    area_unit, energy_unit = given.units.moment * given.units.time, given.units.moment
+    return {
+        "gamma_squared": (1.0, Fraction(1)),
+        "area": (area, area_unit),
+        "energy": (energy, energy_unit),
+        "gyrostat_energy": (energy, energy_unit),
+        "momentum_squared": (area**2, area_unit**2),
+        "spin": (given.rate, 1 / given.units.time),
+    }
+
+
+def _text(value: float | Fraction, unit: Fraction) -> str:
+    """A number of the data's own units, to six digits."""
+    text = decimal_text(Fraction(value) * unit, 6)
+    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text

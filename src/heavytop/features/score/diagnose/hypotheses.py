@@ -1,0 +1,699 @@
+"""A top or a start other than the ones that were given: the sign of γ or P, axes of the top renamed, another P, another
+start, another top.
+
+Numbers are fitted to the first integrals, which are linear in them: with M = IΩ and n = P r, neither M·γ nor
+½ Ω·M + n·γ may change from the start to any sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import permutations, product
+from math import isfinite
+from typing import Any, TypeVar
+
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.features.score.diagnose.samples import (
+    ALIKE,
+    FARTHEST,
+    FITTED_DROP,
+    FLOOR,
+    SHORT,
+    SMALL,
+    Array,
+    Examined,
+    floats,
+    named,
+    notable,
+)
+from heavytop.precision import cross, decimal_text, dot
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State
+
+# Columns that mean something else than Ω and γ in body axes: axes renamed or reversed, γ down, M in place of Ω.
+
+
+_DEGREES = 180 / numpy.pi
+_TURNS = 1 / (2 * numpy.pi)
+_RPM = 60 * _TURNS
+UNITS_OF_OMEGA = {"degrees": _DEGREES, "turns": _TURNS, "rpm": _RPM}
+"""Of angular velocity, each as a multiple of radians per time unit; rpm where times are in seconds."""
+_FEWEST = 3
+"""Numbers of which one factor may be told."""
+_PRESENT = 1e-6
+"""A column of the true states counts as 0 below this part of its vector."""
+_MEANINGS: dict[str, tuple[float, float, bool]] = {
+    "": (1, 1, False),
+    "gamma_down": (1, -1, False),
+    "omega_reversed": (-1, 1, False),
+    "both_reversed": (-1, -1, False),
+    "momentum": (1, 1, True),
+    "momentum_gamma_down": (1, -1, True),
+    "omega_in_degrees": (_DEGREES, 1, False),
+    "omega_in_turns": (_TURNS, 1, False),
+    "omega_in_rpm": (_RPM, 1, False),
+}
+"""Factor of Ω, factor of γ, and whether M stands in place of Ω."""
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnsHypothesis:
+    """What the six columns may be.
+
+    meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
+    of: "both", "omega" or "gamma", the vectors whose axes these are.  swapped: γ stands before Ω.
+    """
+
+    meaning: str = ""
+    axes: tuple[int, int, int] = (1, 2, 3)
+    of: str = "both"
+    swapped: bool = False
+
+    @property
+    def changes(self) -> int:
+        """How many things are other than they should be."""
+        moved = self.axes != (1, 2, 3)
+        signs = sum(axis < 0 for axis in self.axes)
+        return bool(self.meaning) + ("_gamma_down" in self.meaning) + self.swapped + moved + signs + (self.of != "both")
+
+    def columns(self, states: Array, tensor: Array) -> Array:
+        """The columns that a file with this reading has where the states are ``states``."""
+        omega_factor, gamma_factor, momentum = _MEANINGS[self.meaning]
+        order, signs = [abs(axis) - 1 for axis in self.axes], numpy.sign(self.axes)
+        omega, gamma = states[:, :3] * omega_factor, states[:, 3:] * gamma_factor
+        omega = omega @ tensor if momentum else omega
+        if self.of != "gamma":
+            omega = omega[:, order] * signs
+        if self.of != "omega":
+            gamma = gamma[:, order] * signs
+        return numpy.hstack([gamma, omega] if self.swapped else [omega, gamma])
+
+
+def _readings() -> Iterator[ColumnsHypothesis]:
+    renamed = [(a, b, c) for a, b, c in permutations((1, 2, 3))]
+    signed = [
+        (a * s, b * t, c * u) for a, b, c in renamed for s, t, u in product((1, -1), repeat=3) if (s, t, u) != (-1,) * 3
+    ]
+    kinds = [("both", axes) for axes in signed]
+    kinds += [(of, axes) for of in ("omega", "gamma") for axes in renamed[1:]]
+    for meaning, swapped, (of, axes) in product(_MEANINGS, (False, True), kinds):
+        yield ColumnsHypothesis(meaning, axes, of, swapped)
+
+
+READINGS = sorted((reading for reading in _readings() if reading.changes), key=lambda reading: reading.changes)
+"""Every reading that is tried, the simplest first."""
+
+
+def reading(given: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
+    """The simplest reading of the columns that fits about as well as the best, and its error."""
+    if len(given.frame.columns) < 6:
+        return None
+    errors = [given.error(each.columns(truth[:, :6], given.tensor)) for each in READINGS]
+    best = min(errors)
+    return next(
+        ((each, error) for each, error in zip(READINGS, errors, strict=True) if error <= ALIKE * max(best, FLOOR)), None
+    )
+
+
+def scaled(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+    """Ω, γ or one column times a constant factor: kind, numbers, and the error of the states divided by the factor."""
+    groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
+    groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
+    for kind, columns in groups:
+        if not set(range(6)[columns]) <= set(given.frame.columns):
+            continue
+        true, whole = truth[:, columns], truth[:, :3] if columns.start < 3 else truth[:, 3:]
+        if true.size < _FEWEST or numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
+            continue
+        fitted = float((given.states[:, columns] * true).sum() / (true * true).sum())
+        if not numpy.isfinite(fitted) or not fitted:
+            continue
+        left = _divided(given, truth, columns, fitted)
+        factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
+        if factor and factor != -1 and notable(factor, Fraction(1)):
+            numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
+            text = decimal_text(factor, 8)
+            yield kind, {**numbers, "factor": text}, _divided(given, truth, columns, float(factor))
+
+
+def _divided(given: Examined, truth: Array, columns: slice, factor: float) -> float:
+    states = given.states.copy()
+    states[:, columns] /= factor
+    return replace(given, states=states).error(truth)
+
+
+def constant_column(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+    """A column that is the same in every state, and the error of the other five."""
+    if len(given.rows) < _FEWEST:
+        return
+    still = (given.all_states == given.all_states[0]).all(axis=0)
+    for column in (column for column in given.frame.columns if still[column]):
+        states = given.states.copy()
+        states[:, column] = truth[:, column]
+        value = Fraction(float(given.states[0, column])) / (given.units.time if column < 3 else 1)
+        numbers = {"column": NAMES[column], "value": decimal_text(value, 6)}
+        yield "column_constant", numbers, replace(given, states=states).error(truth)
+
+
+_SINGULAR = 1e-4
+"""The integrals name one top if the smallest singular value is smaller than this part of the next."""
+_NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
+"""Widths, relative to the data, within which a fitted number may be rounded; the first that does no harm is taken."""
+_MOST_CHANGED = 3
+_MARGIN = 30.0
+"""How many errors of the samples a fitted number may be off."""
+_BIAS = 0.02
+"""A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
+_AT_ONCE = 1e-3
+_LATER = 2
+"""The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class DataHypothesis:
+    """What the data may be: the kind of mistake, and the numbers that fit by the name of what they replace.
+
+    fitted: whether they were fitted.  required: how far the error must fall, where more than usual.
+    """
+
+    kind: str
+    numbers: tuple[tuple[str, str], ...] = ()
+    fitted: bool = False
+    required: float = 0.0
+
+
+Found = tuple[DataHypothesis, float]
+
+
+def without_numbers(given: Examined) -> Iterator[Found]:
+    """Suppositions that need no fitted number, the likeliest first."""
+    top, start = given.top, given.start
+    if top.weight:
+        yield _tried(given, "no_gravity", replace(top, weight=Fraction(0)))
+    yield _tried(given, "weight_sign", replace(top, weight=-top.weight))
+    yield _tried(given, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
+    yield _tried(given, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
+    k = top.rotor or (Fraction(0),) * 3
+    momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
+    yield _tried(given, "start_momentum", start=momentum)
+    yield _as_momentum(given, momentum)
+    for unit, factor in UNITS_OF_OMEGA.items():
+        yield DataHypothesis(f"all_in_{unit}"), _all_times(given, factor)
+    other = GYROSTAT if given.system is HEAVY_TOP else HEAVY_TOP
+    yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
+    if top.rotor is not None:
+        yield _tried(given, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
+    tensor, moment, rotor = given.tensor, given.in_file(top.moment), given.in_file(k)
+    for order in list(permutations(range(3)))[1:]:
+        places = list(order)
+        axes = (("axes", "".join(str(i + 1) for i in order)),)
+        turned = tensor[numpy.ix_(places, places)]
+        yield _with_body(given, "inertia_axes", turned, moment, rotor, axes)
+        yield _with_body(given, "centre_axes", tensor, moment[places], rotor, axes)
+        yield _with_body(given, "top_axes", turned, moment[places], rotor[places], axes)
+    centre = given.in_file(top.centre)
+    for signs in list(product((1, -1), repeat=3))[1:-1]:
+        texts = (_text(named(value, 1e-15 * abs(value))) for value in centre * signs)
+        yield _with_body(given, "centre_signs", tensor, moment * signs, rotor, (("centre", ", ".join(texts)),))
+
+
+def _with_body(
+    given: Examined, kind: str, tensor: Array, moment: Array, rotor: Array, numbers: tuple[tuple[str, str], ...]
+) -> Found:
+    """The error with a body that has other axes."""
+    same = (given.tensor, given.in_file(given.top.moment), given.in_file(given.top.rotor or (Fraction(0),) * 3))
+    if all(numpy.array_equal(one, other) for one, other in zip((tensor, moment, rotor), same, strict=True)):
+        return DataHypothesis(kind), float("inf")
+    supposed = given.with_body(tensor, moment, rotor)
+    return DataHypothesis(kind, numbers), supposed.error(supposed.supposed(given.times))
+
+
+def _tried(given: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Found:
+    tops = (top or given.top, given.top)
+    same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
+    if same and (start is None or start == given.start) and kind != "system":
+        return DataHypothesis(kind), float("inf")
+    return DataHypothesis(kind), given.error(given.supposed(given.times, top, start))
+
+
+def _as_momentum(given: Examined, start: State) -> Found:
+    """Start and states give M in place of Ω."""
+    truth = given.supposed(given.times, start=start)
+    if truth is not None:
+        truth[:, :3] = truth[:, :3] @ given.tensor + given.in_file(given.top.rotor or (Fraction(0),) * 3)
+    return DataHypothesis("all_momentum"), given.error(truth)
+
+
+def _all_times(given: Examined, factor: float) -> float:
+    """The error where start and states give Ω times ``factor``."""
+    start = State([w / Fraction(factor) for w in given.start.omega], given.start.gamma)
+    truth = given.supposed(given.times, start=start)
+    return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
+
+
+def all_scaled(given: Examined) -> Found | None:
+    """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
+    square = _weight_ratio(given)
+    if square is None or square <= 0:
+        return None
+    fitted = square**0.5
+    left = _all_times(given, fitted)
+    factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
+    if not factor or not notable(factor, Fraction(1)):
+        return None
+    return DataHypothesis("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(
+        given, float(factor)
+    )
+
+
+def _weight_ratio(given: Examined) -> float | None:
+    """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
+    if not given.is_whole:
+        return None
+    tensor, start = given.tensor, given.in_file(given.start.flat)
+    omega = given.states[:, :3]
+    kinetic = 0.5 * (numpy.einsum("ni,ij,nj->n", omega, tensor, omega) - start[:3] @ tensor @ start[:3])
+    height = (given.states[:, 3:6] - start[3:]) @ given.in_file(given.top.moment)
+    square = float(height @ height)
+    ratio = -float(kinetic @ height) / square if square else float("nan")
+    return ratio if isfinite(ratio) else None
+
+
+def another_weight(given: Examined) -> Found | None:
+    """P from the energy."""
+    ratio, old = _weight_ratio(given), given.top.weight
+    if ratio is None or not isfinite(ratio * float(old)):
+        return None
+    fitted = ratio * float(old)
+    candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
+    tops = [(weight, replace(given.top, weight=weight)) for weight in candidates]
+    weight, error = _roundest([(weight, given.error(given.supposed(given.times, top))) for weight, top in tops])
+    if not notable(weight, old):
+        return None
+    return DataHypothesis("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
+
+
+def another_start(given: Examined) -> Found | None:
+    """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
+
+    The error must fall by more than the motion itself magnifies it from the start to the first sample: where
+    neighbouring motions part quickly, the errors of a method look like those of a start.
+    """
+    times = given.times
+    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(given.states[0]).any():
+        return None
+    back = given.starting(given.states[0]).supposed([-times[0]])
+    truth = given.supposed(times[:1])
+    if back is None or truth is None or not _shows_at_once(given, truth):
+        return None
+    start = given.in_file(given.start.flat)
+    error = given.error(given.starting(back[0]).supposed(times))
+    off = numpy.abs(back[0, :6] - start)
+    magnified = float(numpy.abs(given.states[0] - truth[0]).max() / (off.max() or 1.0))
+    sizes = [max(given.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
+    units = [given.units.time] * 3 + [Fraction(1)] * 3
+    noise = _MARGIN * max(error, 1e-12)
+    changed = [
+        (name, named(float(value), noise * size), unit, change > _BIAS * size, noise * size)
+        for name, value, change, size, unit in zip(NAMES, back[0], off, sizes, units, strict=False)
+        if change > noise * size
+    ]
+    # a method of low order carries an error of its first step along as another start
+    if not any(large or _is_round(new, near) for _, new, _, large, near in changed):
+        return None
+    numbers = tuple((name, _text(new / unit)) for name, new, unit, *_ in changed)
+    return DataHypothesis("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+
+
+def _is_round(new: Fraction, near: float) -> bool:
+    """Whether a number is a short decimal, as none is by accident that is known within ``near``."""
+    return new == Fraction(decimal_text(new, SHORT)) and near <= _BIAS * 10.0**-SHORT * abs(float(new))
+
+
+def _shows_at_once(given: Examined, first: Array) -> bool:
+    """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
+    method may look like one from another start.
+    """
+    early, largest = given.at(given.rows[:1]).error(first), given.error(given.supposed(given.times))
+    return early >= _AT_ONCE * largest
+
+
+def another_top(given: Examined) -> Found | None:
+    """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
+    entries = _PRODUCTS if _is_full(given) else _PRODUCTS[:3]
+    direction = _conserving(given, entries) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
+    before = [Fraction(given.tensor[place]) for place in entries] + [*map(Fraction, given.in_file(given.top.moment))]
+    if direction is None or not (direction * floats(before)).any():
+        return None
+    scaled = [_scaled(direction, before, near) for near in _NEAR]
+    tried = [(numbers, _with(given, numbers[:-3], numbers[-3:])) for numbers in scaled]
+    numbers, error = _roundest(tried)
+    units = [given.units.inertia] * len(numbers[3:]) + [given.units.moment] * 3
+    names = [f"I{i + 1}{j + 1}" if _is_full(given) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
+    entries_of = zip(names, before, numbers, units, strict=True)
+    changed = [(name, _text(new * unit)) for name, old, new, unit in entries_of if new != old]
+    told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
+    if not told or len(changed) > _MOST_CHANGED:
+        return None
+    return DataHypothesis("top", tuple(changed), fitted=True), error
+
+
+_PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Entries of a tensor: three of a diagonal one."""
+
+
+def _is_full(given: Examined) -> bool:
+    return bool((given.frame.axes != numpy.eye(3)).any())
+
+
+def _conserving(given: Examined, entries: Sequence[tuple[int, int]]) -> Array | None:
+    """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
+    if not given.is_whole:
+        return None
+    start = given.in_file(given.start.flat)
+
+    def products(one: Array, other: Array) -> Array:
+        found = [one[..., i] * other[..., j] + (one[..., j] * other[..., i] if i != j else 0) for i, j in entries]
+        return numpy.stack(found, axis=-1)
+
+    omega, gamma = given.states[:, :3], given.states[:, 3:6]
+    area = products(omega, gamma) - products(start[:3], start[3:])
+    turning = 0.5 * (products(omega, omega) - products(start[:3], start[:3]))
+    energy = numpy.hstack([turning, gamma - start[3:]])
+    size = given.rate or 1.0
+    units = numpy.array([size**2] * len(entries) + [1.0] * 3)
+    rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(gamma)]), energy]) / units
+    if not numpy.isfinite(rows).all():
+        return None
+    _, values, directions = numpy.linalg.svd(rows)
+    if len(values) < len(units) or values[-1] > _SINGULAR * values[-2]:
+        return None
+    found: Array = directions[-1] / units
+    return found
+
+
+def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[Fraction]:
+    """The direction with the factor by which most numbers stay what they are, within ``near`` of the largest."""
+    old = floats(before)
+    largest = [numpy.abs(old[:-3]).max(), numpy.abs(old[-3:]).max() or numpy.abs(old[:-3]).max()]
+    sizes = numpy.repeat(largest, [len(old) - 3, 3])
+    factors = [o / d for o, d in zip(old, direction, strict=True) if o and d]
+    scaled = max((direction * f for f in factors), key=lambda new: int((numpy.abs(new - old) <= near * sizes).sum()))
+    return [
+        o if abs(value - float(o)) <= near * size else named(float(value), near * size)
+        for value, o, size in zip(scaled, before, sizes, strict=True)
+    ]
+
+
+def _with(given: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
+    """The error with those entries of the tensor, and P r."""
+    tensor = numpy.zeros((3, 3))
+    for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
+        tensor[i, j] = tensor[j, i] = value
+    try:
+        supposed = given.with_body(tensor, floats(moment))
+    except InputError:  # a moment that is not positive
+        return float("inf")
+    return supposed.error(supposed.supposed(given.times))
+
+
+_Numbers = TypeVar("_Numbers")
+
+
+def _roundest(tried: Sequence[tuple[_Numbers, float]]) -> tuple[_Numbers, float]:
+    """The first, that is the most rounded, whose error is about as small as any."""
+    best = min(error for _, error in tried)
+    return next(pair for pair in tried if pair[1] <= ALIKE * best)
+
+
+def _text(value: Fraction) -> str:
+    """A short decimal, a small fraction, or eight digits."""
+    decimal = decimal_text(value, SHORT + 2)
+    if Fraction(decimal) == value or value.denominator > SMALL:
+        return decimal if Fraction(decimal) == value else decimal_text(value, 8)
+    return str(value)
+
+
+# States of other equations, in other axes or in another order of columns than can be read off a heavy top's.
+#
+# These are asked after everything simpler.
+
+
+FoundEquations = tuple[str, dict[str, str], float]
+"""Kind, numbers, and the error that is left."""
+
+
+def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
+    """The heavy top with γ' = Ω × γ."""
+    return (*heavy_top(p, y)[:3], *cross(y[:3], y[3:6]))
+
+
+_TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_velocity)
+_ANOTHER_MOTION = 0.03
+"""Relative errors below it are not those of another field, each of which is compiled anew."""
+_OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
+
+
+def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquations]:
+    """Each with the error that is left; one equation with the other sign only where nothing else fits."""
+    found: list[FoundEquations] = []
+    if truth is not None:
+        found += constant_column(given, truth)
+        found += [_any_order(given, truth), *_axes_of_space(given, truth)] if len(given.frame.columns) == 6 else []
+    if given.system is HEAVY_TOP and given.is_whole:
+        found += _signs(given)
+    yield from found
+    error = given.error(truth)
+    if given.is_whole and error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
+        for place, name in enumerate(NAMES):
+            system = _negated(given.system, place, tuple(map(tuple, given.frame.axes.tolist())))
+            supposed = replace(given, system=system).supposed(given.times)
+            yield "component_sign", {"column": name}, given.error(supposed)
+
+
+@lru_cache(maxsize=18)
+def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) -> System:
+    """The same equations with the derivative of one component, in the axes of the file, negated."""
+    along, block = axes[place % 3], slice(place - place % 3, place - place % 3 + 3)
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        found = list(system.field(p, y))
+        twice = 2.0 * dot(along, found[block])
+        found[block] = [
+            value - part * twice if part else value for value, part in zip(found[block], along, strict=True)
+        ]
+        return tuple(found)
+
+    name = f"{system.name}_{NAMES[place]}_negated" + "_".join(map(float.hex, along))
+    return replace(system, name=name, field=field)
+
+
+def _signs(given: Examined) -> Iterator[FoundEquations]:
+    """A sign in the equations turned over.
+
+    With −Ω in the place of Ω, M' = Ω × M + P γ × r is M' = M × Ω − P γ × r, and γ' = γ × Ω is γ' = Ω × γ.
+    """
+    top, start = given.top, given.start
+    lifted, reversed_start = (
+        replace(top, weight=-top.weight),
+        State([-w for w in start.omega], start.gamma),
+    )
+    other = replace(given, system=_TURNED_BACK)
+    yield "kinematic_sign", {}, given.error(other.supposed(given.times))
+    for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
+        found = replace(given, system=system).supposed(given.times, lifted, reversed_start)
+        yield kind, {}, given.error(None if found is None else found * _OMEGA_BACK)
+
+
+def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
+    """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
+    omega, gamma, truth = given.states[:, :3], given.states[:, 3:6], truth[:, :6]
+    size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate)
+    length = numpy.abs(numpy.linalg.norm(omega, axis=1) - numpy.linalg.norm(truth[:, :3], axis=1)).max() / size
+    vertical = (truth[:, :3] * truth[:, 3:]).sum(axis=1)
+    for axis in range(3):
+        up = numpy.eye(3)[axis]
+        part = numpy.abs(omega[:, axis] - vertical).max() / size
+        for what, expected in (("omega", truth[:, 3:]), ("both", up)):
+            left = max(length, part, numpy.abs(gamma - expected).max())
+            yield "axes_of_space", {"of": what, "vertical": str(axis + 1)}, float(left)
+
+
+def _any_order(given: Examined, truth: Array) -> FoundEquations:
+    """Each column as that component, or its negative, that it is nearest to."""
+    truth = truth[:, :6]
+    sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate), numpy.abs(truth[:, 3:]).max()], 3)
+    both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
+    off = numpy.array(
+        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in given.states[:, :6].T]
+    )
+    nearest = off.argmin(axis=1)
+    if sorted(nearest % 6) != list(range(6)):
+        return "column_order", {}, float("inf")
+    names = ", ".join(("−" if place >= 6 else "") + NAMES[place % 6] for place in nearest)
+    return "column_order", {"columns": names}, float(off.min(axis=1).max())
+
+
+# Times that mean something else: reversed, shifted, in another unit, or off by a row.
+
+
+_GRID = 1500
+_WITHIN = 0.3
+"""A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
+_TRIED = 12
+_REFINED = 6
+_SPAN = Fraction(1, 10)
+"""The samples must spread over so much of their time: an integrator's own lag grows with time and is no shift."""
+_NEAR_ONE = 0.05
+"""A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
+_SHORT = 3
+_EXACTLY = 1e-9
+_MOST_STEPS = 300
+"""In an interval between samples, of which one too many or too few is recognised: further ones are too near to 1."""
+_UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
+_FEWEST_ROWS = 3
+_CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
+
+
+@dataclass(frozen=True, slots=True)
+class TimesHypothesis:
+    """What the times may be.
+
+    kind: time_reversed, start_row_missing, rows_off_by_one (early), rows_late, rows_reversed, times_shifted (by
+    ``shift``: the state said to be at t is that of t + shift), or time_unit (the state said to be at t is that of
+    factor·t).
+    fitted: whether the number was fitted, and not one that units differ by.
+    """
+
+    kind: str
+    shift: float = 0.0
+    factor: float = 1.0
+    fitted: bool = False
+
+
+def clock(given: Examined) -> tuple[TimesHypothesis, float] | None:
+    """The simplest of the suppositions about the times that are about as good as the best, and its error."""
+    found = [(each, at.error(at.supposed(times))) for each, at, times in _without_numbers(given) if len(times)]
+    if len(given.rows) >= 3:
+        found += _fitted(given)
+    best = min((error for _, error in found), default=0.0)
+    return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
+
+
+def _without_numbers(given: Examined) -> Iterator[tuple[TimesHypothesis, Examined, list[Fraction]]]:
+    """Each supposition, the samples that it is tried on and their times."""
+    every = given.all_times
+    yield TimesHypothesis("time_reversed"), given, [-time for time in given.times]
+    if len(every) > 1:
+        before = [every[row - 1] if row else Fraction(0) for row in given.rows]
+        yield TimesHypothesis("start_row_missing"), given, before
+        yield TimesHypothesis("rows_reversed"), given, [every[-1 - row] for row in given.rows]
+        yield _neighbours(given, "rows_off_by_one", 1, 2 * every[-1] - every[-2])
+        yield _neighbours(given, "rows_late", -1, 2 * every[0] - every[1])
+    for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
+        if abs(float(factor * given.times[-1])) * given.rate <= FARTHEST:
+            yield TimesHypothesis("time_unit", factor=float(factor)), given, [factor * time for time in given.times]
+
+
+def _neighbours(
+    given: Examined, kind: str, off: int, beyond: Fraction
+) -> tuple[TimesHypothesis, Examined, list[Fraction]]:
+    """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
+    left that are about as wrong as all: else it is that at ``beyond``.
+    """
+    inside = range(len(given.all_times))
+    rows = [row for row in given.rows if row + off in inside]
+    at = given
+    if _FEWEST_ROWS <= len(rows) < len(given.rows):
+        fewer = given.at(rows)
+        wrong, wrong_of_all = (each.error(each.supposed(each.times)) for each in (fewer, given))
+        at = fewer if ALIKE * wrong >= wrong_of_all else given
+    times = [given.all_times[row + off] if row + off in inside else beyond for row in at.rows]
+    return TimesHypothesis(kind), at, times
+
+
+def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
+    """Shifts and units that bring the first states onto the motion, refined over all samples."""
+    times = numpy.array([float(time) for time in given.times])
+    if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
+        return
+    reach = min(1.5 * abs(times[-1]) + 6 / given.rate, FARTHEST / given.rate)
+    grid = numpy.linspace(-reach, reach, _GRID)
+    orbit = given.supposed([Fraction(value) for value in grid])
+    if orbit is None:
+        return
+    sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
+    # a method's own lag explains the samples of an oscillation as well as any clock
+    slower = list(_refined(given, "time_unit", 1.0, times, sizes))
+    lag = min((error for found, error in slower if abs(found.factor - 1) < _NEAR_ONE), default=float("inf"))
+    yield from (each for each in slower if abs(each[0].factor - 1) >= _NEAR_ONE or _is_short(each[0].factor))
+    for kind in ("times_shifted", "time_unit"):
+        # a shift is the same for every sample; a unit shows best at the earliest sample away from 0
+        tried = []
+        for place in _near(orbit / sizes, given.states[0] / sizes):
+            number = grid[place] - times[0] if kind == "times_shifted" else grid[place] / times[0] if times[0] else 1.0
+            supposed = numpy.interp(_moved(kind, number, times), grid, numpy.arange(_GRID))
+            off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - given.states) / sizes
+            tried.append((float(numpy.median(numpy.fmax.reduce(off, axis=1))), number))
+        for _, number in sorted(tried)[: _TRIED // 3]:
+            for found, error in _refined(given, kind, number, times, sizes):
+                near_one = kind == "time_unit" and abs(found.factor - 1) < _NEAR_ONE
+                if _is_short(found.factor) if near_one else ALIKE * error < lag:
+                    yield found, error
+
+
+def steps_of_interval(factor: float) -> int | None:
+    """n where the factor is (n + 1)/n, as of intervals of n steps that are one too long; −n where it is (n − 1)/n."""
+    n = round(1 / (factor - 1)) if abs(factor - 1) > 1 / (2 * _MOST_STEPS) else 0
+    return n if 1 < abs(n) <= _MOST_STEPS and abs(factor - 1 - 1 / n) < _EXACTLY else None
+
+
+def _is_short(factor: float) -> bool:
+    """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
+    if steps_of_interval(factor) is not None:
+        return True
+    near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
+    return any(
+        one != 1 and abs(one / Fraction(each) - 1) < _EXACTLY
+        for one, each in zip(near, (factor, 1 / factor), strict=True)
+    )
+
+
+def _near(orbit: Array, state: Array) -> list[int]:
+    """Places of the grid where the orbit comes nearest to a state, the nearest first."""
+    far = numpy.fmax.reduce(numpy.abs(orbit - state), axis=1)
+    lower = (far <= numpy.roll(far, 1)) & (far <= numpy.roll(far, -1)) & (far < _WITHIN)
+    places = numpy.flatnonzero(lower)
+    return [int(place) for place in places[numpy.argsort(far[places])][:_TRIED]]
+
+
+def _moved(kind: str, number: float, times: Array) -> Array:
+    return times + number if kind == "times_shifted" else times * number
+
+
+def _refined(
+    given: Examined, kind: str, number: float, times: Array, sizes: Array
+) -> Iterator[tuple[TimesHypothesis, float]]:
+    """Gauss-Newton on the one number; the rate of the motion is a difference quotient of the motion itself."""
+    small = 1e-6 / given.rate
+    for _ in range(_REFINED):
+        at = _moved(kind, number, times)
+        here = given.supposed([Fraction(value) for value in at])
+        there = given.supposed([Fraction(value) for value in at + small])
+        if here is None or there is None:
+            return
+        slope = (there - here) / small / sizes * (1.0 if kind == "times_shifted" else times[:, None])
+        square = float((slope * slope)[~numpy.isnan(given.states)].sum())
+        if not square:
+            return
+        number += float(numpy.nansum(slope * (given.states - here) / sizes)) / square
+        if not abs(_moved(kind, number, times)).max() * given.rate <= FARTHEST:
+            return
+    error = given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))
+    shift, factor = (number, 1.0) if kind == "times_shifted" else (0.0, number)
+    yield TimesHypothesis(kind, shift, factor, fitted=True), error

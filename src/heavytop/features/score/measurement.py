@@ -1,0 +1,442 @@
+"""A motion computed elsewhere, scored like our own, beside heyoka's, and with what explains its error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import msgspec
+import numpy
+
+from heavytop.cases import Case
+from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.exact.flint.balls import midpoint, whole_evaluation, working_precision
+from heavytop.features.score.diagnose.conventions import mistake, sampled
+from heavytop.features.score.diagnose.diagnosis import Diagnosis, diagnose
+from heavytop.features.score.diagnose.readings import disagreement
+from heavytop.features.score.diagnose.samples import turning_rate
+from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
+from heavytop.harness.plan import log_spaced
+from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.attitude_error import ObservedScorer, state_of
+from heavytop.measure.scalar import (
+    GUARD_BITS,
+    RELATIVE,
+    digits_kept,
+    digits_of,
+    digits_right,
+    explains,
+    relative_error,
+    rounding,
+    to_ball,
+)
+from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
+from heavytop.measure.truth import Truth, truth, truth_with_attitude
+from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, physical, round_to, shown, time_text
+from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
+
+# Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.
+
+
+_WORTH_ASKING = 1e-10
+_OVERLAP = 1e-6
+"""Columns that say the same must agree to that."""
+_PART = 0.1
+"""A length explains an error that is at most so many times as large, turned over."""
+_WORDS = {
+    "omega": "Ω in body axes",
+    "omega_space": "Ω in axes of space",
+    "gamma": "γ",
+    "quaternion": "quaternion",
+    "matrix": "matrix",
+    "euler": "Euler angles",
+    "position": "position",
+}
+
+
+def exact_problem(given: GivenTrajectory) -> Problem:
+    """The problem in the format of the trajectory, whose principal data are exact: the body was rounded before."""
+    found = observed_of(given)
+    top, start = found.posed.top, found.posed.start
+    attitude = set(found.columns) - {"omega", "gamma"}
+    parameters = given.system.parameters(top, start)
+    xi = found.posed.xi if attitude else None
+    return Problem(given.system, given.precision, parameters, start, xi, (top, start))
+
+
+def observed_of(given: GivenTrajectory) -> Observed:
+    """What the trajectory gives."""
+    assert given.observed is not None
+    return given.observed
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """A scored trajectory: what measured it, and the relative error of each sample where the reference goes."""
+
+    problem: Problem
+    scorer: ObservedScorer
+    errors: list[float]
+
+
+def scored(
+    given: GivenTrajectory,
+    times: Sequence[Fraction],
+    keep: Sequence[Fraction],
+    effort: float,
+    progress: Callable[[], None],
+) -> Scored:
+    """Every sample up to the first that is not finite, compared with the true motion.  times: rounded to the format."""
+    found, problem = observed_of(given), exact_problem(given)
+    true = truth_with_attitude(problem, times, effort)
+    known = true if isinstance(true, str) else true.remembered()
+    scorer = ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
+    errors: list[float] = []
+    for row, time in enumerate(times[: _count(found)]):
+        scorer(time, found.sample(row))
+        if scorer.error is not None and scorer.error.truth.covers(time):
+            errors.append(scorer.error.last)
+        progress()
+    return Scored(problem, scorer, errors)
+
+
+def _count(found: Observed) -> int:
+    return min(map(len, found.columns.values()), default=0)
+
+
+def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
+    """What explains the error of the columns: their digits, lengths off 1, a convention, or another mistake."""
+    found = observed_of(given)
+    times = given.times[: _count(found)]
+    rows = [row for row in given.states[: len(times)] if row is not None]
+    said = _disagreements(found, times)
+    written = rounding(rows, given.precision)
+    if error is not None and error <= _WORTH_ASKING:
+        rounded = written is not None and explains(written, error)
+        return said + ([Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})] if rounded else [])  # type: ignore[union-attr]
+    lengths = _lengths(found, times, given.precision)
+    if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
+        return [*said, lengths]
+    if written is not None and error is not None and explains(written, error):
+        return [*said, Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
+    seen = found.seen(times)
+    told = None if seen is None else mistake(sampled(seen))
+    if told is not None and seen is not None:
+        numbers = {"of": "data", **told.numbers} | ({"or": ", ".join(told.others)} if told.others else {})
+        looked = sampled(seen)
+        at = None if len(looked.times) == len(times) else (len(looked.times), len(times), shown(looked.times[-1]))
+        return [*said, Diagnosis(told.kind, numbers, told.error, told.left, at)]
+    return said + _of_states(given, times, error, errors)
+
+
+def _of_states(
+    given: GivenTrajectory, times: Sequence[Fraction], error: float | None, errors: Sequence[float]
+) -> list[Diagnosis]:
+    """What the columns have wrong that a file of Ω and γ may have as well, where they give the whole state."""
+    found, bits = observed_of(given), given.precision.bits + GUARD_BITS
+    states: list[tuple[Fraction, ...]] = []
+    for row in range(len(times)):
+        state = state_of(found.sample(row), found.said, found.posed, bits)
+        if state is None:
+            return []
+        states.append(tuple(round_to(midpoint(value), given.precision.bits) for value in state))
+    top, start = found.posed.top, found.posed.start
+    return diagnose(top, start, given.system, times, states, given.precision, error, errors)
+
+
+def _lengths(found: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
+    """Quaternions whose length is not 1, by more than roundings make of it."""
+    rows = found.columns.get("quaternion", [])
+    off = [abs(dot(row, row) + row[3] ** 2 - 1) / 2 for row in rows]
+    if not off or max(off) <= 2**10 * precision.eps:
+        return None
+    worst = max(range(len(off)), key=lambda row: off[row])
+    size = decimal_text(off[worst], 3)
+    return Diagnosis("quaternion_length", {"off": size, "t": shown(times[worst])}, float(off[worst]))
+
+
+def _disagreements(found: Observed, times: Sequence[Fraction]) -> list[Diagnosis]:
+    """Columns that say the same and differ."""
+    seen = found.seen(times)
+    if seen is None:
+        return []
+    with numpy.errstate(all="ignore"):
+        apart = disagreement(seen)
+    said = []
+    for (one, other), off in apart.items():
+        if float(off.max()) > _OVERLAP:
+            row = int(numpy.argmax(off > _OVERLAP))
+            numbers = {"columns": f"{_WORDS[one]} and {_WORDS[other]}", "by": f"{float(off.max()):.2e}"}
+            said.append(Diagnosis("columns_disagree", {**numbers, "t": shown(times[row])}))
+    return said
+
+
+def used(given: GivenTrajectory) -> str:
+    """Which columns were scored, and how they were read."""
+    found = observed_of(given)
+    said, parts = found.said, []
+    for name in found.names:
+        text = _WORDS[name]
+        if name == "quaternion":
+            text += f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})"
+        elif name == "matrix":
+            text += f" ({said.matrix.replace('_', ' ')})"
+        elif name == "euler":
+            text += f" ({said.sequence}, {said.angles})"
+        elif name == "position":
+            text += " of the centre of mass" if said.point is None else " of the point"
+        parts.append(text)
+    up = "" if not set(found.names) - {"omega", "gamma"} else f"; {said.up} points up"
+    return f"Scored: {', '.join(parts)}{up}."
+
+
+__all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "direction", "score"]
+
+Progress = Callable[[], None]
+PEER = "heyoka"
+_REFERENCE_EFFORT = 10.0
+"""Seconds of the model of its cost that a computed reference may take."""
+_EFFORT = 20.0
+"""Seconds that the run of heyoka beside the scored one may take, roughly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """How good a motion is.
+
+    row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
+    diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
+    the file, but read off the digits written.  single: whether every number of the states is one of single precision.
+    used: which columns were scored, where these are not Ω and γ in principal axes.
+    """
+
+    row: Row
+    peer: Peer | None
+    diagnoses: list[Diagnosis]
+    format_guessed: bool = False
+    single: bool = False
+    used: str = ""
+
+    @property
+    def digits_right(self) -> float | None:
+        """Digits that are right at every sample; None without a reference."""
+        return digits_kept(self.row)
+
+    @property
+    def of_digits(self) -> int:
+        """Decimal digits of the format."""
+        return digits_of(self.row.bits)
+
+    @property
+    def direction(self) -> str | None:
+        """Where most of the error lies."""
+        return direction(self.row)
+
+
+def direction(row: Row) -> str | None:
+    """Where most of the error lies: "along" the flow, "across" it, "both"; None where neither is a number."""
+    along, across = (row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
+    if along is None or across is None or not (_is_number(along) and _is_number(across)):
+        return None
+    sizes = [along.number, across.number]
+    if not any(sizes):
+        return None
+    if sizes[0] > _MOSTLY * sizes[1]:
+        return "along"
+    return "across" if sizes[1] > _MOSTLY * sizes[0] else "both"
+
+
+_MOSTLY = 2
+"""One part of an error is most of it if it is so many times as large as the other."""
+
+
+def _is_number(metric: Metric) -> bool:
+    return metric.log10 is not None or metric.value == "0"
+
+
+def score(given: GivenTrajectory) -> Row:
+    """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
+
+    The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
+    the first that is not finite on are not scored; the outcome says so.
+    """
+    return _scored(given)[0] if given.observed is None else _observed_row(given)[0]
+
+
+def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
+    """The row of :func:`score`, heyoka beside it, and what explains the error.
+
+    progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
+    """
+    if given.observed is not None:
+        return _assess_observed(given, progress)
+    row, scorer, errors = _scored(given, progress)
+    states = _finite(given)
+    times = given.times[: len(states)]
+    diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row), errors)
+    written = rounding(states, given.precision)
+    single = written is not None and written.kind == "single"
+    problem = Problem.of(given.top, given.start, given.precision, given.system)
+    peer = _peer(given, problem, scorer, len(states), progress)
+    return Assessment(row, peer, diagnoses, given.format_guessed, single)
+
+
+def _scored(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
+    """The row, what made it, and the error of each state relative to the size of Ω and γ where the reference goes."""
+    precision = given.precision
+    problem = Problem.of(given.top, given.start, precision, given.system)
+    states = _finite(given)
+    times = [round_to(time, precision.bits) for time in given.times]
+    keep = [times[i - 1] for i in log_spaced(len(times))]
+    true = truth(problem, times, _REFERENCE_EFFORT)
+    scorer = Scorer(problem, true if isinstance(true, str) else true.remembered(), keep)
+    errors: list[float] = []
+    rate = turning_rate(given.top, given.start)
+    for time, state in zip(times, states, strict=False):
+        scorer(time, state)
+        if scorer.error is not None and scorer.error.truth.covers(time):
+            errors.append(scorer.error.last(rate))
+        progress()
+    return _row(given, problem, times, keep, scorer), scorer, errors
+
+
+def _row(
+    given: GivenTrajectory,
+    problem: Problem,
+    times: list[Fraction],
+    keep: list[Fraction],
+    scorer: Scorer | ObservedScorer,
+) -> Row:
+    """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
+    precision, states = given.precision, _finite(given)
+    count = len(states)
+    run = Trajectory(
+        problem,
+        given.integrator,
+        tuple(times[:count]),
+        tuple(states),
+        given.outcome,
+        times[count - 1] if count else Fraction(0),
+        given.steps,
+        0,
+        flags=given.flags,
+    )
+    case = Case(given.name, "given", given.system, given.top, given.start)
+    subject = Subject("given", given.integrator)
+    key = RowKey("score", given.name, given.system.name, subject, precision.name, horizon=time_text(times[-1]))
+    task = Task(key, "", given.integrator, case, tuple(times), tuple(keep))
+    row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
+    said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
+    return msgspec.structs.replace(row, **said, data=data_of(case))
+
+
+def _observed_row(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scored]:
+    """The row of a trajectory of attitudes, positions or Ω in any axes, and what made it."""
+    times = [round_to(time, given.precision.bits) for time in given.times]
+    keep = [times[i - 1] for i in log_spaced(len(times))]
+    found = scored(given, times, keep, _REFERENCE_EFFORT, progress)
+    return _row(given, found.problem, times, keep, found.scorer), found
+
+
+def _assess_observed(given: GivenTrajectory, progress: Progress) -> Assessment:
+    row, found = _observed_row(given, progress)
+    count = len(_finite(given))
+    told = diagnoses(given, _size(row), found.errors) if count else []
+    peer = _peer(given, found.problem, found.scorer, count, progress)
+    return Assessment(row, peer, told, given.format_guessed, False, used(given))
+
+
+def _finite(given: GivenTrajectory) -> list[tuple[Fraction, ...]]:
+    """The states before the first that is not finite."""
+    count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
+    return [state for state in given.states[:count] if state is not None]
+
+
+def _size(row: Row) -> float | None:
+    metric = row.metrics.get(RELATIVE.text)
+    if metric is None or not (_is_number(metric) or metric.bound is not None):
+        return None
+    return float(metric)
+
+
+@dataclass(slots=True)
+class _Measured:
+    """As much of a row as its digits need."""
+
+    bits: int
+    metrics: dict[str, Metric]
+    reference: Against
+
+
+def _peer(
+    given: GivenTrajectory, problem: Problem, scorer: DriftAndError, count: int, progress: Progress
+) -> Peer | None:
+    """heyoka's own run of the same problem over the same times, compared with the same known motion.
+
+    None without one, and where heyoka does not get there.
+    """
+    precision = given.precision
+    if isinstance(scorer.truth, str) or not count or precision == DOUBLE_DOUBLE:
+        return None
+    known: Truth = scorer.truth
+    running, bits = Running(), precision.bits + GUARD_BITS
+    limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
+
+    @whole_evaluation
+    def following(time: Fraction, state: Sequence[object]) -> Sums:
+        true = known.state(time, bits)[: len(state)]
+        with working_precision(bits):
+            off = [to_ball(value) - each for value, each in zip(state, true, strict=True)]
+            return running.following(relative_error(off, true))
+
+    def observe(time: Fraction, state: Sequence[object]) -> None:
+        if known.covers(time):
+            running.take(time, following(time, state), False)
+        progress()
+
+    top, start = problem.given or (problem.top, problem.start)
+    options: dict[str, Any] = {"system": problem.system, "xi": problem.xi, "step_limit": limit, "observer": observe}
+    try:
+        run = propagate(top, start, given.times[:count], precision, **options)
+    except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
+        return None
+    with working_precision(bits):
+        found = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
+    digits = digits_kept(_Measured(precision.bits, by_name({RELATIVE: found[RELATIVE]}), scorer.against))
+    if run.outcome is not Outcome.SUCCESS or digits is None:
+        return None
+    return Peer(PEER, precision.name, digits, run.steps)
+
+
+def required(digits: Any) -> Fraction:
+    """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
+    asked = physical(exact(digits), "require")
+    if asked <= 0:
+        raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
+    return asked
+
+
+def passed(row: Row, needed: Fraction | None) -> bool | None:
+    """Whether so many digits are right; False where fewer are, also of a run that ended early.
+
+    None, which is no pass, where it ended early, and where it is not known how many are right, or only that so many are
+    which the reference resolves.  needed: None for no demand.
+    """
+    good = None if not complete(row) else True
+    if needed is None:
+        return good
+    kept = digits_right(row)
+    if kept is None:
+        return None
+    if exact(kept) < needed:
+        return False if row.metrics[RELATIVE.text].bound is None else None
+    return good
+
+
+def complete(row: Row) -> bool:
+    """Whether every state was finite and the run reached its end."""
+    return row.outcome == Outcome.SUCCESS.value

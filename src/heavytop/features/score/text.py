@@ -1,0 +1,513 @@
+"""How good one trajectory is, for people: the answer in its first lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from fractions import Fraction
+from typing import Any
+
+import msgspec
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES, Diagnosis
+from heavytop.features.score.diagnose.samples import FLOOR
+from heavytop.features.score.measurement import Assessment, direction, passed
+from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
+from heavytop.records import SCHEMA, Beside, Peer, Quantity, Report, Row
+from heavytop.report.document.document import (
+    TIME,
+    Block,
+    Card,
+    Cell,
+    Chart,
+    Headline,
+    In,
+    Key,
+    Note,
+    Section,
+    Sources,
+    Table,
+    Value,
+    draw,
+    logarithm,
+    scientific,
+    short,
+)
+from heavytop.report.document.svg import MARKERS, decades, finish, new_axes, spoken
+from heavytop.report.render.text import table, wrapped
+
+# Mistakes of convention in a sentence each: what fits, where it was found, and how many digits are right with it.
+
+
+_CONVENTION_SENTENCES = {
+    "scalar_last": "The quaternions have their scalar part in the other place: quaternion_order = {quaternion_order}",
+    "conjugate": "The quaternions are conjugate: quaternion = {quaternion}",
+    "scalar_last_conjugate": "The quaternions are conjugate and have their scalar part in the other place",
+    "transposed": "The matrices are transposed: matrix = {matrix}",
+    "degrees": "The angles are in {unit}",
+    "sequence": "The Euler angles are those of the sequence {sequence}",
+    "extrinsic": "The Euler angles are about axes of space (extrinsic): those of {sequence}, one after the other",
+    "angles_negated": "The Euler angles have the other sign",
+    "angles_of_inverse": "The Euler angles are those of the inverse rotation, from space to body",
+    "omega_frame": "Ω is in the other axes: those of space where it is said to be in body axes, or the other way round",
+    "omega_in_degrees": "Ω is in degrees per time unit, not in radians",
+    "omega_in_turns": "Ω is in turns per time unit, not in radians",
+    "omega_in_rpm": "Ω is in turns per 60 time units (rpm where times are in s), not in radians",
+    "omega_reversed": "Ω has the other sign",
+    "omega_scaled": "Ω is {factor} times what fits",
+    "momentum": "The columns of Ω are the angular momentum M = I Ω",
+    "gamma_down": "γ points down: with −γ it fits",
+    "up": "Another axis points up: up = {up}",
+    "left_handed": "The axes are left-handed: the {axis} axis is reversed",
+    "inertia_about": "The inertia tensor is that about the {about}",
+    "gravity_sign": "Gravity pulls the other way: g has the other sign, or the third axis of space points down",
+    "gravity_unit": "Gravity has another unit: the weight is {factor} times the one that is given",
+    "products_of_inertia": "The products of inertia have the other sign: what is asked for is I12 = −∫xy dm, and so on",
+    "centre_reversed": "The centre of mass is on the opposite side: −centre, as from the centre to the fixed point",
+    "centre_signs": "The centre of mass is at ({centre})",
+    "centre_unit": "The centre of mass has another unit of length: {factor} times the one that is given",
+    "inertia_unit": "The moments of inertia have another unit: {factor} times those that are given",
+    "inertia_axes": "The axes of the inertia tensor are in another order: those of axes {axes} as 1, 2, 3",
+    "centre_axes": "The axes of the centre of mass are in another order: those of axes {axes} as 1, 2, 3",
+    "body_data_axes": "Tensor and centre have their axes in another order: those of axes {axes} as 1, 2, 3",
+    "inertia_in_space_axes": "The inertia tensor is given in the axes of space at t = 0, not in those of the body",
+    "centre_in_space_axes": "The centre of mass is given in the axes of space at t = 0, not in those of the body",
+    "data_in_space_axes": "Tensor and centre are given in the axes of space at t = 0, not in those of the body",
+    "displacement": "The positions are displacements from the first one",
+    "position_reversed": "The positions have the other sign: from the centre of mass to the fixed point",
+    "position_unit": "The positions have another unit of length: they are {factor} times what fits",
+    "position_of_centre": "The positions are those of the centre of mass, not of the point",
+    "point": "The positions are those of another point of the body, ({point}) in its axes",
+    "pivot": "The fixed point is elsewhere: the positions are shifted by ({offset}) in axes whose third points up",
+    "point_and_pivot": "The positions are those of the point ({point}) of the body, shifted by ({offset})",
+    "space_axes": "The axes of space are in another order or reversed: x, y, z are axes {axes}",
+    "body_axes": "The axes of the body are in another order or reversed: 1, 2, 3 are axes {axes}",
+    "space_turned": "The axes of space are turned by {angle} degrees",
+    "body_turned": "The axes of the body are turned by {angle} degrees",
+}
+
+
+def is_convention(found: Diagnosis) -> bool:
+    """Whether it is said here."""
+    if found.kind in ("quaternion_length", "columns_disagree"):
+        return True
+    # other files have mistakes of the same names, without a word on where they were found
+    return "of" in found.numbers and all(kind in _CONVENTION_SENTENCES for kind in found.kind.split("+"))
+
+
+def sentence(found: Diagnosis) -> str:
+    """What fits, in which numbers, how far the error falls, and the digits that are right with it."""
+    numbers = found.numbers
+    if found.kind == "quaternion_length":
+        return (
+            f"The quaternions have not length 1: it is off by {numbers['off']} at t = {numbers['t']}. Their directions "
+            "are scored, and the length counts as an error; --normalize leaves it out."
+        )
+    if found.kind == "columns_disagree":
+        apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
+        return f"Columns contradict each other: {apart}."
+    said = "; ".join(_one(kind, numbers) for kind in found.kind.split("+"))
+    where = {"columns": ", in the columns but not in the start", "start": ", in the start but not in the columns"}
+    said += where.get(numbers.get("of", ""), "")
+    if found.error is None or found.left is None:
+        return f"{said}."
+    digits = -math.log10(max(found.left, FLOOR))
+    more = " or more" if found.left < FLOOR else ""
+    fall = f"the largest error relative to the size of each quantity falls from {found.error:.2e} to {found.left:.2e}"
+    text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
+    return text + (f" As well fits: {numbers['or'].replace('_', ' ')}." if "or" in numbers else "")
+
+
+def _one(kind: str, numbers: dict[str, str]) -> str:
+    return _CONVENTION_SENTENCES[kind].format(**numbers)
+
+
+# What explains the error of a motion, in a sentence each.
+
+
+_MEANINGS = {
+    "gamma_down": ("γ points down", ": with −γ they fit"),
+    "omega_reversed": ("Ω has the other sign", ": with −Ω they fit"),
+    "both_reversed": ("Ω and γ both have the other sign", ": with −Ω and −γ they fit"),
+    "omega_in_degrees": ("Ω is in degrees per time unit", ", not in radians"),
+    "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
+    "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
+}
+"""What the columns mean in these states, and what that comes to."""
+_SENTENCES = {
+    "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
+    "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
+    "columns_swapped": "γ stands before Ω in these states",
+    "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
+    "rotor_sign": "The states fit a rotor of −k: the momentum of the rotor has the other sign",
+    "start_gamma_sign": "The states fit a start with −γ: γ of the start has the other sign",
+    "start_omega_sign": "The states fit a start with −Ω: Ω of the start has the other sign",
+    "start_momentum": "The start gives the angular momentum M in place of Ω",
+    "all_momentum": "Start and states give the angular momentum M in place of Ω",
+    "all_in_degrees": "Start and states give Ω in degrees per time unit, not in radians",
+    "all_in_turns": "Start and states give Ω in turns per time unit, not in radians",
+    "all_in_rpm": "Start and states give Ω in turns per 60 time units (rpm where times are in s), not in radians",
+    "time_reversed": "The states are those of the times with the other sign",
+    "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
+    "rows_off_by_one": "Each state is that of the next time: the states are one row early",
+    "rows_late": "Each state is that of the time before: the states are one row late",
+    "kinematic_sign": "The states solve γ' = Ω × γ: the equation of γ has the other sign",
+    "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r: the product of M and Ω has the other sign",
+    "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",
+    "rows_reversed": "The states are listed from the last time to the first",
+}
+"""The sentences of kinds without a number."""
+_SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
+_OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass", "top_axes": "top"}
+
+
+def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
+    """One or two sentences: what fits, and how far the error falls with it."""
+    if is_convention(found):
+        return _scope(found) + sentence(found)
+    said = _scope(found) + _said(found, system)
+    if found.left is None or found.error is None:
+        return said
+    if found.kind in ("one_state", "some_states"):
+        without = "it" if found.kind == "one_state" else "them"
+        return f"{said}; without {without} the largest error relative to the size of Ω and γ is {_size(found.left)}."
+    fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
+    return f"{said}; {fall}."
+
+
+def _scope(found: Diagnosis) -> str:
+    """Of which states the sentence is true, where not all were looked at."""
+    if found.looked_at is None:
+        return ""
+    looked, states, until = found.looked_at
+    return f"Looked at {looked} of the {states} states, to t = {until}. "
+
+
+def _size(value: float) -> str:
+    return short(f"{value:.2e}", 2) if value >= FLOOR else f"less than {FLOOR:.0e}"
+
+
+def _said(found: Diagnosis, system: str) -> str:
+    numbers = found.numbers
+    if found.kind in _MEANINGS:
+        return " in these states".join(_MEANINGS[found.kind])
+    if found.kind in _SENTENCES:
+        return _SENTENCES[found.kind]
+    named = ", ".join(f"{name} = {value}" for name, value in numbers.items())
+    match found.kind:
+        case "axes_permuted":
+            return f"The axes are in another order or reversed: {_columns(numbers)}"
+        case "columns":
+            return f"The columns mean something else: {_columns(numbers)}"
+        case "inertia_axes" | "centre_axes" | "top_axes":
+            what = _OWNERS[found.kind]
+            order = ", ".join(numbers["axes"])
+            return f"The axes of the {what} are in another order: the states fit with those of axes {order} as 1, 2, 3"
+        case "centre_signs":
+            return f"The states fit a centre of mass at ({numbers['centre']})"
+        case "system":
+            return f"The states fit the system {_SYSTEM[system]}, not {system}"
+        case "times_shifted":
+            return f"The times are shifted: the state given at t is that at t {_signed(numbers['shift'])}"
+        case "time_unit":
+            return _time_unit(**numbers)
+        case "component_sign":
+            return f"The equation of {numbers['column']} has the other sign: the states fit with its derivative negated"
+        case "weight":
+            return f"The states fit another weight: {named}"
+        case "start":
+            return f"The states fit another start: {named}"
+        case "top":
+            return f"The states fit another top: {named}"
+        case "one_state":
+            return f"Only the state at t = {numbers['t']} is off (state {numbers['state']})"
+        case "some_states":
+            return f"Only the states at t = {numbers['t']} are off (states {numbers['state']})"
+        case "omega_scaled":
+            return f"Ω is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "gamma_scaled":
+            return f"γ is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "column_scaled":
+            return f"{numbers['column']} is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "column_constant":
+            return f"{numbers['column']} is {numbers['value']} in every state: the other five columns fit"
+        case "all_scaled":
+            return f"Start and states give {numbers['factor']}·Ω: with both divided by it they fit"
+        case "row_missing":
+            return f"A row is missing: from t = {numbers['t']} on, the states are those of the next times"
+        case "row_twice":
+            return f"A row too many: from t = {numbers['t']} on, the states are those of the times before"
+        case "column_order":
+            return f"The columns stand in another order: they are {numbers['columns']}"
+        case "axes_of_space":
+            whose = {"omega": "Ω is", "both": "Ω and γ are"}[numbers["of"]]
+            return f"{whose} given in axes fixed in space, of which axis {numbers['vertical']} is vertical"
+        case "frozen":
+            return f"From t = {numbers['t']} on nothing moves: {numbers['states']} states are the same."
+        case "constant":
+            return "Every state is the same: nothing moves."
+        case "rounded":
+            return _rounded(numbers)
+    return _integrals_off(numbers)
+
+
+def _time_unit(factor: str, steps: str = "") -> str:
+    where = f"the state given at t is that at {factor}·t"
+    if not steps:
+        return f"The time has another unit: {where}"
+    n, off = abs(int(steps)), "long" if int(steps) > 0 else "short"
+    taken = n + (1 if int(steps) > 0 else -1)
+    return f"Each interval is one step too {off} ({taken} steps of 1/{n} of it), or the time has another unit: {where}"
+
+
+def _signed(shift: str) -> str:
+    return f"− {shift[1:]}" if shift.startswith("-") else f"+ {shift}"
+
+
+def _columns(numbers: dict[str, str]) -> str:
+    parts = []
+    if "meaning" in numbers:
+        meaning = numbers["meaning"]
+        parts.append(_MEANINGS[meaning][0] if meaning in _MEANINGS else _SENTENCES[meaning])
+    if "order" in numbers:
+        parts.append("γ stands before Ω")
+    if "axes" in numbers:
+        vectors = {"both": "Ω and γ", "omega": "Ω", "gamma": "γ"}[numbers["of"]]
+        axes = ", ".join(axis.replace("-", "−") for axis in numbers["axes"].split(","))
+        parts.append(f"columns 1, 2, 3 of {vectors} are axes {axes}")
+    return "; ".join(parts)
+
+
+def _rounded(numbers: dict[str, str]) -> str:
+    to = {
+        "significant": f"{numbers['digits']} significant digits",
+        "decimals": f"{numbers['digits']} decimals",
+        "single": "single precision (24 bits)",
+    }[numbers["to"]]
+    return f"The states are rounded to {to}, which explains the error: written in full they may be better."
+
+
+def _integrals_off(numbers: dict[str, str]) -> str:
+    """What each first integral does, those first that keep another value."""
+    off = [f"{name} ({value})" for name, value in numbers.items() if value not in (VARIES, AS_AT_START)]
+    said = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
+    for text, verb in ((AS_AT_START, "{} the value of the start"), (VARIES, "")):
+        names = [name for name, value in numbers.items() if value == text]
+        if names:
+            does = verb.format(_keep(names)) if verb else "vary" if len(names) > 1 else "varies"
+            said.append(f"{_listed(names)} {does}")
+    return f"Of the first integrals, {'; '.join(said)}. Nothing that was tried explains it."
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _keep(names: list[str]) -> str:
+    return "keep" if len(names) > 1 else "keeps"
+
+
+_PARTS = {"omega": "Ω", "gamma": "γ", "along": "along the flow", "across": "across the flow"}
+_OBSERVED = {
+    "attitude_error": "attitude (rad)",
+    "position_error": "position",
+    "position_error_relative": "position, relative",
+}
+_DIRECTIONS = {
+    "along": "The error is mostly along the flow, that is in phase.",
+    "across": "The error is mostly across the flow.",
+    "both": "The error is along and across the flow alike.",
+}
+
+
+def answer(row: Row, peer: Peer | None) -> list[str]:
+    """The sentences that say how good it is; the first may be longer than a line, and can be broken behind its ";"."""
+    digits = digits_kept(row)
+    lines = []
+    if row.outcome != "success":
+        lines.append(f"The run ended early ({row.outcome}), at t = {row.time_reached} of {row.horizon}.")
+    if digits is None:
+        return [*lines, _without_digits(row)]
+    where = "every sample up to" if row.samples > 1 else "its one sample,"
+    said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
+    if peer is not None:
+        said += f"; {peer.integrator} in {peer.precision} keeps {digits_text(peer.digits_right)}"
+    lines.append(f"{said}.")
+    mostly = direction(row)
+    if mostly is not None:
+        lines.append(_DIRECTIONS[mostly])
+    return lines
+
+
+def _without_digits(row: Row) -> str:
+    if not row.samples:
+        return "No digit can be counted: the first state is not finite."
+    return "How many digits are right is not known: there is no reference. Drift is measured."
+
+
+def requirement(row: Row, needed: Fraction) -> str:
+    """Whether as many digits are right as are required, in a sentence."""
+    asked = f"{float(needed):g} digits are required"
+    kept, good = digits_right(row), passed(row, needed)
+    # rounded down, so that what is not enough does not look so
+    shown = "" if kept is None else f"{math.floor(kept * 1000) / 1000:g}"
+    if good is not None:
+        return f"{asked}: " + ("they are right." if good else f"{shown} are right.")
+    if row.outcome != "success":
+        return f"{asked}: not known, for the run ended early."
+    return f"{asked}: not known, for " + ("there is no reference." if kept is None else f"{shown} are resolved.")
+
+
+def guessed(found: Assessment) -> str | None:
+    """That the format was not named, and what it was taken for."""
+    if not found.format_guessed:
+        return None
+    said = f"No format is named; {found.row.precision} is the narrowest that holds the digits written."
+    single = " Every number in the states is one of single precision (24 bits): perhaps they were computed in it."
+    return said + (single if found.single else "")
+
+
+def told(found: Assessment) -> list[str]:
+    """What explains the error, and what was guessed."""
+    said = [diagnosis_text(each, found.row.system) for each in found.diagnoses]
+    note = guessed(found)
+    return [*([found.used] if found.used else []), *said, *([note] if note else [])]
+
+
+def to_json(found: Assessment) -> dict[str, Any]:
+    """The row, and beside it what `score --json` says more."""
+    peer = None if found.peer is None else asdict(found.peer)
+    said = [asdict(each) | {"sentence": diagnosis_text(each, found.row.system)} for each in found.diagnoses]
+    answers = {"digits_kept": found.digits_right, "digits_right": found.digits_right, "of_digits": found.of_digits}
+    more: dict[str, Any] = {"scored": found.used} if found.used else {}
+    more |= {"peer": peer, "mostly": found.direction, "format_guessed": found.format_guessed, "diagnosis": said}
+    row: dict[str, Any] = msgspec.to_builtins(found.row)
+    return row | answers | more
+
+
+def sizes(row: Row) -> list[list[Cell]]:
+    """Label, largest, root mean square and final value of each error and of the drift of each first integral."""
+    until = f" before t = {short(row.reference.until)}" if row.reference.until else ""
+    names = {Quantity(SOLUTION_ERROR, part): f"error{until}, {label}" for part, label in _PARTS.items()}
+    names |= {Quantity(name): f"error{until}, {label}" for name, label in _OBSERVED.items()}
+    found = [metric.quantity for metric in row.metrics.values() if metric.quantity]
+    names |= {Quantity(DRIFT, q.component): f"drift, {q.component}" for q in found if q.name == DRIFT}
+    return [
+        [label, *(Value(row.metrics.get(each.over(part).text)) for part in ("max", "rms", "final"))]
+        for each, label in names.items()
+        if each.over("max").text in row.metrics
+    ]
+
+
+def score_text(found: Assessment) -> RenderableType:
+    """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
+    row = found.row
+    numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
+    about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
+    parts: list[RenderableType] = [Text(line) for line in answer(row, found.peer)]
+    parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
+    explained = told(found)
+    if explained:
+        parts += [Text(), *(line for each in explained for line in _wrapped(each))]
+    return Group(*parts)
+
+
+def _wrapped(text: str) -> list[Text]:
+    return [Text(line) for line in wrapped(text, "")]
+
+
+# What a report says of one scored motion: digits right, digits lost over time along and across the flow.
+
+
+_SIZES = "", "largest", "rms", "final"
+_MOST = 50
+"""Sentences beside the answer."""
+_PAGE_PARTS = {"along": "along the flow (phase)", "across": "across the flow"}
+
+
+def score_report(found: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
+    """A report with this row alone, which `compare` understands, and what its page says beside the row."""
+    beside = Beside(found.peer, tuple(told(found)))
+    return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [found.row], beside)
+
+
+def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
+    """How good a scored motion is, what explains its error, how its digits are lost, and the same in numbers."""
+    first, *others = answer(row, beside.peer)
+    yield Headline(first)
+    compared = f"Compared with {row.against}."
+    yield from (Note(said, shown=In.FULL | In.PAGE) for said in (*others, *([] if beside.remarks else [compared])))
+    if beside.remarks:
+        remarks = [Note(said) for said in beside.remarks[:_MOST]]
+        yield Card("What explains it", remarks, note=compared, shown=In.FULL | In.PAGE)
+    yield Chart(digits_lost)
+    units = (
+        "Errors of Ω and along and across the flow in 1/time unit, of γ in units of |γ| = 1; drift of each first "
+        "integral in its own units."
+    )
+    yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
+
+
+def digits_lost(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Digits that the format has and the state has not, over |t|; None for several motions, without a reference, and
+    without a sample away from 0.
+    """
+    rows = [row for _, report in sources for row in report.rows]
+    if len(rows) != 1:
+        return None
+    (row,) = rows
+    section = Section(
+        "lost",
+        "Digits lost over time",
+        [
+            f"Digits lost: log10 of the error in units of ε = 2^(1 − bits) of {row.precision}, of its part along the "
+            "flow (phase) and of its part across it. The axis ends where the format has lost all significant digits."
+        ],
+        columns=["t", *_PAGE_PARTS],
+    )
+    axes = new_axes(TIME, "digits lost", 3.2)
+    epsilon = (1 - row.bits) * math.log10(2)
+    alternative = []
+    for place, (part, label) in enumerate(_PAGE_PARTS.items()):
+        curve = _lost(row, part, epsilon)
+        if curve:
+            x, y = [point[0] for point in curve], [point[1] for point in curve]
+            draw(axes, section.key(Key(label, place, MARKERS[place])), x, y)
+            alternative.append(f"{label}: {y[-1]:.1f} digits lost at |t| = {scientific(x[-1])}.")
+    if not alternative:
+        return None
+    most = row.bits * math.log10(2)
+    axes.set_ylim(0, max(most, *(line.get_ydata().max() for line in axes.lines)) * 1.02)
+    axes.axhline(most, color="#555555", lw=0.9, ls=(0, (4, 3)))
+    decades(axes.xaxis)
+    section.rows = _table(row, epsilon)
+    section.notes.append(f"Dashed: all {most:.0f} digits of {row.precision} are lost.")
+    section.pictures.append(finish(axes, "Digits lost over time", spoken(alternative), "lost"))
+    return section
+
+
+def _lost(row: Row, part: str, epsilon: float) -> list[tuple[float, float]]:
+    """log10 |t| and digits lost at each sample of the series that has both."""
+    series = row.series.get(Quantity(SOLUTION_ERROR, part).text)
+    if series is None:
+        return []
+    pairs = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=True)]
+    return [(x, max(y - epsilon, 0.0)) for x, y in pairs if x is not None and y is not None]
+
+
+def _table(row: Row, epsilon: float) -> list[list[str]]:
+    """The digits lost at each time."""
+    series = [row.series[Quantity(SOLUTION_ERROR, part).text] for part in _PAGE_PARTS]
+
+    def lost(value: str) -> str:
+        size = logarithm(value)
+        return "0.0" if value == "0" else value if size is None else f"{max(size - epsilon, 0.0):.1f}"
+
+    return [
+        [short(time), *map(lost, values)]
+        for time, *values in zip(series[0].times, *(each.values for each in series), strict=True)
+    ]

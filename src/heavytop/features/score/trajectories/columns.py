@@ -1,0 +1,622 @@
+"""Columns of attitudes, positions and Ω in any axes in tables of other programs: their names, places and cells."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import inf
+from typing import Any
+
+from flint import arb
+
+from heavytop import written_numbers
+from heavytop.errors import InputError, quoted
+from heavytop.exact.flint.balls import midpoint, working_precision
+from heavytop.features.score.trajectories.observed import RawStart
+from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
+from heavytop.precision import Vector, dot, exact, log10, vector
+
+REMEDY = "`heavytop docs score` lists the columns that are understood."
+_UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
+_INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)?[\])])+)(?:\s.*)?", re.IGNORECASE)
+_POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
+_PARTS = re.compile(r"(?:q|quat|quaternion)([wxyz0-4])")
+_MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
+_SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
+_FRAMED = re.compile(r"w([xyz])")
+_BODY = re.compile(r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])")
+_GAMMA = re.compile(r"(?:gamma|gam|g|γ)([xyz0-3])")
+_EULER = {
+    **{f"euler{k}": k for k in (1, 2, 3)},
+    **{f"angle{k}": k for k in (1, 2, 3)},
+    **dict.fromkeys(("phi", "φ", "alpha", "α"), 1),
+    **dict.fromkeys(("theta", "θ", "beta", "β"), 2),
+    **dict.fromkeys(("psi", "ψ"), 3),
+}
+_TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
+_AXES = {"x": "1", "y": "2", "z": "3"}
+_CLASSIC = {"p": "1", "q": "2", "r": "3"}
+_TIME = ("t", "time")
+_TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
+"""Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
+_SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
+"""What stands in the last brackets of a name, or behind its first slash."""
+_A_SECOND = ("/s", "/sec", "/second", "s-1")
+_SECOND = {"ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "μs": Fraction(1, 10**6), "min": Fraction(60)}
+_RATE = {
+    **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
+    **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
+}
+_METRE = {"mm": Fraction(1, 10**3), "cm": Fraction(1, 100)}
+_LENGTHS = ("m", *_METRE)
+_OMEGA = ("omega", "omega_space", "framed")
+_UNITS = {"t": _SECOND, "omega": _RATE, "omega_space": _RATE, "framed": _RATE, "position": _METRE}
+"""Units that a header may have, in those of the data: s, rad/s (of these as multiples of π) and m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit that the header says, and what it is in that of the data.  turning: whether π is a factor of it too."""
+
+    name: str
+    size: Fraction
+    turning: bool = False
+
+    def factor(self, digits: int) -> Fraction:
+        """What numbers of so many digits are multiplied by; π to many more."""
+        with working_precision(4 * digits + 64):
+            return self.size * midpoint(arb.pi()) if self.turning else self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What the columns of a table are.
+
+    time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
+    their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
+    units: of t and of quantities, where they are not those of the data.
+    """
+
+    time: int | None
+    places: Mapping[str, Mapping[str, int]]
+    angles: str
+    others: tuple[str, ...]
+    units: Mapping[str, Unit] = field(default_factory=dict)
+
+    def of_state(self) -> dict[str, int]:
+        """The places of t, omega1 to omega3, gamma1 to gamma3, as far as they are there; InputError for one twice."""
+        found = {} if self.time is None else {"t": self.time}
+        for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
+            components = self.places.get(quantity, {})
+            if {"0", "3"} <= set(components):
+                raise InputError(f"There are {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2.")
+            for component, place in components.items():
+                axis = _AXES.get(component) or str(int(component) + ("0" in components))
+                if found.setdefault(f"{name}{axis}", place) != place:
+                    raise InputError(f"The column {name}{axis} stands twice.", "Give each column once.")
+        return found
+
+
+def header(names: Sequence[str]) -> Header:
+    """The meaning of every column; raises InputError for one that stands twice."""
+    found: dict[str, dict[str, int]] = {}
+    time, angles, others = None, set(), []
+    units: dict[str, set[Unit]] = {}
+    plainly = [_plain(_with_index(name.strip())) for name in names]
+    together = _quaternion(names, plainly)
+    for place, (name, plain) in enumerate(zip(names, plainly, strict=True)):
+        if place in together.values():
+            continue
+        if plain in _TIME:
+            if time is not None:
+                raise InputError("The column t stands twice.", "Give each column once.")
+            time = place
+            units["t"] = {_unit("t", name)}
+            continue
+        meaning = _meaning(plain)
+        if meaning is None:
+            others.append(name)
+            continue
+        quantity, component = meaning
+        if component in found.setdefault(quantity, {}):
+            of_state = quantity in ("omega", "gamma")
+            said = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
+            raise InputError(f"The column {said} stands twice.", "Give each column once.")
+        found[quantity][component] = place
+        units.setdefault(quantity, set()).add(_unit(quantity, name))
+        if quantity == "euler" and (unit := _UNIT.search(name.strip())):
+            angles.add("degrees" if unit[1] else "radians")
+    if len(angles) > 1:
+        raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
+    if together:
+        found["quaternion"] = together
+    for name in others:
+        _require_no_quantity(name, found)
+    return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
+
+
+def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
+    """The places of w, x, y, z or e0 to e3 beside each other, where no column is called one of a quaternion.
+
+    Lengths are none.  Raises InputError where x, y, z may belong to either of two, as in x,y,z,w,x,y,z.
+    """
+    if any(_PARTS.fullmatch(name) for name in plain):
+        return {}
+    runs = [(place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3)]
+    lengths = [_unit("position", name).name in _LENGTHS for name in names]
+    found = [(place, run) for place, run in runs if run in _TOGETHER and not any(lengths[place : place + 4])]
+    if len(found) > 1:
+        raise InputError(
+            f"Of the columns {quoted(','.join(names))[:80]} more than four may be a quaternion.",
+            "Call them qw,qx,qy,qz, and positions px,py,pz.",
+        )
+    return {name[-1]: place + number for place, run in found for number, name in enumerate(run)}
+
+
+def _require_no_quantity(name: str, found: Mapping[str, object]) -> None:
+    """Raises InputError for a column that is not read, called as one of a quantity that no other column gives.
+
+    So of a unit that does not stand in brackets: the quantity would be passed over.  What stands behind ``_`` makes
+    another quantity of all but Ω and γ, as in theta_dot.
+    """
+    parts = re.split(r"([\s_{}<>]+)", name.strip())
+    for end in range(1, len(parts), 2):
+        begins = _plain(begun := "".join(parts[:end]))
+        quantity = (None if begins in _CLASSIC else _meaning(begins)) or ("", "")
+        named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
+        if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & found.keys():
+            raise InputError(
+                f"The column {quoted(name)} begins like one of the {_words(quantity[0])}, and is not understood.",
+                f"Write a unit in brackets, {quoted(begun + ' [unit]')}, or give the column another name.",
+            )
+
+
+def _unit(quantity: str, name: str) -> Unit:
+    """The unit of a column; that of the data where it says none that is known."""
+    match = _SAID.search(name.strip())
+    text = unicodedata.normalize("NFKC", (match[1] or match[2] or "") if match else "").lower()
+    text = re.sub(r"[\s*·^().]", "", text.replace("−", "-"))
+    known = _UNITS.get(quantity, {})
+    return Unit(text, known.get(text, Fraction(1)), text in _RATE and known is _RATE)
+
+
+def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
+    """The unit of each quantity that has another than the data; raises InputError for one that has several."""
+    for quantity, said in units.items():
+        if len({(unit.size, unit.turning) for unit in said}) > 1:
+            names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in said))
+            raise InputError(f"The header has the {_words(quantity)} {names}.", "Give all of it in one unit.")
+    found = {quantity: min(said, key=lambda unit: unit.name) for quantity, said in units.items()}
+    return {quantity: unit for quantity, unit in found.items() if unit.size != 1}
+
+
+def _with_index(name: str) -> str:
+    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``: what is in brackets is no unit but a component."""
+    match = _INDEXED.fullmatch(name)
+    base = _plain(match[1]) if match else ""
+    if match is None or base in _TIME or (base not in _CLASSIC and _meaning(base) is not None):
+        return name
+    return match[1] + re.sub(r"[^\w]", "", match[2])
+
+
+def _plain(name: str) -> str:
+    text = unicodedata.normalize("NFKC", re.sub(r"\s*[\[(/].*$", "", name)).lower()
+    text = re.sub(r"_(deg(rees)?|rad(ians)?)$", "", text.strip())
+    return re.sub(r"[\s_{}\\.^-]", "", text)
+
+
+def _meaning(plain: str) -> tuple[str, str] | None:
+    """The quantity and the component of a name; None where it is not understood."""
+    if plain in _EULER:
+        return "euler", str(_EULER[plain])
+    if plain in _CLASSIC:
+        return "omega", _CLASSIC[plain]
+    if plain in _TAIT_BRYAN:
+        return "euler", _TAIT_BRYAN[plain]
+    if match := _PARTS.fullmatch(plain):
+        return "quaternion", match[1]
+    if match := _MATRIX.fullmatch(plain):
+        return "matrix", match[1] + match[2]
+    if match := _FRAMED.fullmatch(plain):
+        return "framed", match[1]
+    for quantity, pattern in (("omega_space", _SPACE), ("omega", _BODY), ("gamma", _GAMMA), ("position", _POSITION)):
+        if match := pattern.fullmatch(plain):
+            return quantity, match[1]
+    return None
+
+
+def is_more_than_states(found: Header) -> bool:
+    """Whether there are other columns than Ω and γ, or one of these vectors alone."""
+    names = set(found.places)
+    given = {"omega" if name == "framed" else name for name in names}
+    return bool(given - {"omega", "gamma"}) or (len(given) == 1 and _complete(found))
+
+
+def _complete(found: Header) -> bool:
+    return all(len(components) == 3 for components in found.places.values())
+
+
+def ordered_places(
+    quantity: str, components: Mapping[str, int], scalar_last: bool, sequence: str
+) -> list[tuple[str, int]]:
+    """Name and place of each component in the order of the quantity; raises InputError for one that is missing."""
+    wanted = _wanted(quantity, set(components), scalar_last, sequence)
+    missing = [name for name in wanted if name not in components]
+    extra = [name for name in components if name not in wanted]
+    if missing or extra:
+        said = f"component {missing[0]} is missing" if missing else f"component {extra[0]} belongs to no other"
+        raise InputError(f"The columns of the {_words(quantity)} are not complete: {said}.", REMEDY)
+    return [(name, components[name]) for name in wanted]
+
+
+def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) -> list[str]:
+    if quantity == "quaternion":
+        if there & set("wxyz"):
+            return list("xyzw" if scalar_last else "wxyz")
+        return list("1234" if "4" in there else "0123")
+    if quantity == "matrix":
+        first = 0 if any("0" in name for name in there) else 1
+        return [f"{i}{j}" for i in range(first, first + 3) for j in range(first, first + 3)]
+    if quantity == "euler" and there & set("XYZ"):
+        if sorted(sequence) != ["X", "Y", "Z"]:
+            raise InputError(
+                f"roll, pitch and yaw are of a sequence about three axes, not of {sequence or 'none that is said'}.",
+                'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
+            )
+        return list(sequence)
+    if there & set("xyz"):
+        return list("xyz")
+    return list("012" if "0" in there else "123")
+
+
+def _words(quantity: str) -> str:
+    return {"omega_space": "angular velocity in space axes", "framed": "angular velocity", "euler": "Euler angles"}.get(
+        quantity, quantity
+    )
+
+
+def cell(text: str, where: str) -> Fraction | None:
+    """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
+    if not text.strip():
+        raise InputError(f"{where} is empty.", "Give every row all of its columns.")
+    try:
+        return written_numbers.number(text, where)
+    except InputError as error:
+        cause = error.cause if error.cause.startswith(where) else f"{where}: {error.cause}"
+        raise InputError(cause, error.remedy) from None
+
+
+# Files with attitudes, positions or Ω in any axes, or the data of a body: read as the columns that they have.
+
+
+CONVENTIONS = ("quaternion_order", "quaternion", "matrix", "sequence", "angles", "frame", "up", "pivot", "point")
+STARTS = ("start_quaternion", "start_matrix", "start_euler", "omega_space")
+BODIES = ("mass", "gravity", "about", "rotor")
+_ARRAYS = {
+    "quaternions": "quaternion",
+    "quaternion": "quaternion",
+    "matrices": "matrix",
+    "matrix": "matrix",
+    "euler": "euler",
+    "eulers": "euler",
+    "positions": "position",
+    "position": "position",
+    "omegas": "omega",
+    "omega_space": "omega_space",
+    "gammas": "gamma",
+}
+"""Keys of JSON documents whose values are a list for each time."""
+KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
+_REMEDY = "`heavytop docs score` shows what a file may hold."
+_ORDERS = {
+    "wxyz": "wxyz",
+    "scalar first": "wxyz",
+    "scalar_first": "wxyz",
+    "xyzw": "xyzw",
+    "scalar last": "xyzw",
+    "scalar_last": "xyzw",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnTable:
+    """Columns as they were read.
+
+    values: by the name of the quantity, the exact numbers of each row, None for a row that is not finite.
+    texts: every number as it was written.  places: what each row is called in messages.
+    """
+
+    values: Mapping[str, list[tuple[Fraction, ...] | None]]
+    texts: list[str]
+    places: list[str]
+
+
+def is_observed(document: Mapping[str, Any]) -> bool:
+    """Whether a document has more than Ω and γ of a top in principal axes."""
+    return "header" in document or any(document.get(key) is not None for key in KEYS)
+
+
+def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
+    """What the file says of its conventions; raises InputError for what is not known."""
+    said: dict[str, Any] = {}
+    if (order := _word(document, "quaternion_order")) is not None:
+        if order.lower() not in _ORDERS:
+            raise InputError(f"quaternion_order = {quoted(order)} is not known.", "Use wxyz or xyzw.")
+        said["quaternion_order"] = _ORDERS[order.lower()]
+    for key in ("quaternion", "matrix"):
+        if _is_direction(document.get(key)):
+            said[key] = document[key].strip()
+    for key in ("sequence", "angles", "up"):
+        if (word := _word(document, key)) is not None:
+            said[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
+    if header is not None and header.angles and said.setdefault("angles", header.angles) != header.angles:
+        raise InputError(
+            f"The header says {header.angles} and angles = {said['angles']}.", "Say the unit of angles once."
+        )
+    for key in ("pivot", "point"):
+        if document.get(key) is not None:
+            said[key] = vector(_numbers(document[key], key, 3), key)
+    return Convention(**said)
+
+
+def _is_direction(value: Any) -> bool:
+    """Whether the value of ``quaternion`` or ``matrix`` is a word, and not an attitude."""
+    return isinstance(value, str) and any(letter in value for letter in "bdstuy_")
+
+
+def _word(document: Mapping[str, Any], key: str) -> str | None:
+    value = document.get(key)
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"{key} = {quoted(value)} is not a word.", _REMEDY)
+    return None if value is None else value.strip()
+
+
+def in_space(document: Mapping[str, Any]) -> bool:
+    """Whether columns wx, wy, wz, or Ω without other columns of it, are in the axes of space."""
+    frame = (_word(document, "frame") or "body").lower()
+    if frame not in FRAMES:
+        raise InputError(f"frame = {quoted(frame)} is not known.", "Use space or body.")
+    return frame == "space"
+
+
+def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
+    """A list of so many members; raises InputError for anything else."""
+    if not isinstance(value, list) or (count is not None and len(value) != count):
+        has = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
+        raise InputError(f"{what} {has}.", f"Give {count} numbers." if count else "Give a list.")
+    return value
+
+
+def _numbers(values: Any, what: str, count: int) -> list[Fraction]:
+    return [written_numbers.finite(value, f"a number of {what}") for value in listed(values, what, count)]
+
+
+def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+    """The columns of a document, of a text table or of JSON.
+
+    Raises InputError for columns that are not complete, for a sequence that is not said, and for a cell that is none,
+    by its line and column.
+    """
+    found = _of_table(document, said) if "header" in document else _of_lists(document, said)
+    if not found.values:
+        raise InputError("There are no columns that fix something of the motion.", _REMEDY)
+    if "euler" in found.values and not said.sequence:
+        raise InputError(
+            "There are Euler angles, and nothing says of which sequence.", 'Give sequence, such as "ZXZ" or "ZYX".'
+        )
+    return found
+
+
+def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+    header, cells, lines = document["header"], document["cells"], document["lines"]
+    space, last = in_space(document), said.quaternion_order == "xyzw"
+    both = {"omega", "gamma"} <= header.places.keys()
+    places: dict[str, list[tuple[str, int]]] = {}
+    units: dict[str, Unit] = {}
+    for quantity, components in header.places.items():
+        try:
+            ordered = ordered_places(quantity, components, last, said.sequence)
+        except InputError:
+            if both and quantity not in ("omega", "gamma"):
+                continue  # a column of some other thing, beside a whole state
+            raise
+        name = quantity
+        if quantity == "framed" or (quantity == "omega" and "framed" not in header.places):
+            name = "omega_space" if space else "omega"
+        if name in places:
+            raise InputError(f"The columns of {name} stand twice.", "Give each quantity once, and say its frame.")
+        places[name] = ordered
+        if quantity in header.units and quantity != "position":  # of which the body decides
+            units[name] = header.units[quantity]
+    values: dict[str, list[tuple[Fraction, ...] | None]] = {name: [] for name in WIDTHS if name in places}
+    for number, row in zip(lines, cells, strict=True):
+        for name in values:
+            values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
+    texts = [row[place] for row in cells for name in values for _, place in places[name]]
+    for name, unit in units.items():
+        values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
+    return ColumnTable(values, texts, [f"line {number}" for number in lines])
+
+
+def _times(factor: Fraction, rows: Sequence[tuple[Fraction, ...] | None]) -> list[tuple[Fraction, ...] | None]:
+    return [None if row is None else tuple(factor * value for value in row) for row in rows]
+
+
+def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention, centre: Vector) -> ColumnTable:
+    """The table with positions in the unit of the body: its data are in that of the header, such as mm, or in m.
+
+    Whichever brings the first position nearer to the distance of the point from the fixed point.
+    """
+    unit = None if header is None else header.units.get("position")
+    rows = table.values.get("position", [])
+    first = next((row for row in rows if row is not None), None)
+    point = centre if said.point is None else said.point
+    distance = log10(dot(point, point))
+    if unit is None or first is None or distance is None:
+        return table
+
+    def off(size: Fraction) -> float:
+        apart = [size * value - place for value, place in zip(first, said.pivot, strict=True)]
+        found = log10(dot(apart, apart))
+        return inf if found is None else abs(found - distance)
+
+    if off(unit.size) >= off(Fraction(1)):
+        return table
+    return replace(table, values={**table.values, "position": _times(unit.size, rows)})
+
+
+def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
+    prefix = {"quaternion": "q", "matrix": "R", "position": "", "euler": "euler"}.get(name, name)
+    return [(f"{prefix}{component}", place) for component, place in places[name]]
+
+
+def _whole(values: Any) -> tuple[Fraction, ...] | None:
+    """The numbers of one sample; None where one is not finite."""
+    found = tuple(values)
+    return None if None in found else found
+
+
+def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
+    given: dict[str, tuple[str, list[Any]]] = {}
+    space = in_space(document)
+    states = document.get("states")
+    if states is not None:
+        rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(listed(states, "states"))]
+        given["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
+        given["gamma"] = "states", [row[3:] for row in rows]
+    for key, name in _ARRAYS.items():
+        if not _is_table(document.get(key), name):
+            continue
+        if name == "omega" and space:
+            name = "omega_space"
+        if name in given:
+            raise InputError(f"{key} and {given[name][0]} both give {name}.", "Give each quantity once.")
+        given[name] = key, [_flat(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
+    counts = {key: len(rows) for key, rows in given.values()}
+    times = document.get("times")
+    if isinstance(times, list):
+        for key, count in counts.items():
+            if count != len(times):
+                raise InputError(f"There are {len(times)} times and {count} {key}.", "Give one row for each time.")
+    values = {}
+    for name in WIDTHS:
+        if name in given:
+            key, rows = given[name]
+            values[name] = [_whole(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
+    texts = [str(value) for _, rows in given.values() for row in rows for value in row]
+    return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
+
+
+def cell_of(value: Any, where: str) -> Fraction | None:
+    """As :func:`heavytop.features.score.trajectories.columns.cell`, of a value of JSON."""
+    if value is None:
+        raise InputError(f"{where} has an empty place.", "Give every row all of its columns.")
+    if not isinstance(value, str):
+        raise InputError(f"{where} holds a {type(value).__name__}, not a number.", _REMEDY)
+    return cell(value, where)
+
+
+def _is_table(value: Any, name: str) -> bool:
+    """Whether a value is one list for each time, and not one for the start."""
+    if not isinstance(value, list) or not value or not isinstance(value[0], list):
+        return False
+    return name != "matrix" or len(value[0]) == WIDTHS["matrix"] or (bool(value[0]) and isinstance(value[0][0], list))
+
+
+def _flat(row: Any, width: int, what: str) -> list[Any]:
+    """The numbers of one row: a matrix row by row."""
+    if isinstance(row, list) and width == 9 and len(row) == 3 and all(isinstance(part, list) for part in row):
+        row = [value for part in row for value in part]
+    if not isinstance(row, list) or len(row) != width:
+        has = f"{len(row)} numbers" if isinstance(row, list) else "no list"
+        raise InputError(f"{what} has {has}, not {width}.", "Give every row all of its columns.")
+    return row
+
+
+def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention) -> RawStart:
+    """The start: by its keys, else by the row t = 0.
+
+    Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.
+    """
+    forms: dict[str, tuple[str, list[Fraction], bool]] = {}
+    for name in ("quaternion", "matrix", "euler"):
+        for key in (f"start_{name}", name):
+            value = document.get(key)
+            if key == name and _is_direction(value):
+                continue
+            if value is None or (key == name and _is_table(value, name)):
+                continue
+            forms[name] = key, *_attitude(value, name, key, said)
+    gamma = document.get("gamma")
+    from_row, degrees = False, said.angles == "degrees"
+    first = {name: rows[0] for name, rows in table.values.items()} if at_start else {}
+    if len(forms) > 1:
+        one, other = (key for key, *_ in list(forms.values())[:2])
+        raise InputError(f"{one} and {other} both give the attitude at t = 0.", "Give one of them.")
+    if not forms and gamma is None:
+        known = next((each for each in ("quaternion", "matrix", "euler", "gamma") if first.get(each)), None)
+        if known is None:
+            raise InputError(
+                "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
+                "and there is no row t = 0 that gives it.",
+                "Give one of them, or the row t = 0, or --case NAME.",
+            )
+        from_row, form, values = True, known, list(first[known] or ())
+    elif forms:
+        form, (_, values, degrees) = next(iter(forms.items()))
+    else:
+        form, values = "gamma", _numbers(gamma, "gamma", 3)
+    if form == "euler" and not said.sequence:
+        raise InputError("start_euler needs its sequence.", 'Give sequence, such as "ZXZ".')
+    beside = _numbers(gamma, "gamma", 3) if forms and gamma is not None else None
+    omega, space = _omega(document, first)
+    return RawStart(
+        form, tuple(values), omega, space, None if beside is None else vector(beside, "gamma"), from_row, degrees
+    )
+
+
+def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...] | None]) -> tuple[Vector, bool]:
+    """Ω at t = 0, and whether it is in the axes of space."""
+    given = [
+        key for key in ("omega", "omega_space") if document.get(key) is not None and not _is_table(document[key], key)
+    ]
+    if len(given) > 1:
+        raise InputError("omega and omega_space both give Ω at t = 0.", "Give one of them.")
+    if given:
+        return vector(_numbers(document[given[0]], given[0], 3), given[0]), given[0] == "omega_space"
+    for name in ("omega", "omega_space"):
+        if first.get(name):
+            return vector(list(first[name] or ()), name), name == "omega_space"
+    raise InputError(
+        "The key omega is missing, and there is no row t = 0 that gives it.",
+        "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
+    )
+
+
+def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[Fraction], bool]:
+    """The numbers of one attitude, and whether they are angles in degrees: as the file says, or written as 30deg."""
+    if isinstance(value, str):
+        value = value.replace(",", " ").split()
+    values = _flat(value, WIDTHS[name], key)
+    marked = [isinstance(each, str) and each.strip().endswith("deg") for each in values]
+    if any(marked) and (name != "euler" or not all(marked)):
+        raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
+    try:
+        found = [exact(each.strip().removesuffix("deg") if isinstance(each, str) else each) for each in values]
+    except InputError as error:
+        raise InputError(f"{key}: {error.cause}", error.remedy) from None
+    return found, name == "euler" and (any(marked) or said.angles == "degrees")
+
+
+def times(document: Mapping[str, Any]) -> list[Fraction]:
+    """The column t of a text table; raises InputError that names the line of what is not a finite number."""
+    found, unit = [], document["header"].units.get("t")
+    for number, text in zip(document["lines"], document["times"], strict=True):
+        value = cell(text, f"Line {number}, column t")
+        if value is None:
+            raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
+        found.append(value if unit is None else unit.size * value)
+    return found

@@ -1,0 +1,498 @@
+"""Trajectories that another program wrote, as JSON or CSV, read exactly and validated."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from heavytop import written_numbers
+from heavytop.cases import Case
+from heavytop.errors import InputError, quoted
+from heavytop.features.score.trajectories import columns as observed_columns
+from heavytop.features.score.trajectories.observed import (
+    LONGEST_NAME,
+    MOST,
+    AnyBody,
+    GivenTrajectory,
+    RawStart,
+    named,
+    observed,
+    require_states,
+    require_system,
+    rounded_state,
+    too_many,
+)
+from heavytop.files import read_whole, without_repeats
+from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact_text, parse, real, shown
+from heavytop.top.attitude import SHAPES, key_of
+from heavytop.top.bodies import CENTRE, Body
+from heavytop.top.equations import NAMES, VARIABLES, System, system_of
+from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physical
+
+# Tables of states that other programs write as text: separators, spellings of the header, comments.
+
+
+REMEDY = "`heavytop docs score` shows both forms of the file, `heavytop list --case lagrange` one to paste."
+COLUMNS = ("t", *VARIABLES)
+VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
+LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
+"""Keys whose values are lists of numbers."""
+_COMMENT = ("#", "%", "!", "//")
+_REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
+"""What stands behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+_ALL_COLUMNS = "Give every row all of its columns."
+_LIKE = 0.75
+"""A key is a misspelling of another if so large a part of them is alike."""
+
+
+def nearest(key: str, known: Sequence[str]) -> str:
+    """The known key that an unknown one is a misspelling of, or nothing."""
+    return next(iter(get_close_matches(key.lower(), sorted(known), 1, _LIKE)), "")
+
+
+def unknown(key: str, known: Sequence[str]) -> InputError:
+    """What is said of a key that is none."""
+    near = nearest(key, known)
+    return InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?" if near else REMEDY)
+
+
+class TextTable:
+    """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
+
+    known: the keys that a comment may have.  Raises InputError for a header or a row that cannot be understood, for a
+    misspelt key and a key that stands twice.
+    """
+
+    def __init__(self, text: str, known: Sequence[str]) -> None:
+        self.keys: dict[str, str | list[str]] = {}
+        self.rows: list[list[str]] = []
+        self.notes: list[str] = []
+        self.header: observed_columns.Header | None = None
+        header: list[str] | None = None
+        body: list[str] = []
+        self.lines: list[int] = []
+        for number, line in enumerate(text.splitlines(), 1):
+            stripped = line.strip()
+            if stripped.startswith(_COMMENT):
+                comment = stripped.lstrip("#%!/ ")
+                if not body and not self._key(comment, known) and _is_header(_cells(comment, None)):
+                    header = _cells(comment, None)
+            elif stripped:
+                body.append(stripped)
+                self.lines.append(number)
+        if not body:
+            raise _no_header([])
+        separator = _separator(body[0])
+        first = _cells(body[0], separator)
+        if not _is_number(first[0]):
+            header, body, self.lines = first, body[1:], self.lines[1:]
+        names = self._without_header(len(first)) if header is None else header
+        self.cells = _split(body, self.lines, separator, len(names))
+        found = observed_columns.header(names)
+        units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
+        said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
+        self.notes += [f"as the header says, {', '.join(said)}"] if said else []
+        if found.time is not None and (found.units or observed_columns.is_more_than_states(found)):
+            self.header, others = found, list(found.others)
+        else:
+            places = found.of_state()
+            if missing := [name for name in COLUMNS if name not in places]:
+                raise _no_header(missing)
+            self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
+            others = [name for place, name in enumerate(names) if place not in places.values()]
+        self.notes += unread(others, names)
+
+    def _key(self, comment: str, known: Sequence[str]) -> bool:
+        """Take in ``key: value`` or ``key = value``; whether it was one."""
+        match = re.match(r"([A-Za-z_][A-Za-z_ ]*?)\s*[:=]\s*(.*)", comment)
+        if match is None or not match[2]:
+            return False
+        key, value = match[1], match[2].strip()
+        if key not in known:
+            # other comments may say what they like
+            if nearest(key, known):
+                raise unknown(key, known)
+            return False
+        if key in self.keys:
+            raise InputError(f"The key {key} stands twice.", "Give each key once.")
+        self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
+        return True
+
+    def _without_header(self, width: int) -> Sequence[str]:
+        """The columns of a table that does not name them."""
+        if width != len(COLUMNS):
+            raise InputError(
+                f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
+                f"not {len(COLUMNS)}.",
+                "Give a header that names the columns.",
+            )
+        self.notes.append(f"there is no header; the columns are taken as {' '.join(COLUMNS)}")
+        return COLUMNS
+
+
+def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
+    """What is said of columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
+    columns = {name.strip() for name in header}
+    own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
+    more = [name for name in names if name.strip() not in own]
+    return [f"columns that are not read: {', '.join(name[:20] for name in more[:6])}"] if more else []
+
+
+def _no_header(missing: list[str]) -> InputError:
+    said = f": {', '.join(missing)} not found" if missing else ""
+    return InputError(f"The first line is not {','.join(COLUMNS)}{said}.", REMEDY)
+
+
+def _separator(line: str) -> str | None:
+    """Semicolon, comma, tab, or None for white space."""
+    return next((mark for mark in (";", ",", "\t") if mark in line), None)
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    if separator is None and any(mark in line for mark in ";,\t"):
+        separator = _separator(line)
+    line = _REMARK.sub("", line).rstrip()
+    cells = line.split(separator)
+    # a separator behind the last column is no column
+    if separator and len(cells) > 1 and not cells[-1].strip():
+        cells = cells[:-1]
+    return [cell.strip().strip("\"'").strip() for cell in cells]
+
+
+def _is_number(text: str) -> bool:
+    return bool(re.fullmatch(r"[+-]?(\.?\d.*|nan(\(.*\))?|inf(inity)?)", text, re.IGNORECASE))
+
+
+def _is_header(names: list[str]) -> bool:
+    """Whether the words of a comment name the columns."""
+    found = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
+    return len(found.of_state()) == len(COLUMNS) or (found.time is not None and not found.others and bool(found.places))
+
+
+def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
+    """The cells of every row; raises InputError that names the line of one that has not as many as the header."""
+    rows = []
+    for number, line in zip(lines, body, strict=True):
+        cells = _cells(line, separator)
+        if len(cells) != width:
+            decimal_commas = separator == "," and len(cells) == 2 * width
+            remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
+            raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
+        # where a semicolon separates, a comma is the point of a decimal
+        rows.append([each.replace(",", ".") for each in cells] if separator == ";" else cells)
+    return rows
+
+
+# Whether a trajectory file and the case that it is said to be of agree.
+
+
+def require_case(case: Case, top: HeavyTop, start: State, which: System, at_start: State | None) -> None:
+    """Raises InputError where the file says something else than the case."""
+    said: list[tuple[str, Any, Any]] = [("system", which.name, case.system.name)]
+    said += [("weight", top.weight, case.top.weight)]
+    said += [(f"I{i}", new, old) for i, (new, old) in enumerate(zip(top.inertia, case.top.inertia, strict=True), 1)]
+    said += [
+        (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
+    ]
+    rotors = (each.rotor or (Fraction(0),) * 3 for each in (top, case.top))
+    said += [(f"k{i} of the rotor", new, old) for i, (new, old) in enumerate(zip(*rotors, strict=True), 1)]
+    said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
+    if at_start is not None:
+        rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
+        said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
+    for what, new, old in said:
+        if new != old and (isinstance(new, str) or not _rounded_alike(new, old)):
+            texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
+            raise InputError(
+                f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
+                f"`heavytop list --case {case.name}` shows the data; without a case the file is scored by its own.",
+            )
+
+
+def _briefly(value: Fraction) -> str:
+    return str(value) if value.denominator < 1000 else decimal_text(value, 6)
+
+
+def _rounded_alike(new: Fraction, old: Fraction) -> bool:
+    """Whether a number is the other one, rounded to three digits or more."""
+    return abs(new - old) <= max(abs(old), Fraction(1)) * Fraction(1, 1000)
+
+
+_FLAGS = ("language", "tolerance", "step")
+_KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
+_KEYS |= {"outcome", "steps", *observed_columns.KEYS}
+_NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
+_NOT_READ |= {
+    "times_given",
+    "xi",
+    "start_attitude",
+    "command",
+    "version",
+    "sequence",
+    "point",
+    "pivot",
+    *map(key_of, SHAPES),
+}
+"""What else `heavytop propagate --json` writes."""
+_SLACK = 8
+"""γ may be off the unit sphere by so many bits of rounding."""
+_ROW_SLACK = Fraction(1, 100)
+"""γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
+
+
+def read(path: Path, case: Case | None = None, normalize: bool = False) -> GivenTrajectory:
+    """The trajectory in a ``.json`` or ``.csv`` file (or ``.tsv``, ``.dat``), or ``-`` for standard input.
+
+    case: gives top, start and system where the file does not.
+    normalize: take quaternions and matrices of any length for their rotations, and γ of the start for its direction.
+    Raises InputError for a file that cannot be read or is neither, for a key or column that is missing or unknown, a
+    text that is not a number, times out of order, states of another shape or count, data that no heavy top has, and
+    data that are not those of the case.
+    """
+    shown_path = str(path)[:LONGEST_NAME]
+    piped = str(path) == "-"
+    if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
+        raise InputError(f"{shown_path} is neither .json nor .csv.", REMEDY)
+    try:
+        content = sys.stdin.buffer.read() if piped else read_whole(path)
+        text = _decoded(content)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", REMEDY) from None
+    is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
+    try:
+        document, notes = (_json(text), []) if is_json else _table(text)
+        name = "given" if piped else path.stem
+        given = _observed if observed_columns.is_observed(document) else _given
+        found = given(document, name, case, normalize)
+        return replace(found, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
+    except InputError as error:
+        raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
+
+
+_SUFFIXES = (".json", ".csv", ".tsv", ".dat")
+
+
+def _decoded(content: bytes) -> str:
+    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+
+
+def _json(text: str) -> dict[str, Any]:
+    """The document, every number as the text it is written as."""
+    try:
+        document = json.loads(
+            text, parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=without_repeats
+        )
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"This is not JSON: {error}.", REMEDY) from None
+    if not isinstance(document, dict):
+        raise InputError("The document is not an object.", REMEDY)
+    for key in document.keys() - _KEYS - _NOT_READ:
+        raise unknown(key, sorted(_KEYS))
+    return document
+
+
+def _table(text: str) -> tuple[dict[str, Any], list[str]]:
+    """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
+    if "\0" in text:
+        raise InputError("This is no text: it holds a byte 0.", REMEDY)
+    if text.count("\n") > 2 * MOST:
+        raise too_many(text.count("\n"))
+    table = TextTable(text, sorted(_KEYS - {"times", "states"}))
+    if table.header is not None:
+        times = [row[table.header.time or 0] for row in table.cells]
+        more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
+        return table.keys | more, table.notes
+    columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
+    return table.keys | columns, table.notes
+
+
+def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
+    if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
+        raise too_many(len(document["times"]))
+    top, at_start = _top(document, case), _row_of_start(document)
+    start = _start(document, case, at_start)
+    which = system_of(_system(document, case), top)
+    times = _times(document)
+    if case is not None:
+        require_case(case, top, start, which, at_start)
+    require_physical(top, start)
+    rows = _list(document, "states")
+    require_states(times, rows)
+    texts = [_list({"state": row}, "state", 6) for row in rows]
+    precision = _precision(document, [str(value) for row in texts for value in row])
+    from_row = at_start is not None and start == at_start
+    slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
+    if normalize:
+        start = start.normalized()
+    start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
+    which.parameters(top, start)
+    states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
+    about = _about(document, stem, case, None in states)
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
+
+
+def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
+    """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
+    times = _times(document)
+    said = observed_columns.convention(document, document.get("header"))
+    table = observed_columns.columns(document, said)
+    require_states(times, table.places)
+    body = _body(document, case)
+    table = observed_columns.in_unit_of_body(table, document.get("header"), said, body.centre)
+    which = system_of(_system(document, case), body)
+    require_system(which)
+    if case is not None and isinstance(body, HeavyTop):
+        require_case(case, body, case.start, which, None)
+    raw = _raw_start(document, table, not times[0], said, case)
+    precision = _precision(document, table.texts)
+    found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
+    top, start = found.posed.top, found.posed.start
+    require_physical(top, start)
+    about = _about(document, stem, case, None in rows) | {"observed": found}
+    return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
+
+
+def _times(document: dict[str, Any]) -> list[Fraction]:
+    """The times, exact and in order; raises InputError where there is none but 0."""
+    if "lines" in document:
+        given = observed_columns.times(document)
+    else:
+        given = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+    times = list(check_times(given))
+    if not any(times):
+        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+    return times
+
+
+def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
+    """What a file says of itself: name, integrator, outcome, steps, flags, and whether its format was guessed."""
+    word = _text(document, "outcome", "success")
+    if word not in [outcome.value for outcome in Outcome]:
+        raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
+    return {
+        "name": named(_text(document, "name", stem if case is None else case.name), "name"),
+        "integrator": named(_text(document, "integrator", "given"), "integrator"),
+        "outcome": Outcome.NON_FINITE if broken else Outcome(word),
+        "steps": _integer(document.get("steps", "0"), "steps"),
+        "flags": {key: named(_text(document, key), key) for key in _FLAGS if key in document},
+        "format_guessed": "precision" not in document and "bits" not in document,
+    }
+
+
+def _raw_start(
+    document: dict[str, Any], table: observed_columns.ColumnTable, at_start: bool, said: Any, case: Case | None
+) -> RawStart:
+    """The start of the file, or of the case where the file says nothing of it."""
+    if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
+        return RawStart("gamma", case.start.gamma, case.start.omega)
+    return observed_columns.start(document, table, at_start, said)
+
+
+def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
+    """The body of a file with its mass, or a top by its weight."""
+    given = [key for key in ("mass", "gravity") if key in document]
+    if not given:
+        return _top(document, case)
+    if "weight" in document:
+        raise InputError(f"weight and {given[0]} are both given.", "Give the weight, or mass and gravity.")
+    mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
+    for key, value in (("mass", mass), ("gravity", gravity)):
+        if not value:
+            raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
+    inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
+    flat = [each for row in inertia for each in (row if isinstance(row, list) else [row])]
+    rotor = document.get("rotor")
+    return Body(mass, gravity, centre, flat, {"centre": CENTRE}.get(about, about or None), rotor)
+
+
+def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
+    """The top of the file, or of the case as far as the file does not say."""
+    inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
+    weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
+    rotor = _list(document, "rotor", 3) if "rotor" in document else None if case is None else case.top.rotor
+    return HeavyTop(inertia, weight, centre, rotor)
+
+
+def _system(document: dict[str, Any], case: Case | None) -> str | None:
+    """The name of the system: the file's, else that of the case; None where neither says it."""
+    return _text(document, "system") if "system" in document else None if case is None else case.system.name
+
+
+def _start(document: dict[str, Any], case: Case | None, at_start: State | None) -> State:
+    """The start of the file, else that of the case, else its row t = 0."""
+    if case is None and at_start is not None and not {"omega", "gamma"} & document.keys():
+        return at_start
+    if case is None and not {"omega", "gamma"} <= document.keys():
+        missing = "omega" if "omega" not in document else "gamma"
+        raise InputError(
+            f"The key {missing} is missing, and there is no row t = 0 that gives the start.",
+            "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
+        )
+    return State(*(_vector(document, key, case) for key in ("omega", "gamma")))
+
+
+def _vector(document: dict[str, Any], key: str, case: Case | None) -> list[Any]:
+    if case is not None and key not in document:
+        owner = case.top if key in ("inertia", "centre") else case.start
+        return list(getattr(owner, key))
+    return _list(document, key, 3)
+
+
+def _row_of_start(document: dict[str, Any]) -> State | None:
+    """The state of the first row if its time is 0 and it is finite."""
+    times, rows = document.get("times"), document.get("states")
+    if not (isinstance(times, list) and isinstance(rows, list) and times and rows and isinstance(rows[0], list)):
+        return None
+    if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
+        return None
+    values = [written_numbers.component(value) for value in rows[0]]
+    found = [value for value in values if value is not None]
+    return State(found[:3], found[3:]) if len(found) == 6 else None
+
+
+def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
+    value = document.get(key)
+    if value is None:
+        raise InputError(f"The key {key} is missing.", REMEDY)
+    return observed_columns.listed(value, key, count)
+
+
+def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:
+    value = document.get(key, default)
+    if value is None:
+        raise InputError(f"The key {key} is missing.", REMEDY)
+    if not isinstance(value, str):
+        raise InputError(f"{key} is a {type(value).__name__}.", "Give text or a number.")
+    return value
+
+
+def _integer(value: Any, what: str) -> int:
+    number = written_numbers.finite(value, what)
+    if number < 0 or number.denominator != 1 or number >= 1 << 63:
+        raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
+    return int(number)
+
+
+def _precision(document: dict[str, Any], texts: list[str]) -> Precision:
+    """The format that the file names, or the narrowest that holds every number of the states as it is written."""
+    if "precision" in document:
+        precision = parse(_text(document, "precision"))
+        bits = _integer(document["bits"], "bits") if "bits" in document else precision.bits
+        if bits != precision.bits:
+            raise InputError(
+                f"bits = {bits}, but {precision.name} has {precision.bits}.", "Give either of precision and bits."
+            )
+        return precision
+    if "bits" in document:
+        bits = _integer(document["bits"], "bits")
+        return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)
+    return written_numbers.format_of(texts)

@@ -1,0 +1,619 @@
+"""Trajectories with attitudes, positions or Ω in any axes, as they are scored: from a document or from arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from math import isqrt
+from typing import Any
+
+import numpy
+
+from heavytop import written_numbers
+from heavytop.errors import InputError
+from heavytop.features.score.diagnose.readings import BodyData, GivenStart, Reading, Seen
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.attitude_error import Convention, Posed, space_to_body
+from heavytop.precision import (
+    DOUBLE,
+    EXTENDED,
+    QUAD,
+    Precision,
+    Vector,
+    cross,
+    decimal_text,
+    dot,
+    exact,
+    number,
+    round_to,
+    shown,
+)
+from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products
+from heavytop.top.bodies import CENTRE, IDENTITY, Body
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
+
+# Bodies of trajectory files: rounded to a format, in principal axes, and in double.
+#
+# A body whose principal axes are irrational is turned by a rational rotation next to them, exact to 160 bits more than
+# the format has: what is left of its tensor is that much below what the format can show.
+
+
+AnyBody = HeavyTop | Body
+Tensor = tuple[Vector, Vector, Vector]
+
+
+def as_given(body: Body) -> Tensor:
+    """The tensor about the point that it was given about, exactly."""
+    if body.about != CENTRE:
+        return body.tensor
+    c, square = body.centre, dot(body.centre, body.centre)
+    first, second, third = (
+        _triple([body.tensor[i][j] - body.mass * ((square if i == j else 0) - c[i] * c[j]) for j in range(3)])
+        for i in range(3)
+    )
+    return first, second, third
+
+
+def _triple(values: Sequence[Fraction]) -> Vector:
+    first, second, third = values
+    return first, second, third
+
+
+def rounded_body(body: AnyBody, precision: Precision) -> AnyBody:
+    """The body with every number that was given rounded to the format."""
+
+    def near(values: Sequence[Fraction]) -> Vector:
+        return _triple([round_to(value, precision.bits) for value in values])
+
+    rotor = None if body.rotor is None else near(body.rotor)
+    if isinstance(body, HeavyTop):
+        weight = round_to(body.weight, precision.bits)
+        return HeavyTop(near(body.inertia), weight, near(body.centre), rotor=rotor)
+    mass, gravity = (round_to(value, precision.bits) for value in (body.mass, body.gravity))
+    return Body(mass, gravity, near(body.centre), [near(row) for row in as_given(body)], body.about, rotor)
+
+
+def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
+    """The body in principal axes, and the rows of A, v_given = A v_principal; irrational axes to so many bits."""
+    if isinstance(body, HeavyTop):
+        return body, IDENTITY
+    found = body.principal(bits)
+    top = body.top_in(found)
+    if found.exact:
+        return top, found.axes
+    # short numbers in place of long ones, which are not exact anyway
+    centre = [round_to(value, bits) for value in top.centre]
+    rotor = None if top.rotor is None else [round_to(value, bits) for value in top.rotor]
+    return HeavyTop(top.inertia, top.weight, centre, rotor=rotor), found.axes
+
+
+def system_of(body: AnyBody, named: System) -> System:
+    """The system in which a body moves: that of a heavy top with a rotor where it has one."""
+    return HEAVY_GYROSTAT if named is HEAVY_TOP and body.rotor is not None else named
+
+
+def body_data(body: AnyBody) -> BodyData:
+    """The body in double."""
+    centre = numpy.array([float(value) for value in body.centre])
+    rotor = numpy.array([float(value) for value in body.rotor or (0, 0, 0)])
+    if isinstance(body, HeavyTop):
+        inertia = numpy.diag([float(value) for value in body.inertia])
+        return BodyData(inertia, centre, None, float(body.weight), False, rotor)
+    inertia = numpy.array([[float(value) for value in row] for row in as_given(body)])
+    return BodyData(inertia, centre, float(body.mass), float(body.gravity), body.about == CENTRE, rotor)
+
+
+# The start of a file with attitudes: R and Ω as exact numbers, and the body with them in principal axes.
+
+
+_SLACK = 8
+"""A quaternion or a matrix may be off by so many bits of rounding."""
+_ROW_SLACK = Fraction(1, 100)
+"""What is read from a row t = 0 is written with the digits of the other rows."""
+_FAR = Fraction(1, 10)
+"""A row whose quaternion or matrix is off by more is refused."""
+_IRRATIONAL_BITS = 1200
+"""Of an attitude whose entries are irrational, before it is rounded to the format."""
+
+Rows = tuple[Vector, Vector, Vector]
+
+
+@dataclass(frozen=True, slots=True)
+class RawStart:
+    """The start as the file gives it.
+
+    form: of ``values``: quaternion, matrix, euler, gamma; or plain, R from body to space whatever matrices are.
+    omega: in body axes, or in those of space.
+    gamma: given beside an attitude.  from_row: whether it is the row t = 0.  degrees: of angles.
+    """
+
+    form: str
+    values: tuple[Fraction, ...]
+    omega: Vector
+    in_space: bool = False
+    gamma: Vector | None = None
+    from_row: bool = False
+    degrees: bool = False
+
+    def rounded(self, precision: Precision) -> RawStart:
+        """The same in numbers of a format."""
+
+        def both(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+            return tuple(round_to(value, precision.bits) for value in values)
+
+        a, b, c = both(self.omega)
+        return replace(self, values=both(self.values), omega=(a, b, c))
+
+
+def rotation(raw: RawStart, said: Convention, precision: Precision, normalize: bool) -> Rows:
+    """R in canonical axes of space, exactly orthogonal: three rows ξ, η, γ of exact numbers.
+
+    normalize: take the rotation nearest to what is given, however far off it is.
+    Raises InputError for a quaternion that has not length 1, a matrix that is not a rotation, and a γ beside it that is
+    not its third row.
+    """
+    slack = _ROW_SLACK if raw.from_row else 2**_SLACK * precision.eps
+    if raw.form == "gamma":
+        return _of_gamma(raw, slack, normalize)
+    where = "the row t = 0" if raw.from_row else "the start" if raw.form == "plain" else f"start_{raw.form}"
+    if not normalize:
+        require_rotation(raw.form, raw.values, slack, f"The {raw.form} of {where}")
+    if raw.form == "quaternion":
+        require_direction(raw.values, f"The quaternion of {where}")
+        rows: Any = said.rotation("quaternion", raw.values, None)
+    else:
+        rows = _orthogonal(raw, said, precision)
+    found = [tuple(row) for row in said.upright(rows)]
+    if raw.gamma is not None:
+        off = max(abs(a - b) for a, b in zip(raw.gamma, found[2], strict=True))
+        if off > max(slack, Fraction(1, 10**6)):
+            raise InputError(
+                f"gamma and {where} contradict each other: gamma is ({_list(raw.gamma)}), but the third row of R is "
+                f"({_list(found[2])}).",
+                "Give one of them; with up = another axis than z gamma still points up.",
+            )
+    return found[0], found[1], found[2]
+
+
+def _list(values: Sequence[Fraction]) -> str:
+    return ", ".join(decimal_text(value, 6) for value in values)
+
+
+def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
+    state = State(raw.omega, raw.values)
+    if not normalize:
+        state.require_unit_gamma(slack, "Give it in full, or use --normalize.")
+    gamma = state.normalized(_SPARE_BITS + 64).gamma
+    xi = perpendicular(gamma)
+    a, b, c = cross(gamma, xi)
+    return xi, (a, b, c), gamma
+
+
+def _orthogonal(raw: RawStart, said: Convention, precision: Precision) -> Rows:
+    """R of a matrix that is off by roundings, or of angles: of the quaternion next to it, so that it is orthogonal."""
+    if raw.form == "euler":
+        angles = tuple(Angle(value, raw.degrees) for value in raw.values)
+        return Attitude("euler", angles=angles, sequence=said.sequence).rational_rows(precision.bits + _SPARE_BITS)
+    plain = replace(said, matrix="body_to_space") if raw.form == "plain" else said
+    return of_quaternion(nearest_quaternion(plain.rotation("matrix", raw.values, None)))
+
+
+def of_quaternion(q: Sequence[Fraction]) -> Rows:
+    """R of a quaternion w, x, y, z of any length, exactly."""
+    first, second, third = (tuple(row) for row in Convention().rotation("quaternion", q, None))
+    return first, second, third
+
+
+def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """w, x, y, z of the direction of a rotation matrix, of no unit length; by the largest of the four."""
+    first, second, third = map(_triple, rows)
+    return list(max(enumerate(quaternion_products((first, second, third))), key=lambda pair: pair[1][pair[0]])[1])
+
+
+def require_direction(values: Sequence[Fraction], what: str) -> None:
+    """Raises InputError for a quaternion 0, which is no attitude."""
+    if not any(values):
+        raise InputError(f"{what} is 0, which is no attitude.", "Give a quaternion of length 1.")
+
+
+def require_rotation(form: str, values: Sequence[Fraction], slack: Fraction, what: str) -> None:
+    """Raises InputError that says by how much, unless a quaternion has length 1 and a matrix is a rotation."""
+    if form == "quaternion":
+        off = dot((*values[:3],), (*values[:3],)) + values[3] ** 2 - 1
+        if abs(off) > 2 * slack:
+            raise InputError(
+                f"{what} has not length 1: |q|^2 - 1 = {decimal_text(off, 6)}.",
+                "Divide it by its length, or use --normalize (normalize=True in Python).",
+            )
+    if form == "matrix":
+        require_matrix([values[0:3], values[3:6], values[6:9]], slack, what)
+
+
+def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: str) -> None:
+    """Raises InputError for a reflection, and for rows that are not orthogonal and of length 1 within ``slack``."""
+    determinant = dot(rows[0], cross(rows[1], rows[2]))
+    products = [dot(rows[i], rows[j]) - (i == j) for i in range(3) for j in range(i + 1)]
+    off = max(products, key=abs)
+    if determinant < 0 and abs(off) <= _FAR:
+        raise InputError(
+            f"{what} is a reflection, not a rotation: its determinant is {decimal_text(determinant, 6)}.",
+            "These are left-handed axes: reverse one axis of space or of the body.",
+        )
+    if abs(off) > 2 * slack:
+        raise InputError(
+            f"{what} is not orthogonal: R R^T is off the unit matrix by {decimal_text(off, 6)}.",
+            "Give it in full, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
+        )
+
+
+def require_rows(form: str, rows: Sequence[Sequence[Fraction] | None], places: Sequence[str], normalize: bool) -> None:
+    """Raises InputError for the first row whose quaternion or matrix is far from one of a rotation."""
+    for row, place in zip(rows, places, strict=True):
+        if row is None:
+            continue
+        if form == "quaternion":
+            require_direction(row, f"The quaternion of {place}")
+        if not normalize:
+            require_rotation(form, row, _FAR, f"The {form} of {place}")
+
+
+def body_omega(raw: RawStart, said: Convention, rows: Rows) -> Vector:
+    """Ω at t = 0 in body axes."""
+    if not raw.in_space:
+        return raw.omega
+    a, b, c = space_to_body(rows, said.upright(raw.omega))
+    return a, b, c
+
+
+def raw_start(start: State) -> RawStart:
+    """The start of a program: by its attitude where it has one, else by γ."""
+    omega = start.omega if start.omega_space is None else start.omega_space
+    space = start.omega_space is not None
+    if start.attitude is None:
+        return RawStart("gamma", start.gamma, omega, space)
+    rows = start.attitude.rational_rows(_IRRATIONAL_BITS)
+    return RawStart("plain", tuple(entry for row in rows for entry in row), omega, space)
+
+
+# A trajectory that another program computed, as it is scored: exact times, states rounded to its format.
+
+
+MOST = 100_000
+"""States that are scored."""
+LONGEST_NAME = 200
+_ODD_GAMMA = Fraction(1, 10)
+"""A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
+_FITS_ANYWHERE = 1 << 1023
+"""Every format holds numbers below that."""
+_SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
+"""Between them a double has all its bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenTrajectory:
+    """A trajectory as it was given.
+
+    times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
+    finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
+    format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
+    observed: what it gives in place of Ω and γ in principal axes; the states are then all numbers of a row, and top and
+    start are those in principal axes.
+    """
+
+    name: str
+    integrator: str
+    top: HeavyTop
+    start: State
+    system: System
+    precision: Precision
+    times: list[Fraction]
+    states: list[tuple[Fraction, ...] | None]
+    outcome: Outcome
+    steps: int
+    flags: dict[str, str]
+    sha256: str = ""
+    format_guessed: bool = False
+    notes: tuple[str, ...] = ()
+    observed: Observed | None = None
+
+    def warnings(self) -> list[str]:
+        """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
+        if self.observed is not None:
+            return [*self.notes, *self.observed.body.warnings()]
+        found = [*self.notes, *self.top.warnings()]
+        for time, state in zip(self.times, self.states, strict=True):
+            if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
+                found.append(
+                    f"|gamma|^2 is off 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
+                    f"are the states in the order {' '.join(VARIABLES)}?"
+                )
+                break
+        return found
+
+
+def of_arrays(
+    top: HeavyTop,
+    start: State,
+    which: System,
+    times: list[Fraction],
+    rows: list[list[Any]],
+    precision: Precision | None,
+    name: str,
+    integrator: str,
+) -> GivenTrajectory:
+    """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
+
+    precision: None for the narrowest format that holds every number as it is given.
+    Raises InputError for what is not a number, for counts that differ or are too large, for names that cannot be shown.
+    """
+    require_states(times, rows)
+    form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
+    states = [rounded_state([component(value) for value in row], form) for row in rows]
+    return _in_memory((name, integrator), top, start, which, form, times, states)
+
+
+def require_states(times: list[Fraction], rows: list[Any]) -> None:
+    """Raises InputError unless there are as many states as times, and not too many."""
+    if len(rows) != len(times):
+        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
+    if len(times) > MOST:
+        raise too_many(len(times))
+
+
+def too_many(count: int) -> InputError:
+    """What is said of so many states."""
+    every = -(-count // MOST)
+    return InputError(
+        f"{count} states are too many to score.", f"Give at most {MOST} of them, such as one row in {every}."
+    )
+
+
+def component(value: Any) -> Fraction | None:
+    """An exact number out of a number of any format or text; None for NaN and infinities."""
+    if isinstance(value, str):
+        return written_numbers.component(value)
+    try:
+        return exact(value)
+    except InputError:
+        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
+            return None
+        raise
+
+
+def bits_of(value: Any) -> int:
+    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
+    kind = type(value).__name__
+    if kind in ("real128", "longdouble", "real"):
+        return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
+    exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
+    return written_numbers.bits_of(str(value)) if exactly else DOUBLE.bits
+
+
+def named(text: str, what: str) -> str:
+    """The text; raises InputError for one that is empty, too long or cannot be shown."""
+    if not 0 < len(text) <= LONGEST_NAME or not text.isprintable():
+        raise InputError(
+            f"The {what} of {len(text)} characters begins {text[:40]!r}.",
+            f"Use 1 to {LONGEST_NAME} printable characters.",
+        )
+    return text
+
+
+def rounded_state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
+    """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
+    found = tuple(_rounded_given(value, precision) for value in values if value is not None)
+    finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
+    return found if finite else None
+
+
+def _rounded_given(value: Fraction, precision: Precision) -> Fraction:
+    """As :func:`heavytop.precision.round_to`; the processor's own rounding where it does the same."""
+    if precision is DOUBLE and _SMALLEST <= abs(value) < _LARGEST:
+        return Fraction(float(value))
+    return round_to(value, precision.bits)
+
+
+def _fits(value: Fraction, precision: Precision) -> bool:
+    if abs(value) < _FITS_ANYWHERE:
+        return True
+    try:
+        number(value, precision)
+    except InputError:
+        return False
+    return True
+
+
+_SPARE_BITS = 160
+"""Bits of principal axes beyond those of the format."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What a trajectory gives in place of Ω and γ in principal axes.
+
+    columns: by the name of the quantity, the rounded numbers of each sample up to the first that is not finite.
+    said: their conventions.  posed: the body and its start, rounded to the format and exact from there.
+    body, start: the same as they were given, for suppositions.
+    """
+
+    columns: Mapping[str, list[tuple[Fraction, ...]]]
+    said: Convention
+    posed: Posed
+    body: AnyBody
+    start: RawStart
+
+    @property
+    def names(self) -> list[str]:
+        """The quantities that are scored."""
+        return list(self.columns)
+
+    def sample(self, row: int) -> dict[str, tuple[Fraction, ...]]:
+        """The numbers of one row."""
+        return {name: rows[row] for name, rows in self.columns.items()}
+
+    def seen(self, times: Sequence[Fraction]) -> Seen | None:
+        """The samples in double; None where no double holds them."""
+        try:
+            columns = {name: numpy.array(rows, dtype=float) for name, rows in self.columns.items()}
+            body, point = body_data(self.body), self.said.point
+            pivot = numpy.array([float(v) for v in self.said.pivot])
+            start = _start(self.start, self.posed)
+        except OverflowError:
+            return None
+        if not all(numpy.isfinite(values).all() for values in columns.values()):
+            return None
+        of = body.centre if point is None else numpy.array([float(v) for v in point])
+        count = min(map(len, columns.values()), default=0)
+        said = Reading.of(self.said)
+        if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
+            said = replace(said, degrees=self.start.degrees)
+        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot, count) if count else None
+
+
+def _start(raw: RawStart, posed: Posed) -> GivenStart:
+    omega = numpy.array([float(value) for value in raw.omega])
+    if raw.form != "gamma":
+        return GivenStart(raw.form, numpy.array([float(value) for value in raw.values]), omega, raw.in_space)
+    assert posed.xi is not None
+    rows = [_given(posed, v) for v in (posed.xi, cross(posed.start.gamma, posed.xi), posed.start.gamma)]
+    return GivenStart("rows", numpy.array(rows, dtype=float).reshape(-1), omega, raw.in_space)
+
+
+def _given(posed: Posed, principal_vector: Sequence[Fraction]) -> list[float]:
+    return [float(sum(a * v for a, v in zip(row, principal_vector, strict=True))) for row in posed.axes]
+
+
+def posed(
+    body: AnyBody, raw: RawStart, said: Convention, precision: Precision, normalize: bool
+) -> tuple[AnyBody, RawStart, Posed]:
+    """Body and start rounded to the format, and both in principal axes."""
+    body, start = rounded_body(body, precision), raw.rounded(precision)
+    top, axes = in_principal_axes(body, precision.bits + _SPARE_BITS)
+    rows = rotation(start, said, precision, normalize)
+    omega = body_omega(start, said, rows)
+    in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
+    w, gamma, xi = (_triple(v) for v in in_principal)
+    return body, start, Posed(top, State(w, gamma), xi, axes, body.centre)
+
+
+def observed(
+    body: AnyBody,
+    raw: RawStart,
+    said: Convention,
+    values: Mapping[str, Sequence[tuple[Fraction, ...] | None]],
+    places: Sequence[str],
+    precision: Precision,
+    normalize: bool = False,
+) -> tuple[Observed, list[tuple[Fraction, ...] | None]]:
+    """What is scored, and for each row all of its numbers, None where one is not finite.
+
+    normalize: take quaternions and matrices of any length for their rotations, at the start and in the rows.
+    Raises InputError for quaternions and matrices that are none, with their place.
+    """
+    rounded = {name: [_rounded(row, precision) for row in rows] for name, rows in values.items()}
+    for form in ("quaternion", "matrix"):
+        if form in rounded:
+            require_rows(form, rounded[form], places, normalize)
+    count = max(map(len, rounded.values()))
+    rows = [_joined([part[i] for part in rounded.values()]) for i in range(count)]
+    done = next((i for i, row in enumerate(rows) if row is None), count)
+    columns = {name: [row for row in part[:done] if row is not None] for name, part in rounded.items()}
+    if normalize:
+        columns = {name: _normalized(name, part, said) for name, part in columns.items()}
+    body, start, found = posed(body, raw, said, precision, normalize)
+    return Observed(columns, said, found, body, start), rows
+
+
+def _normalized(name: str, rows: list[tuple[Fraction, ...]], said: Convention) -> list[tuple[Fraction, ...]]:
+    """Quaternions of length 1 but for a rounding in 128 bits, and the rotations next to matrices."""
+    if name == "quaternion":
+        return [unit(row) for row in rows]
+    if name != "matrix":
+        return rows
+    squares = [nearest_quaternion([row[0:3], row[3:6], row[6:9]]) for row in rows]
+    return [tuple(entry for row in of_quaternion(unit(each)) for entry in row) for each in squares]
+
+
+def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """The vector over its length, to 128 bits."""
+    largest = max(map(abs, values))
+    scaled = [value / largest for value in values]
+    square, scale = sum(value * value for value in scaled), 1 << 128
+    length = Fraction(isqrt(int(square * scale * scale)), scale)
+    return tuple(Fraction(round(value / length * scale), scale) for value in scaled)
+
+
+def _rounded(row: tuple[Fraction, ...] | None, precision: Precision) -> tuple[Fraction, ...] | None:
+    return None if row is None else rounded_state(list(row), precision)
+
+
+def _joined(parts: Sequence[tuple[Fraction, ...] | None]) -> tuple[Fraction, ...] | None:
+    found: list[Fraction] = []
+    for part in parts:
+        if part is None:
+            return None
+        found += part
+    return tuple(found)
+
+
+def of_observed_arrays(
+    body: AnyBody,
+    raw: RawStart,
+    said: Convention,
+    times: list[Fraction],
+    arrays: Mapping[str, list[list[Any]]],
+    precision: Precision | None,
+    names: tuple[str, str],
+    normalize: bool = False,
+) -> GivenTrajectory:
+    """A trajectory from memory: rows of numbers of each quantity, in any format or as text.
+
+    precision: None for the narrowest format that holds every number as it is given.  names: of the row and the
+    integrator.
+    Raises InputError for what is not a number, for counts that differ or are too large, and as :func:`observed`.
+    """
+    for rows in arrays.values():
+        require_states(times, rows)
+    numbers = [value for rows in arrays.values() for row in rows for value in row]
+    form = precision or written_numbers.of_bits(max(bits_of(value) for value in numbers))
+    values = {name: [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)] for name, rows in arrays.items()}
+    places = [f"row {i}" for i in range(len(times))]
+    found, states = observed(body, raw, said, values, places, form, normalize)
+    require_physical(found.posed.top, found.posed.start)
+    which = system_of(body, HEAVY_TOP)
+    return _in_memory(names, found.posed.top, found.posed.start, which, form, times, states, found)
+
+
+def _in_memory(
+    names: tuple[str, str],
+    top: HeavyTop,
+    start: State,
+    which: System,
+    form: Precision,
+    times: list[Fraction],
+    states: list[tuple[Fraction, ...] | None],
+    found: Observed | None = None,
+) -> GivenTrajectory:
+    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
+    name, integrator = named(names[0], "name"), named(names[1], "integrator")
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=found)
+
+
+def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
+    try:
+        found = [component(value) for value in row]
+    except InputError as error:
+        raise InputError(f"{where}: {error.cause}", error.remedy) from None
+    finite = tuple(value for value in found if value is not None)
+    return finite if len(finite) == len(found) else None
+
+
+def require_system(system: System) -> None:
+    """Raises InputError for a system whose attitude is not scored."""
+    if system not in (HEAVY_TOP, HEAVY_GYROSTAT):
+        raise InputError(
+            f"Attitudes and positions are not scored in the system {system.name}.", 'Use "heavy_top", or give Ω and γ.'
+        )

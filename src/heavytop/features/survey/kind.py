@@ -1,0 +1,149 @@
+"""Many motions of a sweep: each a row of survey.parquet, all together a row of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import ClassVar
+
+import msgspec
+import numpy
+
+from heavytop.errors import InputError, quoted
+from heavytop.features.survey.charts import survey_charts
+from heavytop.features.survey.gathered import DATA, chunk_bytes, of_motions
+from heavytop.features.survey.measured import Chunk, Drawn, drawn, measured
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive, uniform
+from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
+from heavytop.integrate.trajectory import Outcome
+from heavytop.kind import Kind
+from heavytop.measure.integrator import HEYOKA
+from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
+from heavytop.records import Against, Beside, Metric, Row, RowKey
+from heavytop.report.document.document import Block, Card, Chart, In, Note
+
+NAME = "survey"
+_SWEEP = "sweep:"
+_METHOD = "two runs of multiword in double-double, of different orders"
+
+
+class SurveyTable(PlanTable, tag=NAME):
+    """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended.
+
+    map: two data by the names of their columns, over which digits lost are drawn; none for the first two that vary.
+    """
+
+    cases: list[str]
+    horizon: str
+    precision: str = "double"
+    samples: int = 10
+    integrator: str = HEYOKA
+    tolerance: str = ""
+    map: list[str] = msgspec.field(default_factory=list)
+    chunked: ClassVar[bool] = True
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One for each sweep, of its first motion; a plan makes one of each chunk from it."""
+        for name in self.cases:
+            if not name.startswith(_SWEEP):
+                raise InputError(f"A survey of {quoted(name)} is none of a sweep.", "Name sweeps: sweep:NAME.")
+        precision = parse(self.precision)
+        if precision not in (DOUBLE, EXTENDED):
+            raise InputError(f"There is no survey in {precision.name}.", "Use double or extended.")
+        (horizon,) = positive([self.horizon], "horizon")
+        if self.tolerance:
+            positive([self.tolerance], "tolerance")
+        if self.map and (len(set(self.map)) != 2 or len(self.map) != 2 or not set(self.map) <= set(DATA)):
+            raise InputError(
+                f"A map over {quoted(', '.join(self.map))} has no two axes.", f"Use two of {', '.join(DATA)}."
+            )
+        times, _ = uniform(horizon, self.samples)
+        subject = computed(self.integrator, tolerance=self.tolerance)
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon)),
+                "",
+                self.integrator,
+                case,
+                times,
+                options=tuple(self.map),
+            )
+            for case in map(find, self.cases)
+        ]
+
+
+class Survey(Kind):
+    """A task is a chunk of motions; its row carries their records as Parquet bytes until the report is written."""
+
+    name = NAME
+    table = SurveyTable
+    gathers = True
+    noise_factor = 5.0
+    place = 33
+
+    def carries_band(self, metric: Metric) -> bool:
+        """All quantiles: the interval that the number of motions leaves to each."""
+        return metric.kind == "error"
+
+    def cost(self, task: Task) -> float:
+        """Half a millisecond a motion, roughly, for each ten time units."""
+        count = task.case.count if isinstance(task.case, Chunk) else 1
+        return 0.5 + count * 5e-4 * (1 + float(abs(task.times[-1])) / 10)
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """The chunk's records.  Raises Contradiction where the computed reference is off the proven one."""
+        assert isinstance(task.case, Chunk)
+        precision = task.precision
+        times = [exact(number(time, precision)) for time in task.times]
+        motions = drawn(task.case, precision, task.seed)
+        asked = task.key.subject.tolerance
+        options = {"tolerance": exact(asked)} if asked else {}
+        found = measured(motions, task.integrator, times, precision, options)
+        radius = float(numpy.nanmax(found["reference_radius"], initial=0.0))
+        row = exact_row(task, f"{task.case.count} motions", Against("computed", _METHOD, f"{radius:.3g}"), {})
+        everything = found | _names(task, motions) | _data(motions)
+        return msgspec.structs.replace(row, bits=precision.bits, chunk=chunk_bytes(everything))
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """A line a row."""
+        lines = [Note(_line(row)) for row in rows]
+        yield Card("Surveys: a record for each motion in survey.parquet", lines, shown=In.SHORT | In.FULL | In.PAGE)
+        yield Chart(survey_charts)
+
+
+def _names(task: Task, motions: Drawn) -> dict[str, object]:
+    chunk = task.case
+    assert isinstance(chunk, Chunk)
+    assert chunk.sweep is not None
+    same = {
+        "sweep": chunk.sweep.name,
+        "integrator": task.key.subject.name,
+        "tolerance": task.key.subject.tolerance,
+        "precision": task.key.precision,
+        "horizon": task.key.horizon,
+    }
+    texts: dict[str, object] = {name: [text] * chunk.count for name, text in same.items()}
+    return texts | {"index": numpy.arange(chunk.first, chunk.first + chunk.count), "class": motions.classes}
+
+
+def _data(motions: Drawn) -> dict[str, object]:
+    p = motions.parameters
+    rotor = (*p.rotors, 0, 0)[:3]
+    parts = {"inertia": p.inertia, "moment": p.moment, "rotor": rotor, "omega": motions.start[:3]}
+    parts |= {"gamma": motions.start[3:]}
+    zeros = numpy.zeros(len(motions.problems))
+    return {
+        f"{name}{k + 1}": zeros if isinstance(column, int) else column.high[:, 0]
+        for name, columns in parts.items()
+        for k, column in enumerate(columns)
+    }
+
+
+def _line(row: Row) -> str:
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in of_motions(row))
+    if row.outcome != Outcome.SUCCESS.value:
+        return f"{row.case} {row.integrator} {row.precision}: {row.outcome}"
+    found = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
+    said = ", ".join(f"{name} {float(metric):.2g}" for name, metric in found.items() if metric is not None)
+    worst = f"; the worst is {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
+    return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {said}{worst}"

@@ -1,0 +1,376 @@
+"""The records of a chunk: errors, digits, drifts, steps and outcomes of many motions, as columns.
+
+The reference is a run in double-double arithmetic, eight motions in lanes; its radius is the distance from a second run
+with another order and other steps.  The first motion of each chunk has a proven one too, and a computed one that is
+further from it than ten of its radii and rounding is a contradiction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy
+
+from heavytop.cases import Case
+from heavytop.errors import Contradiction, PeerFailed
+from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.harness.sweeps import Lazy, Random, Sweep
+from heavytop.integrate.heyoka.lanes import states_on_a_grid
+from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_words_ensemble
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.rounding_noise import factor, scaled
+from heavytop.measure.truth import Known, known_motion
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
+from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
+from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+# A chunk of a sweep as arrays: the tops and starts that the sweep's cases have, rounded to the format.
+
+
+CHUNK = 4096
+"""Motions in a chunk, a row group of the file."""
+GENERAL = "general"
+_CLASSES = {
+    "momentum_squared": "euler",
+    "moment_along_centre": "spherical",
+    "spin": "lagrange",
+    "kovalevskaya": "kovalevskaya",
+    "goryachev_chaplygin": "goryachev-chaplygin",
+    "hess": "hess",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk(Case):
+    """Motions ``first`` to before ``first + count`` of a sweep, as a case; its own top and start are those of the
+    first.
+    """
+
+    sweep: Sweep | None = None
+    first: int = 0
+    count: int = 0
+
+
+def chunks(sweep: Sweep, cases: Sequence[Case], index: int) -> Chunk:
+    """The chunk of that index."""
+    first = index * CHUNK
+    case = cases[first]
+    own = {name: getattr(case, name) for name in Case.__dataclass_fields__}
+    return Chunk(**own, sweep=sweep, first=first, count=min(CHUNK, len(cases) - first))
+
+
+def number_of(cases: Sequence[Case]) -> int:
+    """How many chunks a sweep has."""
+    return -(-len(cases) // CHUNK)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """Rounded motions: exactly what an integrator of the format is given.
+
+    numbers: what enters the field, and the start, (motions, k + 6).
+    """
+
+    problems: Sequence[Problem]
+    integrals: list[tuple[Integral, ...]]
+    numbers: Pairs
+
+    @property
+    def system(self) -> System:
+        """The same of all."""
+        return self.problems[0].system
+
+    @property
+    def parameters(self) -> Parameters:
+        """Each a column, (motions, 1)."""
+        columns = [self.numbers[:, k : k + 1] for k in range(self.numbers.high.shape[1] - 6)]
+        found = self.system.taken_in(columns)
+        nothing = Pairs.of(numpy.zeros((len(self.problems), 1)))
+        moment = found.moment or (nothing,) * 3
+        return found._replace(moment=moment, rotor=nothing if found.rotor is None else found.rotor)
+
+    @property
+    def start(self) -> list[Pairs]:
+        """The six components, (motions, 1) each."""
+        width = self.numbers.high.shape[1]
+        return [self.numbers[:, k : k + 1] for k in range(width - 6, width)]
+
+    @property
+    def classes(self) -> list[str]:
+        """Of each motion, by the further integrals that it has."""
+        return [_class(each) for each in self.integrals]
+
+
+def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
+    """The motions of a chunk, bit for bit those of the sweep's cases; seed: of other roundings."""
+    assert chunk.sweep is not None
+    cases = chunk.sweep.cases()
+    places = range(chunk.first, chunk.first + chunk.count)
+    if isinstance(chunk.sweep, Random) and precision == DOUBLE and not seed:
+        numbers = _rounded(numpy.array([chunk.sweep.integers(index) for index in places]))
+        further = _may_have_more(numbers)
+        integrals = [_integrals(cases[index]) if more else _ALWAYS for index, more in zip(places, further, strict=True)]
+        return Drawn(
+            Lazy(chunk.count, lambda place: _problem(numbers[place])),
+            integrals,
+            Pairs.of(numbers),
+        )
+    given = [cases[index] for index in places]
+    if seed:
+        given = [replace(case, top=scaled(case.top, factor(seed))) for case in given]
+    problems = [Problem.of(case.top, case.start, precision, case.system) for case in given]
+    return Drawn(problems, [_integrals(case) for case in given], _drawn_pairs(problems))
+
+
+def _drawn_pairs(problems: Sequence[Problem]) -> Pairs:
+    """Their numbers, which two doubles hold: of formats of 106 bits at most."""
+    rows = [[*each.system.entering(each.parameters), *each.start.flat] for each in problems]
+    high = numpy.array(rows, float)
+    low = [
+        [float(v - Fraction(h)) for v, h in zip(*pair, strict=True)] for pair in zip(rows, high.tolist(), strict=True)
+    ]
+    return Pairs(high, numpy.array(low))
+
+
+def _integrals(case: Case) -> tuple[Integral, ...]:
+    return holding(case.top, case.start, case.system)
+
+
+def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
+
+    All of them are below 2^53, so that each quotient is the exact number rounded once.
+    """
+    thousandths, weight, centre = numbers[:, :3] / 1000.0, numbers[:, 3:4], numbers[:, 4:7]
+    moment = (weight * centre) / 1e6
+    return numpy.hstack([thousandths, moment, numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
+
+
+def _problem(numbers: NDArray[np.float64]) -> Problem:
+    i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
+    given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
+    return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)
+
+
+def _may_have_more(p: Any) -> Any:
+    """Where two moments of inertia are equal or a component of the centre is 0: else no further integral is known."""
+    equal = (p[:, 0] == p[:, 1]) | (p[:, 1] == p[:, 2]) | (p[:, 0] == p[:, 2])
+    return (equal | (p[:, 3:6] == 0).any(axis=1)).tolist()
+
+
+def _class(integrals: Sequence[Integral]) -> str:
+    found = [kind for each in integrals for name, kind in _CLASSES.items() if each.name.rstrip("123") == name]
+    return found[-1] if found else GENERAL
+
+
+_ALWAYS = holding(HeavyTop((4, 5, 6), 1, (1, 1, 1)), State((1, 0, 0), (0, 0, 1)))
+"""The three integrals of every heavy top."""
+
+
+DRIFTS = ("gamma_squared", "area", "energy", "further")
+"""Integrals whose drift is a column; further: the largest drift of all others that the motion has."""
+_TOLERANCES = Fraction(1, 2**96), Fraction(1, 2**84)
+"""Of both runs in double; other orders and steps.  In extended: of double-double itself, and the first."""
+_MODERATE = 1e4
+"""Larger data, and times, are looked at motion by motion."""
+_STEP_LIMIT = 1_000_000
+_FLOOR = 1e-28
+_RADII = 10
+
+Columns = dict[str, Any]
+
+
+def measured(
+    drawn: Drawn, integrator: ChosenIntegrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+) -> Columns:
+    """Each quantity over the motions.  Errors of Ω are in 1/time unit, drifts in units of the integral; NaN where a run
+    or its reference did not reach the horizon.
+
+    Raises Contradiction where the computed reference is off the proven one, PeerFailed where every run failed.
+    """
+    outcomes, states, steps = _runs(integrator, drawn, times, precision, options)
+    truth, apart = _truth(drawn, times, precision)
+    with numpy.errstate(all="ignore"):
+        wrong = (outcomes == Outcome.SUCCESS.value) & ~numpy.isfinite(states.high).all(axis=(1, 2))
+        outcomes[wrong] = Outcome.NON_FINITE.value
+        found = _errors(states, truth, times, precision)
+        found |= _drifts(drawn, states)
+    _require_agreement(drawn.problems[0], times, truth, float(apart[0]))
+    return {"outcome": outcomes.tolist(), "steps": steps} | found | {"reference_radius": apart}
+
+
+def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> bool:
+    """Whether the motions can be computed as arrays: doubles, and times that are out of nobody's reach."""
+    if precision != DOUBLE or times[0] <= 0 or max(abs(drawn.numbers.high).max(), float(times[-1])) > _MODERATE:
+        return False
+    return bool(drawn.numbers.high[:, :3].min() > 1 / _MODERATE)
+
+
+def _runs(
+    integrator: ChosenIntegrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+) -> tuple[Any, Pairs, Any]:
+    """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
+    count = len(drawn.problems)
+    outcomes, steps = numpy.full(count, Outcome.SUCCESS.value, object), numpy.zeros(count, int)
+    states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
+    if integrator == ChosenIntegrator(HEYOKA) and _usual(drawn, times, precision):
+        given = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
+        found, steps, good = states_on_a_grid(drawn.system, *given, times, **options)
+        states = Pairs(found, numpy.zeros_like(found))
+    rest = numpy.flatnonzero(~good)
+    problems = [drawn.problems[place] for place in rest.tolist()]
+    if problems:
+        runs = _one_by_one(integrator, problems, times, options)
+        outcomes[rest] = [run[0] for run in runs]
+        again = _pairs([run[1] for run in runs], len(times))
+        states.high[rest], states.low[rest] = again.high, again.low
+        steps[rest] = [run[2] for run in runs]
+    return outcomes, states, steps
+
+
+def _one_by_one(
+    integrator: ChosenIntegrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
+) -> list[tuple[str, Sequence[Any], int]]:
+    """Outcome, states and steps of each, by the integrator's own ensembles where it has them."""
+    if integrator.supports_ensemble:
+        many = integrator.propagate_many(problems, times, threads=1, **options)
+        return [(run.outcome.value, run.states, run.steps) for run in many]
+    runs = [_alone(integrator, problem, times, options) for problem in problems]
+    failures = [run for run in runs if isinstance(run, PeerFailed)]
+    if len(failures) == len(runs):
+        raise failures[0]
+    return [(Outcome.FAILED.value, (), 0) if isinstance(run, PeerFailed) else run for run in runs]
+
+
+def _alone(
+    integrator: ChosenIntegrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
+) -> tuple[str, Sequence[Any], int] | PeerFailed:
+    """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
+    try:
+        (run,) = integrator.propagate_many([problem], times, threads=1, **options)
+    except PeerFailed as error:
+        return error
+    short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
+    return (Outcome.INCOMPLETE if short else run.outcome).value, run.states, run.steps
+
+
+def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
+    """(motions, samples, 6) of native states, exact in two doubles; NaN where there is none."""
+    high, low = (numpy.full((len(states), samples, 6), math.nan) for _ in range(2))
+    for place, run in enumerate(states):
+        if not len(run):
+            continue
+        rows = numpy.asarray(run)[:samples, :6]
+        if rows.dtype == numpy.float64:
+            high[place, : len(rows)], low[place, : len(rows)] = rows, 0.0
+            continue
+        first = rows.astype(float)
+        high[place, : len(rows)], low[place, : len(rows)] = first, (rows - first).astype(float)
+    return Pairs(high, low)
+
+
+def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tuple[Pairs, Any]:
+    """The reference, and the largest distance of the second run from it, absolute, a rounding of the format added, for
+    short motions often agree in every bit.
+    """
+    tolerances = _TOLERANCES if precision == DOUBLE else (None, _TOLERANCES[0])
+    found = [_reference(drawn, times, precision, tolerance) for tolerance in tolerances]
+    with numpy.errstate(all="ignore"):
+        apart = numpy.abs((found[0] - found[1]).high).max(axis=(1, 2))
+        size = numpy.abs(found[0].high).max(axis=(1, 2))
+        return found[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
+
+
+def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
+    """One run in double-double, of all motions."""
+    count = len(drawn.problems)
+    states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
+    if drawn.system is HEAVY_TOP and tolerance is not None and _usual(drawn, times, precision):
+        numbers = drawn.numbers.high
+        states, good = double_double_states(numbers[:, :6], numbers[:, 6:], times, tolerance, _STEP_LIMIT)
+    rest = numpy.flatnonzero(~good)
+    problems = [replace(drawn.problems[place], precision=DOUBLE_DOUBLE) for place in rest.tolist()]
+    if problems:
+        targets = [number(time, DOUBLE_DOUBLE) for time in times]
+        runs = propagate_words_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
+        again = _pairs([run.states for run in runs], len(times))
+        states.high[rest], states.low[rest] = again.high, again.low
+    return states
+
+
+def _errors(states: Pairs, truth: Pairs, times: Sequence[Fraction], precision: Precision) -> Columns:
+    """As :class:`heavytop.measure.scorer.SolutionError` has them, the largest over the samples."""
+    delta = numpy.abs((states - truth).high)
+    relative = (delta / numpy.maximum(1.0, numpy.abs(truth.high))).max(axis=2)
+    largest = relative.max(axis=1)
+    finite = numpy.isfinite(largest)
+    where = numpy.where(finite[:, None], relative, 0.0).argmax(axis=1)
+    most = precision.bits * math.log10(2)
+    digits = numpy.minimum(most, -numpy.log10(largest))
+    scale = float(precision.eps) * float(abs(times[-1])) ** 1.5
+    return {
+        "error_max": largest,
+        "error_time": numpy.where(finite, numpy.array([float(t) for t in times])[where], math.nan),
+        "error_omega": delta[:, :, :3].max(axis=(1, 2)),
+        "error_gamma": delta[:, :, 3:].max(axis=(1, 2)),
+        "error_scaled": largest / scale,
+        "digits_right": digits,
+    }
+
+
+def _drifts(drawn: Drawn, states: Pairs) -> Columns:
+    """The largest |I(t) - I(0)| over the samples, of each integral from the rounded start."""
+    groups: dict[Any, list[int]] = defaultdict(list)
+    for place, integrals in enumerate(drawn.integrals):
+        groups[tuple((i.name, _axes(i)) for i in integrals)].append(place)
+    found = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
+    parameters, start = drawn.parameters, drawn.start
+    for places in groups.values():
+        own = parameters.mapped(lambda column, places=places: column[places])  # type: ignore[misc]
+        now = [states[places, :, k] for k in range(6)]
+        before = [column[places] for column in start]
+        for integral in drawn.integrals[places[0]]:
+            change = integral.value(own, now) - integral.value(own, before)
+            size = numpy.abs(change.high).max(axis=1)
+            name = f"drift_{integral.name}"
+            if name in found:
+                found[name][places] = size
+            else:
+                found["drift_further"][places] = numpy.fmax(found["drift_further"][places], size)
+    return found
+
+
+def _axes(integral: Any) -> Any:
+    return getattr(integral.value, "keywords", {}).get("axes")
+
+
+def _require_agreement(problem: Problem, times: Sequence[Fraction], truth: Pairs, apart: float) -> None:
+    """Raises Contradiction where the first motion's reference is off its closed form or enclosure."""
+    if not math.isfinite(apart):
+        return
+    known = known_motion(problem, times[-1])
+    if not isinstance(known, Known):
+        return
+    for place, time in enumerate(times):
+        if not known.truth.covers(time):
+            continue
+        balls = known.truth.state(time, DOUBLE_DOUBLE.bits)
+        for k, ball in enumerate(balls):
+            computed = Fraction(float(truth.high[0, place, k])) + Fraction(float(truth.low[0, place, k]))
+            middle = exact(midpoint(ball))
+            off = abs(computed - middle) - exact(radius(ball))
+            if off > _RADII * Fraction(apart) + Fraction(_FLOOR) * (1 + abs(middle)):
+                raise Contradiction(
+                    f"The computed reference at t = {float(time):.6g} is {float(off):.3g} off the proven one, and its "
+                    f"radius is {apart:.3g}."
+                )

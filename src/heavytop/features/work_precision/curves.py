@@ -1,0 +1,247 @@
+"""Work against precision, read off the rows of a report: one line for each integrator and format, and what it shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from heavytop.integrate.registry import INTEGRATORS
+from heavytop.precision import parse
+from heavytop.records import UNMEASURED, Quantity, Row
+from heavytop.report.document.document import In, Table
+
+_MOST_CASES = 2
+OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
+"""heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
+ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
+"""The largest over the samples, and that at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkPrecisionPoint:
+    """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
+
+    seconds: of its fastest run.  Other work on the machine only ever adds, and adds more to longer runs: medians on a
+    busy machine would flatter whoever is quick.
+    """
+
+    log10: float
+    seconds: float
+    setting: str
+
+
+@dataclass(slots=True)
+class WorkPrecisionLine:
+    """One integrator in one format, from coarse to fine as the plan has it.
+
+    failures: the seconds that points took which did not reach the end; they have no error.
+    compile: seconds that compiling took, at most over the points; 0 where none is known.
+    """
+
+    integrator: str
+    precision: str
+    points: list[WorkPrecisionPoint] = field(default_factory=list)
+    failures: list[float] = field(default_factory=list)
+    compile: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """``heyoka quad``; double goes without saying for others."""
+        plain = self.precision == "double" and self.integrator != OURS
+        return self.integrator if plain else f"{self.integrator} {self.precision}"
+
+    @property
+    def best(self) -> WorkPrecisionPoint | None:
+        """The point with the smallest error."""
+        return min(self.points, key=lambda point: point.log10, default=None)
+
+    def seconds_at(self, log10: float) -> float | None:
+        """The seconds for an error of 10^log10: the least over points as fine, and between points on either side of it,
+        where a straight line on logarithmic axes is drawn; None where no point is as fine.
+        """
+        found = [point.seconds for point in self.points if point.log10 <= log10]
+        for one, other in zip(self.points, self.points[1:], strict=False):
+            if min(one.log10, other.log10) <= log10 <= max(one.log10, other.log10) and one.log10 != other.log10:
+                part = (log10 - one.log10) / (other.log10 - one.log10)
+                found.append(one.seconds ** (1 - part) * other.seconds**part)
+        return min(found, default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Lead:
+    """How heyoka compares with the fastest other integrator that reaches an error, on one case.
+
+    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, other: who took them.
+    general: label and seconds of heyoka with one code for every top, where ``name`` is compiled for this one.
+    compile: seconds to compile, at most, of each of the two forms.
+    """
+
+    case: str
+    log10: float
+    name: str
+    ours: float | None
+    other: str
+    theirs: float | None
+    lanes: float | None = None
+    general: tuple[str, float | None] | None = None
+    compile: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def ratio(self) -> float | None:
+        """How many times faster heyoka is."""
+        return self._ratio(self.ours)
+
+    def _ratio(self, seconds: float | None) -> float | None:
+        return None if seconds is None or self.theirs is None else self.theirs / seconds
+
+    @property
+    def short(self) -> str:
+        """The ratios in a line, who is faster first; "" where there is none."""
+        if self.ratio is None:
+            return ""
+        if self.ratio < 1:
+            return f"At 1e{self.log10:g} {self.other} is {1 / self.ratio:.1f} × as fast as {self.name}"
+        other = self.general and self._ratio(self.general[1])
+        more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
+        return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.other}{more}"
+
+    @property
+    def text(self) -> str:
+        """The lead in a sentence."""
+        goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
+        if self.ours is None:
+            theirs = "" if self.theirs is None else seconds_text(self.theirs)
+            fastest = f"; the fastest that gets there is {self.other} ({theirs})" if theirs else ""
+            return f"{goal}: not reached{fastest}"
+        if self.ratio is None or self.theirs is None:
+            parts = [f"{goal} takes {seconds_text(self.ours)}; no other gets there"]
+        elif self.ratio < 1:
+            parts = [
+                f"{self.case}: the fastest at error 1e{self.log10:g} is {self.other} ({seconds_text(self.theirs)})"
+            ]
+            parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
+        else:
+            pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
+            parts = [f"{goal} is {_speed(self.ratio)} than the best other integrator, {self.other} ({pair})"]
+        if self.general is not None:
+            parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
+        if self.lanes is not None:
+            parts.append(f"a motion in lanes takes {seconds_text(self.lanes)}")
+        if self.compile:
+            parts.append(
+                "to compile, at most: " + ", ".join(f"{name} {seconds_text(s)}" for name, s in self.compile.items())
+            )
+        return "; ".join(parts)
+
+    def _general_said(self, seconds: float | None) -> str:
+        if seconds is None:
+            return "does not get there"
+        ratio = self._ratio(seconds)
+        return f"takes {seconds_text(seconds)}" if ratio is None else f"is {_speed(ratio)} ({seconds_text(seconds)})"
+
+
+def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
+    """The lines of each case, by the largest error over the samples."""
+    found: dict[str, dict[tuple[str, str], WorkPrecisionLine]] = {}
+    for row in rows:
+        if row.outcome in UNMEASURED:
+            continue
+        name = row.key.subject.name
+        line = found.setdefault(row.case, {}).setdefault((name, row.precision), WorkPrecisionLine(name, row.precision))
+        seconds = row.seconds.get("least", math.nan)
+        error = row.metrics.get(ERRORS[0].text)
+        if row.outcome != "success":
+            line.failures.append(seconds)
+        elif error is not None and error.log10 is not None and seconds > 0:
+            line.points.append(WorkPrecisionPoint(error.log10, seconds, row.key.subject.asked))
+            line.compile = max(line.compile, row.seconds.get("compile", 0.0))
+    return {case: list(lines.values()) for case, lines in found.items()}
+
+
+def beside_ours(rows: Sequence[Row]) -> list[Table]:
+    """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
+    a line a point of the curve, of its error, its seconds and, where heyoka is measured, what it takes for that error.
+    """
+    found = panels(rows)
+    names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
+    beside = any(line.integrator == OURS for lines in found.values() for line in lines)
+    tables = []
+    for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
+        cases: dict[str, dict[str, str]] = {}
+        for case, lines in list(found.items())[:_MOST_CASES]:
+            for line in lines:
+                if line.integrator == name:
+                    ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
+                    cells = {_rung(line, point): _cell(point, ours) for point in line.points}
+                    cases[case] = cases.get(case, {}) | cells
+        points = dict.fromkeys(point for cells in cases.values() for point in cells)
+        lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
+        note = f"{name}: largest error in its time" + (" (heyoka's time for that error)" if beside else "")
+        if lines_of:
+            tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
+    return tables
+
+
+def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
+    return point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
+
+
+def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
+    cell = f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)}"
+    if not ours:
+        return cell
+    seconds, _ = _quickest(ours, point.log10)
+    return f"{cell} ({'not reached' if seconds is None else seconds_text(seconds, 2)})"
+
+
+def leads(rows: Sequence[Row]) -> list[Lead]:
+    """heyoka's best scalar line against the best of the others, for each case that has both and an error that one
+    reaches: in double at 1e-10, and beyond extended at 1e-30.
+    """
+    return [
+        lead
+        for case, lines in panels(rows).items()
+        for log10, formats in ((-10.0, ("double",)), (-30.0, ("double-double", "quad", "real")))
+        if (lead := _lead(case, log10, [line for line in lines if parse(line.precision).family in formats]))
+    ]
+
+
+def _lead(case: str, log10: float, lines: Sequence[WorkPrecisionLine]) -> Lead | None:
+    ours = [line for line in lines if line.integrator in (OURS, CONSTANTS)]
+    lanes = [line for line in lines if line.integrator == LANES]
+    others = [line for line in lines if line.integrator not in (OURS, CONSTANTS, LANES)]
+    if not ours or not others:
+        return None
+    (mine, name), (theirs, other), (side_by_side, _) = (_quickest(group, log10) for group in (ours, others, lanes))
+    if mine is None and theirs is None:
+        return None
+    name = name or ours[0].label
+    general = [(line.label, line.seconds_at(log10)) for line in ours if line.integrator == OURS]
+    two_forms = any(line.integrator == CONSTANTS for line in ours)
+    return Lead(
+        case,
+        log10,
+        name,
+        mine,
+        other,
+        theirs,
+        side_by_side,
+        general[0] if name == CONSTANTS and general else None,
+        {line.label: line.compile for line in ours if line.compile and two_forms},
+    )
+
+
+def _quickest(lines: Sequence[WorkPrecisionLine], log10: float) -> tuple[float | None, str]:
+    times = [(seconds, line.label) for line in lines if (seconds := line.seconds_at(log10)) is not None]
+    return min(times, default=(None, ""))
+
+
+def _speed(ratio: float) -> str:
+    return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
+
+
+def seconds_text(seconds: float, digits: int = 3) -> str:
+    """1.5 s, or 15 ms."""
+    value, unit = (seconds, "s") if seconds >= 1 else (1000 * seconds, "ms")
+    return f"{value:.0f} {unit}" if value >= 100 else f"{value:.{digits}g} {unit}"

@@ -1,0 +1,314 @@
+"""Seconds against error: one integrator at one tolerance or step, over a horizon, compared with the known motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from heavytop.errors import InputError
+from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.features.work_precision.charts import method_growth, work_precision
+from heavytop.features.work_precision.curves import (
+    CONSTANTS,
+    ERRORS,
+    LANES,
+    OURS,
+    WorkPrecisionLine,
+    beside_ours,
+    leads,
+    panels,
+)
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import positive, uniform
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.integrate import registry
+from heavytop.integrate.registry import IntegratorSource, name_of
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.kind import Kind, with_explanation
+from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
+from heavytop.measure.scalar import metric, of_fraction
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
+from heavytop.measure.truth import Truth, truth
+from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
+from heavytop.records import FINEST, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document.document import Block, Chart, In, Note
+from heavytop.report.document.document import Table as Cells
+from heavytop.report.render.page import fastest
+from heavytop.report.store.checks import CLOSE, bound, ended, size_of, sizes
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import State
+
+NAME = "work_precision"
+_ENOUGH_SECONDS = 0.3
+_RUNS = range(3, 101)
+_FOR_COMPARISON = Repeats(11, 201, 1.0, 3, band=True)
+ERROR_MAX, ERROR_FINAL = ERRORS
+RETURN = Quantity("return_error")
+_RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
+"""Of an integrator that is measured beside heyoka in double, by what it is set by."""
+_OF_OTHERS = 0.6
+"""Decades of rounding noise of third-party integrators, whose step control turns a rounding into another step: rerun
+with other roundings, CVODE and splitting methods move by up to a decade."""
+
+
+class Curve(msgspec.Struct, forbid_unknown_fields=True):
+    """One integrator in one format; ``tolerances``, of which "eps" is the finest it offers, or ``steps`` if fixed."""
+
+    integrator: str
+    precision: str = "double"
+    tolerances: list[str] = []
+    steps: list[str] = []
+
+    def subjects(self) -> Iterator[Subject]:
+        """The subject of each point; raises InputError for an impossible value."""
+        if not self.tolerances and not self.steps:
+            raise InputError(f"The list of points of {self.integrator} is empty.", "Give it tolerances, or steps.")
+        for text in self.steps:
+            if text != FINEST and physical(exact(text), "step") <= 0:
+                raise InputError(f"A step of {text[:60]!r}.", "Give numbers above 0.")
+        for text in self.tolerances:
+            if text != FINEST and not 0 < exact(text) <= 1:
+                raise InputError(f"A tolerance of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+            if self.integrator in (OURS, CONSTANTS, LANES) and text != FINEST:
+                usable_tolerance(text, parse(self.precision))
+        yield from (computed(self.integrator, tolerance=text) for text in self.tolerances)
+        yield from (computed(self.integrator, step=text) for text in self.steps)
+
+
+class WorkPrecisionTable(PlanTable, tag=NAME):
+    """Each point of each curve over the same horizon; ``samples`` uniform samples.
+
+    timings: whether runs are repeated so often that two reports of one machine can be compared by their seconds.
+    """
+
+    cases: list[str]
+    horizon: str
+    ladders: list[Curve]
+    samples: int = 100
+    timings: bool = False
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        (horizon,) = positive([self.horizon], "horizon")
+        times, end = uniform(horizon, self.samples), time_text(horizon)
+        points = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
+                f"/T={self.horizon}",
+                f"{subject.name} {subject.setting}",
+                case,
+                *times,
+                self.timings,
+            )
+            for case in map(find, self.cases)
+            for precision, subject in points
+        ]
+
+    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+        """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
+        integrator = name_of(which)
+        formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
+        control = registry.control_apart(which) if DOUBLE.name in formats else ""
+        ladders = [
+            Curve(integrator, name, **{"steps" if control == "step" else "tolerances": _RUNGS[control]})
+            if name == DOUBLE.name
+            else Curve(integrator, name, [FINEST])
+            for name in formats
+        ]
+        return msgspec.structs.replace(self, ladders=ladders) if ladders else None
+
+
+class WorkPrecision(Kind):
+    """error_final and error_max (largest component, at the end and over the samples), return_error, and drift.
+
+    seconds: ``run`` is the median and ``least`` the fastest of ``repeats`` runs to the end alone; ``compile`` is apart.
+    ``band``: with ``timings``, half-width in decades of the interval that holds the middle 95 % of the runs.
+    """
+
+    name = NAME
+    table = WorkPrecisionTable
+    may_give_up = "work against precision"
+    place = 40
+
+    def assumed_band(self, subject: Subject) -> float:
+        """The noise of third-party integrators."""
+        return 0.0 if subject.name in (OURS, CONSTANTS, LANES) else _OF_OTHERS
+
+    def roundings(self, quantity: Quantity | None, steps: int) -> float:
+        """√n eps for a first integral, whose roundings walk at random, and n for the distance from the true motion, in
+        which drift adds up along the flow.
+        """
+        if steps < 1:
+            return 0.0
+        return math.log10(steps) * (0.5 if quantity is not None and quantity.name == DRIFT else 1.0)
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Raises PeerFailed where the third-party integrator fails."""
+        case, precision = task.given, task.precision
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        # found before the runs: looking through the installed packages empties the caches of the processor
+        peer = registry.ready(task.integrator.which, _setting(task.key.subject))
+
+        def integrate(times: Any, start: State = case.start) -> Trajectory:
+            top = case.top if start is case.start else problem.top
+            return peer(top, start, times, precision, system=case.system)
+
+        sampled = integrate(task.times)
+        scorer = _scored(task, problem, sampled)
+        metrics = _metrics(scorer, bool(sampled.times))
+        seconds, alone = self._timed(task, integrate, sampled, _error(scorer))
+        done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
+        if case.system is not GYROSTAT:
+            metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
+        if not done:
+            metrics[ERROR_FINAL] = _missing()
+        run = replace(alone, times=sampled.times, states=sampled.states, seconds=seconds)
+        if not done and alone.outcome is Outcome.SUCCESS:
+            run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
+        row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
+        row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        return with_explanation(row, task, run, scorer)
+
+    def _timed(
+        self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None
+    ) -> tuple[dict[str, float], Trajectory]:
+        """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
+        end, how = task.times[-1:], _repeats(task)
+        name = task.integrator.name
+        if not task.integrator.can.own and sampled.outcome is Outcome.SUCCESS:
+            seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
+            counted = replace(alone, times=sampled.times, states=sampled.states)
+            require_counts(name, counted, _setting(task.key.subject), error)
+            return seconds, alone
+        alone = integrate(end)
+        warm = alone.seconds["run"] < TOO_LONG and alone.outcome is Outcome.SUCCESS
+        figures, runs = timed(lambda number: integrate(end) if warm or number > 1 else alone, how)
+        alone = runs[-1]
+        compiling = max(run.seconds["compile"] for run in (sampled, alone))
+        return {"compile": compiling} | figures, alone
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """The errors are the largest of Ω and γ; the median of the seconds is no less than the least of them."""
+        if row.seconds.get("least", 0.0) > row.seconds.get("run", math.inf):
+            yield "seconds: the fastest run is slower than the median"
+        names = (Quantity(SOLUTION_ERROR, part).text for part in ("omega", "gamma"))
+        both = [row.series[name] for name in names if name in row.series]
+        largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
+        if len(both) < 2 or largest is None:
+            return
+        found = [size for series in both for size in sizes(series)]
+        if found and max(found) > bound(largest) + CLOSE:
+            yield "error_max: smaller than its series"
+        if last is None or last.log10 is None:
+            return
+        if largest.log10 is not None and last.log10 > largest.log10 + CLOSE:
+            yield "error_final: larger than the largest"
+        if not all(ended(series, row) for series in both):
+            return
+        ends = [size for series in both if (size := size_of(series.values[-1])) is not None]
+        if len(ends) == len(both) and abs(max(ends) - last.log10) > CLOSE:
+            yield "error_final: not the last value of its series"
+
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Who is fastest at 1e-10 and by how much; a table a case; how heyoka compares, a sentence a case.  In short an
+        integrator beside heyoka, setting by setting, where there is one.
+        """
+        if (found := fastest(rows)) is not None:
+            yield found
+        for place, (case, lines) in enumerate(panels(rows).items()):
+            yield _table("" if place else _TITLE, case, lines)
+        yield from (Note(lead.text) for lead in leads(rows))
+        shorter = [Note(f"{lead.case}: {lead.short}.", shown=In.SHORT) for lead in leads(rows) if lead.short]
+        yield from beside_ours(rows) or shorter
+        yield from (Chart(work_precision), Chart(method_growth))
+
+
+_TITLE = "Work against precision: seconds that an error takes, whole horizon"
+
+
+def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
+    """Seconds that an error takes, a line an integrator."""
+    cells = []
+    for line in lines:
+        best = line.best
+        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+        at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
+        found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+        cells.append([line.label, *found, str(len(line.failures) or "")])
+    columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "aborted"]
+    return Cells(title, columns, cells)
+
+
+def _missing() -> Metric:
+    return Metric("missing", None)
+
+
+def _setting(subject: Subject) -> tuple[str, Fraction] | None:
+    """What the integrator is asked for; None for the finest that it offers."""
+    if FINEST in (subject.tolerance, subject.step):
+        return None
+    return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
+
+
+def _repeats(task: Task) -> Repeats:
+    """More of them where seconds are to be compared."""
+    if task.options:
+        return _FOR_COMPARISON
+    return Repeats(_RUNS[0], _RUNS[-1], _ENOUGH_SECONDS)
+
+
+def _error(scorer: Scorer) -> Fraction | None:
+    """The largest error over the samples, or what it is below; None without a reference."""
+    if scorer.error is None:
+        return None
+    parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
+    return max(midpoint(part) + radius(part) for part in parts) if all(part.is_finite() for part in parts) else None
+
+
+def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
+    keep = [exact(number(time, problem.precision)) for time in task.keep]
+    times = tuple(exact(number(time, problem.precision)) for time in task.times)
+    scorer = Scorer(problem, _truth(problem, times), keep)
+    scorer.take(run.times, run.states)
+    return scorer
+
+
+def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
+    """The largest drifts, and the errors."""
+    found = ((each.quantity, each) for each in scorer.drift.metrics().values())
+    metrics = {quantity: each for quantity, each in found if quantity and quantity.statistic == "max"}
+    if scorer.error is not None and sampled:
+        omega, gamma = (scorer.error.running[part] for part in ("omega", "gamma"))
+        metrics[ERROR_FINAL] = metric(omega.final.max(gamma.final))
+        metrics[ERROR_MAX] = metric(omega.maximum.max(gamma.maximum))
+    elif scorer.error is not None:
+        metrics[ERROR_MAX] = _missing()
+    return metrics
+
+
+def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
+    """How far from the start the way back ends, largest component.
+
+    The way back is the way on from (−Ω, γ): the heavy top is reversible, (Ω, γ, t) -> (−Ω, γ, −t).
+    """
+    end = [exact(value) for value in run.states[-1]]
+    back = integrate([run.times[-1]], State([-value for value in end[:3]], end[3:]))
+    if back.outcome is not Outcome.SUCCESS:
+        return _missing()
+    signs = (-1, -1, -1, 1, 1, 1)
+    pairs = zip(signs, back.states[-1], problem.start.flat, strict=True)
+    return of_fraction(max(abs(sign * exact(value) - start) for sign, value, start in pairs))
+
+
+@lru_cache(maxsize=8)
+def _truth(problem: Problem, times: tuple[Fraction, ...]) -> Truth | str:
+    """Shared by all integrators that are compared with it, with every state that was worked out."""
+    found = truth(problem, times)
+    return found if isinstance(found, str) else found.remembered()

@@ -1,0 +1,187 @@
+"""The data of a case, ready to paste: options of the command line, CSV, JSON, TOML of a plan, Python."""
+
+from __future__ import annotations
+
+import json
+import re
+from decimal import Decimal
+from fractions import Fraction
+from random import Random
+from typing import Any
+
+from heavytop.cases import Case
+from heavytop.errors import InputError
+from heavytop.exact.catalogue import matches
+from heavytop.features.score.trajectories.files import COLUMNS
+from heavytop.measure.motion import motion_texts
+from heavytop.measure.rounding_noise import FACTORS, factor, scaled
+from heavytop.precision import dot
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State, data_texts
+
+_TIMES = ("1", "5", "10")
+_PLACES = 18
+_DIGITS = 40
+"""Of a start whose attitude is irrational."""
+
+
+def case_data(case: Case) -> dict[str, Any]:
+    """Exact data as text, by the keys of a trajectory file; of a named body as it was given."""
+    head = {"name": case.name, "system": case.system.name}
+    if case.body is None or case.given_start is None:
+        return head | data_texts(case.top, case.start)
+    texts = motion_texts(case.body, case.given_start, _DIGITS)
+    return head | {
+        key: _in_decimals(value) if isinstance(value, str) else [_in_decimals(each) for each in value]
+        for key, value in texts.items()
+    }
+
+
+def _in_decimals(text: str) -> str:
+    """A text whose quotients are decimals where they end: the data of other programs are."""
+
+    def decimal(found: re.Match[str]) -> str:
+        below = int(found[2])
+        places = next((n for n in range(_PLACES) if 10**n % below == 0), None)
+        return found[0] if places is None else f"{Decimal(int(found[1]) * 10**places // below).scaleb(-places):f}"
+
+    return re.sub(r"(?<![\w/.])(-?\d+)/(\d+)(?![\w/.])", decimal, text)
+
+
+def forms(case: Case) -> dict[str, str]:
+    """The data of a case in each form: ``command`` (line), ``csv``, ``json``, ``toml`` and ``python``."""
+    data = case_data(case)
+    texts = {"csv": _csv(data), "json": _json(data), "toml": _toml(data)}
+    if case.body is None:
+        return {"command": _command(data)} | texts | {"python": _python(data)}
+    command = f"heavytop propagate --case {case.name} --times {','.join(_TIMES)} --show quaternion,position"
+    return {"command": command} | texts | {"python": _in_decimals(_python_of_body(case))}
+
+
+def _follows(data: dict[str, Any]) -> bool:
+    """Whether the system need not be said: it is that of a top with these data."""
+    return bool(data["system"] == ("heavy_gyrostat" if "rotor" in data else "heavy_top"))
+
+
+def _command(data: dict[str, Any]) -> str:
+    system = "" if _follows(data) else f" --system {data['system']}"
+    keys = ("inertia", "weight", "centre", "rotor", "omega", "gamma")
+    options = " ".join(f"--{key} {_joined(data[key])}" for key in keys if key in data)
+    return f"heavytop propagate {options}{system} --times {','.join(_TIMES)}"
+
+
+def _joined(value: str | list[str]) -> str:
+    return value if isinstance(value, str) else ",".join(value)
+
+
+def _csv(data: dict[str, Any]) -> str:
+    """The comments above the columns of a table, and the header."""
+    return "\n".join([*(f"# {key}: {_joined(value)}" for key, value in data.items()), ",".join(COLUMNS)])
+
+
+def _toml(data: dict[str, Any]) -> str:
+    # a plan's own top may not have the name of a case
+    named = {key: value for key, value in data.items() if not key.startswith("start_")}
+    named |= {"name": f"my-{data['name']}"}
+    kind, _, angles = data.get("start_attitude", "").partition(" ")
+    if kind == "axis_angle":
+        angles = ":".join(angles.rsplit(",", 1))
+    given = {key: data.get(f"start_{key}") for key in ("quaternion", "matrix")} if not kind else {kind: angles}
+    given = {key: value for key, value in given.items() if value}
+    if given:
+        named.pop("gamma")
+    named |= given
+    return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in named.items())])
+
+
+def _json(data: dict[str, Any]) -> str:
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
+    return "\n".join(["{", ",\n".join(lines), "}"])
+
+
+def _python(data: dict[str, Any]) -> str:
+    def number(value: str) -> str:
+        return value if value.lstrip("-").isdigit() else f'"{value}"'
+
+    def numbers(key: str) -> str:
+        return f"({', '.join(map(number, data[key]))})"
+
+    weight = number(data["weight"])
+    system = "" if _follows(data) else f', system="{data["system"]}"'
+    rotor = f", rotor={numbers('rotor')}" if "rotor" in data else ""
+    return "\n".join(
+        [
+            "import heavytop as ht",
+            "",
+            f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')}{rotor})",
+            f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})",
+            f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})",
+        ]
+    )
+
+
+def _python_of_body(case: Case) -> str:
+    return "\n".join(
+        [
+            "import heavytop as ht",
+            "",
+            f"body = ht.{case.body!r}",
+            f"start = ht.{case.given_start!r}".replace("attitude=", "attitude=ht."),
+            f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)",
+            "run.quaternions(), run.positions()",
+        ]
+    )
+
+
+# The members of an ensemble: random starts of a top, or one motion with other roundings.
+
+
+_GRID = 1000
+_GAMMA_BITS = 24
+_APART = 64
+"""Roundings of one seed are so many rows of a report apart from those of the next."""
+
+
+Member = tuple[HeavyTop, State]
+
+
+def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
+    """``count`` tops with starts; growing ``count`` keeps the earlier ones.
+
+    Where random starts of the top are known in the same way as the case, these, of the one top: Ω has components
+    uniform up to the largest of the case's Ω, and γ is a rational point of the unit sphere, uniform over it; for the
+    gyrostat γ is M/|M| and |M| is half to three halves of the case's.
+    A case that is one motion of its top, such as a pendulum, is taken with as many other roundings
+    (:mod:`heavytop.measure.rounding_noise`); raises InputError where there are not as many.
+    """
+    if one_motion(case, seed):
+        if count > FACTORS:
+            raise InputError(f"{count} starts of {case.name}, which is one motion.", f"Give up to {FACTORS}.")
+        return [(scaled(case.top, factor(_APART * seed, index)), case.start) for index in range(count)]
+    return [(case.top, _draw(case, seed, index)) for index in range(count)]
+
+
+def one_motion(case: Case, seed: int) -> bool:
+    """Whether the case is one special motion of its top, not of a class that random starts are of."""
+    return case.homoclinic is not None or _kind(case, case.start) is not _kind(case, _draw(case, seed, 0))
+
+
+def _draw(case: Case, seed: int, index: int) -> State:
+    # a text seeds Python's generator by its SHA-512: the same on every platform
+    random = Random(f"{case.name} {seed} {index}")
+    ball = [Fraction(0)] * 3
+    while not _GRID**2 // 4 < dot(ball, ball) <= _GRID**2:
+        ball = [Fraction(random.randint(-_GRID, _GRID)) for _ in range(3)]
+    gamma = State((0, 0, 0), ball).normalized(_GAMMA_BITS).gamma
+    if case.system is GYROSTAT:
+        size = dot(case.top.angular_momentum(case.start.omega), case.start.gamma)
+        size *= Fraction(random.randint(_GRID // 2, 3 * _GRID // 2), _GRID)
+        return State([size * g / i for g, i in zip(gamma, case.top.inertia, strict=True)], gamma)
+    size = max(abs(w) for w in case.start.omega)
+    return State([size * Fraction(random.randint(-_GRID, _GRID), _GRID) for _ in range(3)], gamma)
+
+
+def _kind(case: Case, start: State) -> type | None:
+    """The closed form that a random start of the top has as well, or the special one it has not."""
+    found = next(matches(case.top, start, case.system), None)
+    return None if found is None else type(found)

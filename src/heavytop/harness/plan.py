@@ -1,0 +1,426 @@
+"""Plans: what is run, written in TOML, and the single measurements they expand to."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from bisect import bisect_right
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from fractions import Fraction
+from functools import partial, reduce
+from importlib import resources
+from itertools import accumulate
+from operator import or_
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import msgspec
+
+from heavytop import records
+from heavytop.cases import CASES, Case, case, named_bodies, require_possible
+from heavytop.errors import InputError, invalid, quoted
+from heavytop.exact.bodies import resolve
+from heavytop.files import read_whole
+from heavytop.harness.rows import Kinds, PlanTable, Task
+from heavytop.harness.sweeps import Lazy, Sweep
+from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
+from heavytop.integrate.registry import known as known_integrators
+from heavytop.integrate.registry import require as require_integrator
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.rounding_noise import MOST_SEEDS
+from heavytop.precision import exact, number, physical, require
+from heavytop.records import FINEST, RowKey
+from heavytop.top.bodies import Body, motion_of
+from heavytop.top.equations import system_of
+from heavytop.top.heavy_top import HeavyTop
+
+_KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
+_NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
+_RENAME = "Give it another name."
+BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
+QUANTITIES = frozenset(
+    (
+        *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
+        *("omega", "omega_space", "gamma", "quaternion", "matrix"),
+        *("horizon", "times", "rate_times", "tolerance", "tolerances", "steps", "limit"),
+    )
+)
+"""Keys whose values are exact numbers: an integer, a decimal, or text with a decimal or a fraction."""
+
+
+class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A top of the plan's own, or a body in any axes; numbers as exact text, or as they are written in TOML.
+
+    With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
+    numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
+    ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle`` ("x,y,z:angle").
+    """
+
+    name: str
+    inertia: list[str]
+    centre: list[str]
+    weight: str | None = None
+    mass: str | None = None
+    gravity: str | None = None
+    about: str | None = None
+    omega: list[str] | None = None
+    omega_space: list[str] | None = None
+    gamma: list[str] | None = None
+    quaternion: list[str] | None = None
+    matrix: list[str] | None = None
+    euler: str | None = None
+    axis_angle: str | None = None
+    rotor: list[str] | None = None
+    system: str | None = None
+
+    def case(self) -> Case:
+        """The case; raises InputError for what is no body or start, or cannot be measured."""
+        body, start = motion_of(msgspec.structs.asdict(self))
+        about, system = "from the plan", system_of(self.system, body)
+        if isinstance(body, HeavyTop) and start.attitude is None:
+            return require_possible(Case(self.name, about, system, body, start))
+        found = resolve(body, start)
+        case = Case(self.name, about, system, found.top, found.start)
+        return require_possible(replace(case, body=body if isinstance(body, Body) else None, given_start=start))
+
+
+class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A whole plan; of the tables in ``measure`` each is that of its kind.
+
+    integrator: tables of programs.  integrators: files beside that of the plan, ``mine.toml`` or ``mine.py:solve``.
+    row_timeout: seconds that a row of a third-party integrator may take.
+    """
+
+    name: str
+    measure: list[PlanTable]
+    top: list[Top] = []
+    sweep: list[Sweep] = []
+    integrator: list[dict[str, Any]] = []
+    integrators: list[str] = []
+    row_timeout: str | int | float = ""
+
+
+def read(
+    name: str, kinds: Kinds, seed: int = 0, integrator: str | IntegratorSource = ""
+) -> tuple[Plan, str, Sequence[Task]]:
+    """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
+
+    integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
+    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`beside` does.
+    """
+    plan, digest = load(name, kinds)
+    try:
+        defined = definitions(plan, Path() if name in BUILT_IN else Path(name).parent)
+        if integrator:
+            integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
+            plan = beside(plan, integrator)
+        if not isinstance(integrator, str):
+            defined = defined | {integrator.name: integrator}
+        return plan, digest, expand(plan, seed, defined)
+    except InputError as error:
+        if name in BUILT_IN:
+            raise
+        raise InputError(f"{name}: {error.cause}", error.remedy) from None
+
+
+def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
+    """The built-in plan of that name, or the one in that TOML file, and the hash of its text.
+
+    Raises InputError with the place in the file for an unknown key or kind or an impossible value.
+    """
+    if name in BUILT_IN:
+        text = (resources.files("heavytop.harness") / "plans" / f"{name}.toml").read_text("utf-8")
+    elif Path(name).suffix == ".toml":
+        try:
+            text = read_whole(Path(name)).decode("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"The plan {name} cannot be read: {error}.", "Give a readable TOML file.") from None
+    else:
+        raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
+    try:
+        plan = of_document(document_of(text), kinds)
+        if not re.fullmatch(_NAME, plan.name):
+            raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
+    except RecursionError:
+        raise InputError(f"The plan {name} is nested too deeply.", _KEYS) from None
+    except ValueError as error:  # of TOML, of an integer of too many digits, and of msgspec
+        cause = f"The plan {name} is not valid: {invalid(error)}."
+        raise InputError(cause, _KEYS) from None
+    return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def document_of(text: str) -> dict[str, Any]:
+    """The TOML document, with the numbers of :data:`QUANTITIES`, and all that are no integers, as they are written.
+
+    Raises ValueError for what is no TOML.
+    """
+    return {key: _as_written(key, value) for key, value in tomllib.loads(text, parse_float=str).items()}
+
+
+def _as_written(key: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _as_written(name, each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_as_written(key, each) for each in value]
+    return str(value) if key in QUANTITIES and type(value) is int else value
+
+
+def former(name: str) -> set[str]:
+    """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
+    try:
+        return records.in_document(document_of(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+    except (OSError, ValueError, RecursionError):
+        return set()
+
+
+def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
+    """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
+    one name.
+    """
+    found: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
+    for text in plan.integrators:
+        if text.endswith(".toml"):
+            found += commands_in(folder / text)
+        elif isinstance(source := named(text, folder), str):
+            raise InputError(f"integrators = {quoted(text)} is no file.", "Give FILE.toml or FILE.py:FUNCTION.")
+        else:
+            found.append(source)
+    defined = {each.name: each for each in found}
+    for name in (name for name in defined if name in known_integrators()):
+        raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
+    if len(defined) < len(found):
+        raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
+    if plan.row_timeout != "":
+        seconds_of(plan.row_timeout, "row_timeout")
+    return defined
+
+
+def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
+    """The plan with the same measurements of another integrator after heyoka's.
+
+    Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
+    """
+    if integrator == HEYOKA:
+        raise InputError(f"{HEYOKA} is what others are compared with.", "Name another with --integrator, or none.")
+    if not isinstance(integrator, str) and not is_third_party(integrator.name):
+        raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
+    require_integrator(integrator)
+    added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
+    if not added:
+        raise InputError(f"The plan {plan.name} does not measure {HEYOKA}.", "Use --plan gate.")
+    return msgspec.structs.replace(plan, measure=[*plan.measure, *added])
+
+
+def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
+    """The plan in a TOML document; raises ValidationError with the place of an unknown key, kind or impossible type."""
+    tables = {each.name: each.table for each in kinds.values() if each.table is not None}
+    _require_kinds(document, "measure", tables)
+    _require_kinds(document, "sweep", {str(each.__struct_config__.tag) for each in get_args(Sweep)})
+    _require_keys(document, tables)
+    any_table = reduce(or_, tables.values())
+    measure = ("measure", list[any_table])  # type: ignore[valid-type]
+    whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
+    plan: Plan = msgspec.convert(records.of_document(document), cast(type[Plan], whole))
+    return plan
+
+
+def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) -> None:
+    """Raises ValidationError for a table of a kind that is not there: with those that are, and the nearest."""
+    entries = table.get(section)
+    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+        kind = entry.get("kind") if isinstance(entry, dict) else None
+        if isinstance(kind, str) and kind not in known:
+            near = get_close_matches(kind, known, 1)
+            meant = f"; did you mean {near[0]}" if near else ""
+            raise msgspec.ValidationError(
+                f"kind = {quoted(kind)} in {section}[{place}] is none of {', '.join(sorted(known))}{meant}"
+            )
+
+
+def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]]) -> None:
+    """Raises ValidationError for a [[measure]] with a key that its kind does not have: with those that it has."""
+    entries = records.of_document(document).get("measure")
+    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+        table = tables.get(entry.get("kind", "")) if isinstance(entry, dict) else None
+        keys = {"kind"} if table is None else {"kind", *table.__struct_encode_fields__}
+        if table is not None and (unknown := min(entry.keys() - keys, default="")):
+            raise msgspec.ValidationError(
+                f"unknown field `{unknown[:40]}` in measure[{place}]; kind = {quoted(entry['kind'])} has "
+                + ", ".join(sorted(keys - {"kind"}))
+            )
+
+
+def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | None = None) -> Sequence[Task]:
+    """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
+
+    defined: integrators of the plan's own, by name.
+    Raises InputError for an unknown case, integrator or precision, an impossible value or seed, data that a format
+    cannot hold, two measurements of the same, and a top or sweep that nothing measures.
+    """
+    if not 0 <= seed <= MOST_SEEDS:
+        raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
+    own, swept = _own(plan), _swept(plan)
+    known = own | {name: cases[0] for name, cases in swept.items()}
+    asked = {name for table in plan.measure for name in getattr(table, "cases", [])}
+    if unused := known.keys() - asked:
+        raise InputError(
+            f"The plan {plan.name} does not measure {', '.join(sorted(unused))}.",
+            "Name it in the cases of a [[measure]], or take it out.",
+        )
+    parts = [
+        ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
+        for whole in plan.measure
+        for table, cases in _parts(whole, _chunked(plan, swept) if whole.chunked else swept)
+    ]
+    sources: dict[str, IntegratorSource | None] = {}
+    seen: dict[RowKey, str] = {}
+    for templates, _ in parts:
+        for place, task in enumerate(templates):
+            subject = task.key.subject
+            if subject.what == "computed" and subject.name not in sources:
+                sources[subject.name] = (defined or {}).get(subject.name)
+                require_integrator(sources[subject.name] or subject.name)
+            task = templates[place] = replace(task, source=sources.get(subject.name))
+            work = _exactly(task.key)
+            if work in seen:
+                other = "" if seen[work] == task.label else f", also as {seen[work]}"
+                raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
+            if task.label in seen.values():  # one case at several horizons
+                templates[place] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
+            seen[work] = templates[place].label
+            _require_fit(task)
+    if not seen:
+        raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
+    ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
+
+    def task_at(index: int) -> Task:
+        part = bisect_right(ends, index)
+        templates, cases = parts[part]
+        place, which = divmod(index - (ends[part - 1] if part else 0), len(templates))
+        return templates[which].of(cases[place]) if cases else templates[which]
+
+    return Lazy(ends[-1], task_at)
+
+
+def _own(plan: Plan) -> dict[str, Case]:
+    """The plan's own tops by name."""
+    own: dict[str, Case] = {}
+    for top in plan.top:
+        _require_name(top.name, "top")
+        if top.name in own:
+            raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
+        if top.name in CASES or top.name in named_bodies():
+            raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
+        try:
+            own[top.name] = top.case()
+        except InputError as error:
+            raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None
+    return own
+
+
+def warnings(plan: Plan) -> list[str]:
+    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
+
+
+def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
+    """The cases of each sweep, by the name under which tables ask for them."""
+    swept: dict[str, Sequence[Case]] = {}
+    for place, sweep in enumerate(plan.sweep):
+        _require_name(sweep.name, "sweep")
+        for other in plan.sweep[:place]:
+            if sweep.name == other.name:
+                raise InputError(f"The plan {plan.name} has two sweeps {sweep.name!r}.", _RENAME)
+            if sweep == msgspec.structs.replace(other, name=sweep.name):
+                raise InputError(f"The sweeps {other.name} and {sweep.name} are the same.", "Take one of them out.")
+        swept[f"sweep:{sweep.name}"] = sweep.cases()
+    return swept
+
+
+def _chunked(plan: Plan, swept: Mapping[str, Sequence[Case]]) -> dict[str, Sequence[Case]]:
+    """The chunks of each sweep, by the same names."""
+    from heavytop.features.survey.measured import chunks, number_of
+
+    return {
+        name: Lazy(number_of(cases), partial(chunks, sweep, cases))
+        for sweep, (name, cases) in zip(plan.sweep, swept.items(), strict=True)
+    }
+
+
+def _require_name(name: str, what: str) -> None:
+    if not re.fullmatch(_NAME, name):
+        raise InputError(f"The {what}'s name {name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
+
+
+def _exactly(key: RowKey) -> RowKey:
+    """The key with its setting as fractions: 1e-3 and 0.001 are the same work."""
+    asked = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
+    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in asked.items()}
+    return msgspec.structs.replace(key, subject=msgspec.structs.replace(key.subject, **exactly))
+
+
+def _require_fit(task: Task) -> None:
+    """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
+    if task.case is None or not task.has_precision:
+        return
+    try:
+        precision = require(task.precision)
+        Problem.of(task.case.top, task.case.start, precision, task.case.system)
+        for time in task.times[:1] + task.times[-1:]:
+            number(time, precision)
+    except InputError as error:
+        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
+
+
+def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
+    """The table itself, or one for each of its cases where one is a sweep: then the table is of the sweep's first."""
+    names: list[str] = getattr(table, "cases", [])
+    if not swept.keys() & set(names):
+        return [(table, None)]
+    return [(msgspec.structs.replace(table, cases=[name]), swept.get(name)) for name in names]
+
+
+# Lists of times in a plan, checked.
+
+
+_MAX_SAMPLES = 1_000_000
+
+
+def log_spaced(count: int, per_decade: int = 8) -> list[int]:
+    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
+    wanted = {count}
+    i = 0
+    while (value := round(10 ** (i / per_decade))) < count:
+        wanted.add(value)
+        i += 1
+    return sorted(wanted)
+
+
+def positive(texts: list[str], what: str) -> list[Fraction]:
+    """Exact numbers; raises InputError unless they are positive and grow."""
+    values = [physical(exact(text), what) for text in texts]
+    if not values or values != sorted(set(values)) or values[0] <= 0:
+        raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
+    return values
+
+
+def samples(count: int) -> int:
+    """The count; raises InputError where it cannot be."""
+    if not 1 <= count <= _MAX_SAMPLES:
+        raise InputError(f"{count} samples cannot be taken.", f"Give a number from 1 to {_MAX_SAMPLES}.")
+    return count
+
+
+def signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
+    """The times forward or backward."""
+    return tuple(-time for time in times) if direction == "backward" else tuple(times)
+
+
+def uniform(horizon: Fraction, count: int) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+    """``count`` uniform samples up to the horizon, and those of them that go into a series, about eight a decade."""
+    times = tuple(horizon * i / count for i in range(1, samples(count) + 1))
+    return times, tuple(times[i - 1] for i in log_spaced(count))

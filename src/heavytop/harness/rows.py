@@ -1,0 +1,395 @@
+"""From what was measured to a row of the report."""
+
+from __future__ import annotations
+
+import gc
+import math
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar, Protocol
+
+import msgspec
+
+from heavytop.cases import Case
+from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
+from heavytop.harness.checkpoint import Saved
+from heavytop.integrate.peers.command import begin_row
+from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
+from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
+from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
+from heavytop.measure.rounding_noise import factor, scaled
+from heavytop.measure.scalar import of_fraction
+from heavytop.measure.truth import seconds_a_step as words_seconds
+from heavytop.precision import Precision, decimal_text, exact, exact_text, parse, time_text
+from heavytop.records import (
+    CONTRADICTION,
+    EXACT,
+    FAILED,
+    FINEST,
+    OUT_OF_REACH,
+    OUT_OF_TIME,
+    UNSUPPORTED,
+    Against,
+    Data,
+    Metric,
+    MetricKind,
+    Row,
+    RowKey,
+    Series,
+    Subject,
+)
+from heavytop.top.amplification import amplification
+from heavytop.top.heavy_top import HeavyTop, State
+
+# A single measurement of a plan.
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One measurement, and the row it will fill.
+
+    key: of the row.  suffix: behind the case in what the row calls it: a direction, a horizon.  subject: what is
+    measured.
+    case: None where no motion is measured.
+    times: exact, of the sign of the direction; keep: those that go into the series.
+    options: what else the kind of measurement needs to know, and it alone.
+    seed: which roundings; 0 for those of the data as given.
+    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
+    source: of an integrator that is neither built in nor a package's.
+    """
+
+    key: RowKey
+    suffix: str
+    subject: str
+    case: Case | None = None
+    times: tuple[Fraction, ...] = ()
+    keep: tuple[Fraction, ...] = ()
+    options: Any = None
+    seed: int = 0
+    fault: str = ""
+    source: IntegratorSource | None = None
+
+    def of(self, case: Case) -> Task:
+        """The same measurement of another case of the same system."""
+        key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)
+        return replace(self, key=key, case=case)
+
+    @property
+    def title(self) -> str:
+        """What the row calls its case."""
+        return self.key.case + self.suffix
+
+    @property
+    def precision(self) -> Precision:
+        """The format; raises InputError where none is involved."""
+        return parse(self.key.precision)
+
+    @property
+    def has_precision(self) -> bool:
+        """Whether a format is involved."""
+        return self.key.precision != EXACT
+
+    @property
+    def integrator(self) -> ChosenIntegrator:
+        """What computes the motion."""
+        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
+
+    @property
+    def is_third_party(self) -> bool:
+        """Whether code or a program of others computes the motion."""
+        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
+
+    @property
+    def given(self) -> Case:
+        """The case, with the roundings of the seed."""
+        assert self.case is not None
+        return replace(self.case, top=scaled(self.case.top, factor(self.seed))) if self.seed else self.case
+
+    def require_reach(self) -> None:
+        """Raises OutOfReach where what is measured is a run of too many steps."""
+        subject, case = self.key.subject, self.case
+        if subject.what == "computed" and case is not None and self.times:
+            problem = Problem.of(case.top, case.start, self.precision, case.system)
+            step = exact(subject.step) if subject.step not in ("", FINEST) else None
+            require_reach(problem, self.times[-1], step=step)
+
+    @property
+    def label(self) -> str:
+        """For progress and messages."""
+        plain = self.subject in (HEYOKA, self.key.kind)
+        system = self.key.system if self.case is None else ""
+        precision = self.key.precision if self.has_precision else ""
+        parts = (self.key.kind, self.title, "" if plain else self.subject, system, precision)
+        return " ".join(part for part in parts if part)
+
+    @property
+    def run_seconds(self) -> float:
+        """Seconds that multiword, or heyoka for all others, take for such a motion, roughly."""
+        step = (words_seconds if self.key.subject.name == MULTIWORD else seconds_a_step)(self.precision.bits)
+        return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
+
+
+def computed(name: str, **setting: Any) -> Subject:
+    """The integrator of that name with a setting as a subject."""
+    return Subject("computed", name, **setting)
+
+
+def seconds_a_step(bits: int) -> float:
+    """Seconds that one step of heyoka takes in a format of so many bits, roughly."""
+    return 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
+
+
+def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:
+    """A time as a metric; None is never."""
+    return Metric("never", None, kind) if time is None else of_fraction(abs(time), kind, time_text(abs(time)))
+
+
+def data_of(case: Case | None) -> Data | None:
+    """The exact data of the motion that is measured; of an ensemble the start by which the others are drawn."""
+    if case is None:
+        return None
+    top, start = case.top, case.start
+    inertia, centre, omega, gamma, rotor = (
+        tuple(map(exact_text, part)) for part in (top.inertia, top.centre, start.omega, start.gamma, top.rotor or ())
+    )
+    return Data(inertia, exact_text(top.weight), centre, omega, gamma, rotor)
+
+
+def exact_row(
+    task: Task,
+    measured: str,
+    reference: Against,
+    metrics: dict[str, Metric],
+    bits: int = 0,
+    series: dict[str, Series] | None = None,
+) -> Row:
+    """The row of what is evaluated, not integrated.  Its samples are the times of the task."""
+    return Row(
+        case=task.title,
+        integrator=task.subject,
+        bits=bits,
+        outcome=Outcome.SUCCESS.value,
+        time_reached=task.key.horizon,
+        steps=0,
+        finite=all(metric.value != "nan" for metric in metrics.values()),
+        metrics=metrics,
+        key=task.key,
+        reference=reference,
+        measured=measured,
+        series=series or {},
+        samples=len(task.times),
+    )
+
+
+def computed_row(
+    task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], reference: Against
+) -> Row:
+    """The row of a run: where it ended, what made its bits, and what was measured of it.
+
+    A run that gives fewer samples than its task has times is incomplete, whatever it says of itself; finite only where
+    it reached the last time and every metric is a number.
+    """
+    case, precision = task.given, run.problem.precision
+    outcome = run.outcome
+    if outcome is Outcome.SUCCESS and task.times and len(run.times) < len(task.times):
+        outcome = Outcome.INCOMPLETE
+    done = outcome is Outcome.SUCCESS
+    horizon = task.times[-1] if task.times else run.time_reached
+    return Row(
+        case=task.title,
+        integrator=run.integrator,
+        bits=precision.bits,
+        outcome=outcome.value,
+        time_reached=time_text(horizon if done else run.time_reached),
+        steps=run.steps,
+        finite=done and not any(m.value in ("nan", "missing") for m in metrics.values()),
+        metrics=metrics,
+        key=task.key,
+        reference=reference,
+        measured=f"computed: {run.integrator} in {precision.name}",
+        order=run.order,
+        flags=run.flags,
+        input_rounding=decimal_text(input_rounding(case.top, case.start, run.problem), 3),
+        series=series,
+        samples=len(run.times),
+        seconds=run.seconds,
+        amplification=_amplification(run.problem, horizon),
+    )
+
+
+_OUTCOMES: dict[type[HeavyTopError], str] = {
+    Contradiction: CONTRADICTION,
+    PeerFailed: FAILED,
+    Unsupported: UNSUPPORTED,
+    OutOfTime: OUT_OF_TIME,
+}
+
+
+def _amplification(problem: Problem, horizon: Fraction) -> float | None:
+    """That of the motion of a problem, to three digits; None for data beyond double.
+
+    Of the data rounded to double: all formats of a case share one path.
+    """
+    try:
+        parameters = problem.parameters.mapped(_in_double)
+        start = tuple(map(_in_double, problem.start.flat))
+    except OverflowError:
+        return None
+    found = amplification(problem.system, parameters, start, horizon)
+    return float(f"{found:.3g}") if math.isfinite(found) else None
+
+
+def _in_double(value: Fraction) -> Fraction:
+    """The nearest double; the value itself where that is 0.  Raises OverflowError beyond them."""
+    return Fraction(float(value)) or Fraction(value)
+
+
+def unmeasured(task: Task, reason: HeavyTopError) -> Row:
+    """The row of a task that was aborted: an outcome of its own, no metric, and why in the place of a reference."""
+    return Row(
+        case=task.title,
+        integrator=task.subject,
+        bits=task.precision.bits if task.has_precision else 0,
+        outcome=_OUTCOMES.get(type(reason), OUT_OF_REACH),
+        time_reached="0",
+        steps=0,
+        finite=False,
+        metrics={},
+        key=task.key,
+        reference=Against("none", reason=reason.cause),
+        measured="nothing",
+    )
+
+
+def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Row:
+    """The row of a task whose integrator failed: ``cause``, and in which case at which setting."""
+    setting = task.key.subject.setting
+    return unmeasured(task, kind(" ".join(part for part in (cause, "in", task.title, setting) if part)))
+
+
+def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
+    """The largest relative rounding of the data that the run was given: not charged to it, but said."""
+    given = problem.system.parameters(top, start)
+    rounded = problem.parameters.numbers, problem.start.flat
+    pairs = zip((*given.mapped(Fraction).numbers, *start.flat), sum(rounded, ()), strict=True)
+    return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)
+
+
+# What a run needs to know of a kind of measurement.  The kinds are in :mod:`heavytop.features.kinds`.
+
+
+Find = Callable[[str], Case]
+"""The case of a name; raises InputError for an unknown one."""
+
+
+class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
+    """A table `[[measure]]` of a plan; unknown keys are errors.
+
+    chunked: whether its tasks are chunks of a sweep, not single motions.
+    """
+
+    chunked: ClassVar[bool] = False
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row; raises InputError for an impossible value."""
+        raise NotImplementedError
+
+    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+        """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
+        if getattr(self, "integrator", None) != HEYOKA:
+            return None
+        return msgspec.structs.replace(self, integrator=name_of(which))
+
+
+class MeasuredKind(Protocol):
+    """One kind of measurement, as far as it is run; what it does not say is the usual.
+
+    name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
+    concludes: whether all rows of the kind together come to more rows.
+    gathers: whether its rows are parts of one that :mod:`heavytop.features.survey` makes of them for the report.
+    """
+
+    name: str
+    table: type[PlanTable] | None = None
+    concludes: bool = False
+    gathers: bool = False
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """The row of ``task``; a run that fails is a row with its outcome.
+
+        saved: the place of an earlier, interrupted measurement of this row, and where this one keeps its own.
+        Raises OutOfReach, Contradiction and PeerFailed, which are rows too.
+        """
+        ...
+
+    def cost(self, task: Task) -> float:
+        """Seconds it may take, roughly: for the progress bar and for running long ones first.
+
+        Those of one run of heyoka, and a second.
+        """
+        return 1.0 + task.run_seconds
+
+    def conclude(self, rows: Sequence[Row]) -> list[Row]:
+        """What all rows of the kind together come to; called where it :attr:`concludes`."""
+        return []
+
+
+Kinds = Mapping[str, MeasuredKind]
+
+
+# One task measured, in whatever process: its row, and how a process begins that measures such.
+
+
+RESUME = "Finished rows are kept: run again with --resume"
+
+
+def measure(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
+    """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
+    begin_row()
+    try:
+        task.require_reach()
+        return msgspec.structs.replace(_taken_up(kind, task, saved), data=data_of(task.case))
+    except PeerFailed as error:
+        return failed(task, error.cause)
+    except Unsupported as error:
+        return unmeasured(task, error)
+    except (OutOfReach, Contradiction) as error:
+        return unmeasured(task, error)
+    except InputError as error:
+        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
+
+
+def _taken_up(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
+    """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
+    try:
+        return kind.measure(task, saved)
+    except (OtherFlags, OutOfReach, Contradiction, PeerFailed, Unsupported):
+        raise
+    except Exception:
+        if not saved.taken:
+            raise
+    saved.forget()
+    return kind.measure(task, saved)
+
+
+def ended_its_process(task: Task, times: int, how: str = "") -> Row:
+    """The failed row of a task whose third-party integrator ended its process, ``how`` the last time."""
+    return failed(task, f"{task.key.subject.name} ended its process {times} times{how and ', ' + how}")
+
+
+def begin_worker(*_kinds: MeasuredKind) -> None:
+    """In a new process, which leaves interrupts to its parent.
+
+    With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.freeze()
+
+
+def died(task: Task, times: int) -> HeavyTopError:
+    """That a task of this program ended its process each time."""
+    return HeavyTopError(
+        f"A worker process died {times} times during {task.label}.", f"{RESUME}, perhaps with fewer --workers."
+    )

@@ -1,0 +1,578 @@
+"""What changed between two reports, ranked: at most eight sentences, and a line a row.
+
+A sentence is made from the records of the two rows, never from another sentence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain, groupby, pairwise
+from typing import NamedTuple
+
+import msgspec
+
+from heavytop.features.local_error.measurement import ORDER
+from heavytop.features.work_precision.curves import ERRORS
+from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scorer import SOLUTION_ERROR
+from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.report.compare.rows import Finding
+from heavytop.report.compare.verdicts import Verdict
+from heavytop.report.document.document import clip, short
+
+MOST, _LONGEST, _CLIPPED = 8, 300, 20
+"""Sentences, characters of one, and those that say how long a clipped text is."""
+RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW, Verdict.SAME)
+"""The verdicts, the worst first."""
+_ORDER_MOVED = 0.5
+"""An order between two settings that moved by less is no finding: errors near rounding bend it by as much."""
+_DIGITS_MOVED = 0.1
+"""Digits right that moved by less are said to one place, and so not at all."""
+_ENDS_AS_BEFORE = 0.5
+"""Decades by which the error of the last state may have grown where the dense output alone is worse."""
+_STEPS_MOVED = 0.02
+"""Decades: a step size control that rounds otherwise moves the steps by less."""
+_LESS = 0.5
+"""Of the decades that the finest setting lost, what a coarser one may have lost where an error of lower order came."""
+_LOWER_ORDER = (
+    "; coarser settings {}: the new error is of lower order than the method's, as of a coefficient or a "
+    "stage in lower precision"
+)
+_MOST_KEPT = 20_000
+"""Rows whose numbers are held; further ones are counted, and named by their findings."""
+_DIGITS = (SOLUTION_ERROR, ERRORS[0].name)
+"""Quantities that the digits right sum up."""
+_WORDS = {
+    "solution_error": "error",
+    "local_error_ulp": "error of a step in eps",
+    "break_away_time": "escape time",
+    "drift": "drift",
+}
+_GROWS = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no resolved law"}
+_COMPONENTS = {
+    "along": "along the flow",
+    "across": "across the flow",
+    "gamma_squared": "of |γ|²",
+    "momentum_squared": "of |M|²",
+    "area": "of M·γ",
+    "energy": "of the energy",
+    "omega": "of Ω",
+    "gamma": "of γ",
+}
+
+
+class Change(NamedTuple):
+    """A row that is not the same in both reports.  old, new: None where only one report has it.
+
+    findings: all that are not the same, the worst first; never empty.
+    """
+
+    identity: Identity
+    old: Row | None
+    new: Row | None
+    findings: list[Finding]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of its findings."""
+        return self.findings[0].verdict
+
+    @property
+    def digits(self) -> tuple[float, float] | None:
+        """Digits right before and after, where both are known."""
+        old, new = map(_digits, (self.old, self.new))
+        return None if old is None or new is None else (old, new)
+
+    @property
+    def lost(self) -> float:
+        """Digits lost; of errors of other kinds the decades of the largest loss."""
+        if self.digits is not None:
+            return self.digits[0] - self.digits[1]
+        return max((moved for each in self.findings if (moved := self.decades(each)) is not None), default=0.0)
+
+    def set_off(self, mended: Collection[tuple[str, str]]) -> Change:
+        """Without the slight losses of those integrators."""
+        return self._replace(findings=[each for each in self.findings if each.set_off(mended) is each])
+
+    def decades(self, finding: Finding) -> float | None:
+        """Decades by which the error of a finding grew; None for what is no error, or not a number in both rows."""
+        return self.decades_of(finding.metric)
+
+    def decades_of(self, name: str) -> float | None:
+        """The same of a metric by its name."""
+        old, new = (self.metric(row, name) for row in (self.old, self.new))
+        if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
+            return None
+        return new.log10 - old.log10
+
+    @staticmethod
+    def metric(row: Row | None, name: str) -> Metric | None:
+        """The metric of that name, if the row is there and has it."""
+        return None if row is None else row.metrics.get(name)
+
+    @property
+    def log_steps(self) -> float:
+        """log10 of the steps of the baseline; -inf where it counts none."""
+        return math.log10(self.old.steps) if self.old is not None and self.old.steps else -math.inf
+
+    @property
+    def largest_loss(self) -> float:
+        """Decades of the largest loss of an error."""
+        worse = (self.decades(each) for each in self.findings if each.verdict is Verdict.WORSE)
+        return max((moved for moved in worse if moved is not None), default=0.0)
+
+    def about(self, finding: Finding) -> Quantity | None:
+        """The quantity that a metric or series is about, without its statistic; None for laws, seconds, whole rows."""
+        found = self.measured(finding)
+        return found and found.over("")
+
+    def measured(self, finding: Finding) -> Quantity | None:
+        """The same with its statistic."""
+        for row in (self.old, self.new):
+            if row is not None and finding.of in ("", "series"):
+                found = (row.series if finding.of else row.metrics).get(finding.name)
+                if found is not None and found.quantity is not None:
+                    return found.quantity
+        return None
+
+
+class SettingPoint(NamedTuple):
+    """One setting of an integrator on one case: log10 of its steps and of its error, in the two reports."""
+
+    steps: tuple[float, float]
+    errors: tuple[float, float]
+
+
+@dataclass(slots=True)
+class Changes:
+    """Gathers what a comparison finds, pair by pair."""
+
+    rows: list[Change] = field(default_factory=list)
+    points: dict[tuple[str, str, str], list[SettingPoint]] = field(default_factory=dict)
+
+    def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
+        """Take in the findings about one row, in one report or in both; returns them as they are."""
+        changed = [each for each in findings if each.verdict is not Verdict.SAME]
+        if changed:
+            changed.sort(key=lambda each: RANK.index(each.verdict))
+            before, after = (old, new) if len(self.rows) < _MOST_KEPT else (None, None)
+            self.rows.append(Change(changed[0].row, _without_samples(before), _without_samples(after), changed))
+        if old is not None and new is not None:
+            self._point(old, new)
+        return findings
+
+    def _point(self, old: Row, new: Row) -> None:
+        errors = [row.metrics.get(ERRORS[0].text) for row in (old, new)]
+        logs = [metric.log10 for metric in errors if metric is not None and metric.log10 is not None]
+        if len(logs) == 2 and old.steps and new.steps:
+            steps = math.log10(old.steps), math.log10(new.steps)
+            key = _curve(old.identity)
+            self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
+
+    def mended(self) -> set[tuple[str, str]]:
+        """The integrators that gained more than their slight losses, which are the same then and left out.
+
+        Of two methods of which each is slightly better somewhere, that with the largest loss is worse.
+        """
+        gained: dict[tuple[str, str], float] = {}
+        lost: dict[tuple[str, str], float] = {}
+        for change in self.rows:
+            for each in change.findings:
+                if each.slight or (each.verdict is Verdict.BETTER and not each.of):
+                    side, moved = (lost if each.slight else gained), change.decades(each)
+                    side[each.method] = max(side.get(each.method, 0.0), math.inf if moved is None else abs(moved))
+        found = {method for method, most in lost.items() if gained.get(method, 0.0) > most}
+        if found:
+            left = (change.set_off(found) for change in self.rows)
+            self.rows = [change for change in left if change.findings]
+        return found
+
+    def coarser(self, change: Change) -> str:
+        """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
+        steps; else empty.
+
+        What it has lost by then falls more slowly than the method's own error, which is larger at the others.
+        """
+        curve = _curve(change.identity)
+        points, changed = self.points.get(curve, []), [each for each in self.rows if _curve(each.identity) == curve]
+        if len(points) < 2 or not all(each.old and each.old.steps and each.new and each.new.steps for each in changed):
+            return ""
+        finest = max(point.steps[0] for point in points)
+        lost = {each.log_steps: each.largest_loss for each in changed}
+        if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
+            return ""
+        most = lost.pop(finest)
+        return "" if any(each > _LESS * most for each in lost.values()) else "lost less" if lost else "are the same"
+
+    @property
+    def worst_first(self) -> list[Change]:
+        """The rows by verdict, then by digits lost."""
+        return sorted(self.rows, key=lambda change: (RANK.index(change.verdict), -change.lost))
+
+
+class Sentence(NamedTuple):
+    """One sentence, and the rows that it speaks of."""
+
+    text: str
+    rows: frozenset[Identity]
+
+
+def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
+    """At most eight sentences, the most telling first; what is worse before what is better.
+
+    same: how many metrics are the same, each row that was aborted in both reports counted as one.
+    failed: rows that failed in both reports, in the same way.
+    """
+    if not changes.rows:
+        counted = same - sum(row.outcome in UNMEASURED for row in failed)
+        numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
+    orders = list(_orders(changes))
+    found = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
+    by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
+    found += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
+    for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
+        rows = [change for change in changes.worst_first if change.verdict in verdicts]
+        for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
+            found += make(rows, verdicts)
+    found += [sentence for moved, sentence in orders if moved > 0]
+    still = _still_failed(failed)
+    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still)]
+    told = frozenset[Identity]().union(*(each.rows for each in found))
+    rest = [change for change in changes.rows if change.identity not in told]
+    end = f"{_count(len(rest), 'other row')} changed." if rest else "Nothing else changed."
+    if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
+        end = "The two have no row in common. Were they made with the same plan?"
+    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end)]
+
+
+def _still_failed(rows: Sequence[Row]) -> list[str]:
+    """A sentence for the rows that failed in both reports; none where there is no such row."""
+    if not rows:
+        return []
+    whose, on = _whose([row.identity for row in rows]), _on([row.identity for row in rows])
+    return [f"{_count(len(rows), 'row')}{whose} failed in both reports{on}: {clip(_why(rows[0]), 160)}."]
+
+
+def _why(row: Row) -> str:
+    """What ended a row: the reason that its integrator gives, or its outcome and how far it came."""
+    if row.outcome == FAILED:
+        return row.reference.reason
+    stopped = f"at t = {short(row.time_reached)} of {short(row.horizon)}"
+    return f"{row.outcome}, {row.reference.reason if row.outcome in UNMEASURED else stopped}"
+
+
+def line(change: Change) -> str:
+    """What happened to one row, in a few words: digits lost or gained, else its largest change for the worse."""
+    worst = max(change.findings, key=lambda each: (-RANK.index(each.verdict), change.decades(each) or -math.inf))
+    if not worst.metric:
+        return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
+    digits, count = change.digits, len(list(folded(change)))
+    more = f"; {_count(count, 'quantity', 'quantities')} changed" if count > 1 else ""
+    better = change.verdict is Verdict.BETTER
+    if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
+        return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
+    said = f"{clip(worst.metric, 40)} {short(worst.baseline or '-')} → {short(worst.candidate or '-')}"
+    if worst.of == "series":
+        said = clip(worst.metric, 40)
+    return said + (f", {worst.reason}" if worst.reason else "") + more
+
+
+def folded(change: Change) -> Iterator[tuple[str, list[Finding]]]:
+    """The findings of a row by quantity, largest, rms, last value and series of one thing together; worst first."""
+    together: dict[tuple[Verdict, str], list[Finding]] = {}
+    for finding in change.findings:
+        quantity = change.about(finding)
+        name = quantity.text if quantity else finding.name if finding.of == "series" else finding.metric
+        together.setdefault((finding.verdict, name), []).append(finding)
+    for (_, name), findings in together.items():
+        yield name or "whole row", findings
+
+
+def statistics(change: Change, name: str, findings: Sequence[Finding]) -> str:
+    """Which statistics of a quantity changed: ``drift_energy: max, rms, series``."""
+    measured = ((each, change.measured(each)) for each in findings)
+    parts = ("series" if each.of == "series" else found.statistic if found else "" for each, found in measured)
+    said = ", ".join(part for part in parts if part)
+    return f"{name}: {said}" if said else name
+
+
+def _without_samples(row: Row | None) -> Row | None:
+    """A row whose series say only what they are about: sentences need no more, and they are most of its size."""
+    if row is None or not row.series:
+        return row
+    series = {name: Series([], [], each.quantity) for name, each in row.series.items()}
+    return msgspec.structs.replace(row, series=series)
+
+
+def _count(number: int, one: str, many: str = "") -> str:
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def _digits(row: Row | None) -> float | None:
+    """Digits right, or those of the largest error where a row has no relative one."""
+    if row is None:
+        return None
+    if (kept := digits_kept(row)) is not None:
+        return kept
+    error = row.metrics.get(ERRORS[0].text)
+    return None if error is None or error.log10 is None else -error.log10
+
+
+def _curve(row: Identity) -> tuple[str, str, str]:
+    """Case, integrator and format: what the settings of one work-precision curve share."""
+    return row.case, row.key.subject.name, row.key.precision
+
+
+def _where(row: Identity, at: bool = True) -> str:
+    """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
+    key = row.key
+    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, key.precision) if part)
+    end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
+    return f"{_case(row)}{end} ({inside})"
+
+
+def _case(row: Identity) -> str:
+    return clip(f"{row.key.case}/{row.key.direction}" if row.key.direction else row.key.case, 40)
+
+
+def _on(rows: Sequence[Identity]) -> str:
+    """`` on lagrange at T = 100 (...)`` of one row; of several the first."""
+    return f"{', first' if len(rows) > 1 else ''} on {_where(rows[0])}"
+
+
+def _whose(rows: Sequence[Identity]) -> str:
+    """`` of mine:rk4, mine:rk5``."""
+    names = list(dict.fromkeys(clip(row.key.subject.name, 40) for row in rows))
+    return f" of {', '.join(names[:3])}" + (" and others" if len(names) > 3 else "") if names else ""
+
+
+def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
+    """By how much the order that single steps or refined settings show moved, the largest change of each integrator."""
+    largest: dict[str, tuple[float, Sentence]] = {}
+    for name, moved, sentence in chain(_orders_of_steps(changes), _orders_of_settings(changes)):
+        if name not in largest or abs(moved) > abs(largest[name][0]):
+            largest[name] = moved, sentence
+    yield from sorted(largest.values(), key=lambda each: each[0])
+
+
+def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
+    """Integrator, change and sentence, of the order that single steps show."""
+    for change in changes.rows:
+        metrics = [change.metric(row, ORDER.text) for row in (change.old, change.new)]
+        before, after = (math.nan if metric is None else float(metric) for metric in metrics)
+        if abs(after - before) > 0:
+            said = f"Order observed {before:g} → {after:g} in single steps on {_where(change.identity, at=False)}."
+            yield change.identity.key.subject.name, after - before, Sentence(said, frozenset({change.identity}))
+
+
+def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
+    """The same of −Δ log error/Δ log steps between one setting and the next finer one."""
+    changed: dict[tuple[str, str, str], set[Identity]] = {}
+    for row in (change.identity for change in changes.rows):
+        changed.setdefault(_curve(row), set()).add(row)
+    for key, rows in changed.items():
+        _, name, precision = key
+        for coarse, fine in pairwise(sorted(changes.points.get(key, []))):
+            spans = [b - a for a, b in zip(coarse.steps, fine.steps, strict=True)]
+            if min(spans) > 0:
+                falls = [a - b for a, b in zip(coarse.errors, fine.errors, strict=True)]
+                before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
+                if abs(after - before) >= _ORDER_MOVED:
+                    steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
+                    where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
+                    said = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
+                    yield name, after - before, Sentence(said, frozenset(rows))
+
+
+def _explained(changes: Changes) -> Iterator[Sentence]:
+    """What explains the states that are far off now and were not: of each integrator what explains most rows."""
+    found: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
+    for change in changes.worst_first:
+        new, old = (each.explained if each else msgspec.UNSET for each in (change.new, change.old))
+        if new and (not old or old.kind != new.kind):
+            kinds = found.setdefault(change.identity.key.subject.name, {})
+            kinds.setdefault(new.kind, []).append((new.text, change.identity))
+    for kinds in found.values():
+        cases = max(kinds.values(), key=len)
+        (text, first), also = cases[0], len(cases) - 1
+        more = f" and {_count(also, 'other row')}" if also else ""
+        seen = f" Seen on {_where(first)}{more}."
+        if len(text) + len(seen) > _LONGEST:
+            text = clip(text, _LONGEST - len(seen) - _CLIPPED)
+        yield Sentence(text + seen, frozenset(row for _, row in cases))
+
+
+def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence]:
+    """Rows that failed, cannot be compared, are missing or new: one sentence for what became of them, its commonest
+    reason named.
+    """
+    found: dict[str, list[tuple[str, Change]]] = {}
+    for change in rows:
+        if change.verdict in verdicts and not change.findings[0].metric:
+            became, reason = _became(change)
+            found.setdefault(became, []).append((reason, change))
+    for became, cases in found.items():
+        reason, _ = Counter(reason for reason, _ in cases).most_common(1)[0]
+        cases.sort(key=lambda case: case[0] != reason)
+        named = [change.identity for _, change in cases]
+        whose, on = _whose(named), _on(named) if became in _NAMED else ""
+        said = f"{_count(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}{on}"
+        yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
+
+
+_NAMED = ("failed", "stop earlier", "are worse", "are better")
+"""What became of rows where the sentence says of which."""
+_SINGULAR = {
+    "are missing": "is missing",
+    "are new": "is new",
+    "are better": "is better",
+    "are worse": "is worse",
+    "stop earlier": "stops earlier",
+    "are no longer supported": "is no longer supported",
+}
+
+
+def _became(change: Change) -> tuple[str, str]:
+    """What became of a row as a whole, and why."""
+    if change.verdict is Verdict.MISSING:
+        return "are missing", ""
+    if change.verdict is Verdict.NEW:
+        return "are new", ""
+    if change.new is None or change.new.outcome == "success":
+        became = {Verdict.BETTER: "are better", Verdict.WORSE: "are worse"}
+        return became.get(change.verdict, "cannot be compared"), change.findings[0].reason
+    if change.new.outcome == UNSUPPORTED:
+        return "are no longer supported", change.new.reference.reason
+    if change.old is None or change.old.outcome == "success":
+        return "failed", _why(change.new)
+    return ("stop earlier" if change.verdict is Verdict.WORSE else "failed in both reports"), _why(change.new)
+
+
+def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
+    """Digits right: the largest change of each integrator, and on how many other rows they moved the same way."""
+    sign = -1.0 if Verdict.BETTER in verdicts else 1.0
+    moved = [c for c in rows if c.findings[0].metric and c.digits is not None and sign * c.lost >= _DIGITS_MOVED]
+    for changes in _by_integrator(moved):
+        worst = max(changes, key=lambda change: (sign * change.lost, change.identity.case))
+        assert worst.digits is not None
+        old, new = map(digits_text, worst.digits)
+        also = len(changes) - 1
+        more = f", {'fewer' if sign > 0 else 'more'} on {_count(also, 'other row')} too" if also else ""
+        if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
+            more += "; the last state is as it was: errors are between steps, of the dense output"
+        yield Sentence(
+            f"Digits right {old} → {new} on {_where(worst.identity)}{more}.", frozenset(c.identity for c in changes)
+        )
+
+
+def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
+    """Other steps at the same setting: the largest change of each integrator."""
+    moved = [c for c in rows if c.old is not None and c.new is not None and c.old.steps and c.new.steps]
+    moved = [c for c in moved if abs(_steps(c)) > _STEPS_MOVED]
+    for changes in _by_integrator(moved):
+        most = max(changes, key=lambda change: abs(_steps(change)))
+        assert most.old is not None
+        assert most.new is not None
+        text = f"Steps {most.old.steps} → {most.new.steps} at the same setting on {_where(most.identity)}."
+        yield Sentence(text, frozenset(change.identity for change in changes))
+
+
+def _steps(change: Change) -> float:
+    """log10 of by how much the steps grew."""
+    assert change.old is not None
+    assert change.new is not None
+    return math.log10(change.new.steps / change.old.steps)
+
+
+def _ends_as_before(change: Change) -> bool:
+    """Whether of a computed row whose digits fell the last state is as right as it was: a file says nothing of steps."""
+    computed = change.old is not None and change.old.key.subject.what == "computed"
+    moved = [] if change.old is None or not computed else [change.decades_of(name) for name in _finals(change.old)]
+    return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
+
+
+def _finals(row: Row) -> list[str]:
+    """The metrics of the error at the last sample."""
+    found = ((name, metric.quantity) for name, metric in row.metrics.items())
+    return [name for name, q in found if q and q.name in _DIGITS and q.statistic == "final"]
+
+
+def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
+    """Growth laws that moved: one sentence for each quantity and integrator, the first motion named."""
+    found: dict[tuple[str, str, str], list[Change]] = {}
+    for change in rows:
+        for finding in change.findings:
+            laws = [None if row is None else row.laws.get(finding.name) for row in (change.old, change.new)]
+            if finding.of == "growth" and finding.verdict in verdicts and None not in laws:
+                old, new = (law for law in laws if law is not None)
+                said = _law_moved(old, new, finding.reason)
+                found.setdefault(
+                    (change.identity.key.subject.name, _quantity(old.quantity, finding.name), said), []
+                ).append(change)
+    for (_, what, said), changes in found.items():
+        also = f" and {_count(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
+        text = f"The {what} {said} on {_where(changes[0].identity, at=False)}{also}."
+        yield Sentence(text, frozenset(change.identity for change in changes))
+
+
+def _law_moved(old: Law, new: Law, reason: str) -> str:
+    """``grows like t (was t^0.5)``; of the same class its exponent and why it counts."""
+    if old.growth != new.growth:
+        return f"grows {_GROWS.get(new.growth, f'like {new.growth}')} (was {_GROWS.get(old.growth, old.growth)})"
+    exponents = [f"{law.exponent:.3g}" for law in (old, new) if law.exponent is not None]
+    return f"grows with exponent {' → '.join(exponents) or '?'}: {reason}"
+
+
+def _quantity(quantity: Quantity | None, name: str) -> str:
+    """``error along the flow``, ``drift of the energy``; the key where it has no words."""
+    if quantity is None:
+        return clip(name, 60)
+    what = _WORDS.get(quantity.name, quantity.name.replace("_", " "))
+    component = quantity.component
+    return f"{what} {_COMPONENTS.get(component, component.replace('_', ' '))}".strip()
+
+
+def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
+    """Drifts, escape times, errors of steps, seconds: the largest change of each quantity and integrator."""
+    found: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
+    for change in rows:
+        for _, findings in folded(change):
+            worst, quantity = findings[0], change.about(findings[0])
+            if worst.verdict in verdicts and not _told_elsewhere(change, worst, quantity):
+                name = quantity.name if quantity else worst.name
+                size = change.decades(worst) or 0.0
+                found.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
+    for cases in sorted(found.values(), key=lambda cases: -max(size for size, _, _ in cases)):
+        _, change, finding = max(cases, key=lambda case: case[0])
+        what = _quantity(change.about(finding), finding.metric)
+        values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
+        if finding.of == "series":
+            values = " at its samples"
+        why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
+        together = frozenset(c.identity for _, c, _ in cases)
+        also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
+        coarser = {changes.coarser(c) for _, c, _ in cases} if Verdict.WORSE in verdicts else {""}
+        below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
+        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
+
+
+def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
+    """Whether other sentences say it: whole rows, laws, orders, and what the digits right sum up."""
+    if not finding.metric or finding.of == "growth" or finding.metric == ORDER.text:
+        return True
+    if change.digits is None or abs(change.lost) < _DIGITS_MOVED:
+        return False
+    return finding.of == "series" or (quantity is not None and quantity.name in _DIGITS)
+
+
+def _by_integrator(changes: Sequence[Change]) -> Iterator[list[Change]]:
+    def name(change: Change) -> str:
+        return change.identity.key.subject.name
+
+    for _, group in groupby(sorted(changes, key=name), name):
+        yield list(group)

@@ -1,0 +1,449 @@
+"""How much of a noise band a comparison allows, and when a candidate is noisier by more than chance.
+
+What is allowed comes from the baseline: a candidate must not excuse itself.  And a band is rounding noise or it is no
+band: reruns that part by more than rounding makes of them excuse nothing.
+
+A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
+wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
+everything) in 175,000 pairs: `benchmarks/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Sequence
+from fnmatch import translate
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from heavytop.errors import InputError, invalid
+from heavytop.files import read_whole
+from heavytop.precision import exact, log10, physical
+from heavytop.records import Metric, Quantity, Row
+from heavytop.report.document.kind import ReportedKind
+from heavytop.top.amplification import FOLLOWED, amplification, rate
+from heavytop.top.equations import Parameters, System, holding, largest, system
+from heavytop.top.heavy_top import HeavyTop, State
+
+# When two numbers count as the same: defaults, or a TOML file of rules.  docs/compare.md shows every key.
+
+
+BITS = math.log10(2)
+"""Decades in one bit."""
+_LOSS = 2 * BITS
+"""By how much an error may grow where the policy does not say."""
+_TENTH = math.log10(1.1)
+"""The same of an error that is truncation, which every machine makes the same."""
+_REMEDY = "`heavytop docs compare` shows every key of a policy."
+
+
+class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What one metric may do.  Numbers are exact text or TOML numbers; unset ones are taken from the whole policy.
+
+    floor: errors below floor·eps of the row's format are all the same.
+    loss_bits or loss_digits: an error may grow by that much; where neither is given by 2 bits, one of truncation by a
+    tenth.
+    noise: and by that many times its noise band, where the rows hold one; 0 for no band.
+    duration: a duration may shrink by that fraction.  value: a value that must agree may be off by that fraction.
+    """
+
+    floor: str | float | None = None
+    loss_bits: str | float | None = None
+    loss_digits: str | float | None = None
+    noise: str | float | None = None
+    duration: str | float | None = None
+    value: str | float | None = None
+
+    def __post_init__(self) -> None:
+        if self.loss_bits is not None and self.loss_digits is not None:
+            raise InputError("A policy gives both loss_bits and loss_digits.", "Give one of them.")
+        for name in ("floor", "loss_bits", "loss_digits", "noise", "duration", "value"):
+            if (given := getattr(self, name)) is not None:
+                _not_negative(name, given)
+
+
+class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An allowance for the metrics whose measure, case and name match these glob patterns; the first match counts.
+
+    ignore: such metrics are left out.  limit: an error above it is worse, a duration below it too, whatever was before.
+    """
+
+    measure: str = "*"
+    case: str = "*"
+    metric: str = "*"
+    ignore: bool = False
+    limit: str | float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for pattern in (self.measure, self.case, self.metric):
+            glob(pattern)
+        if self.limit is not None:
+            _not_negative("limit", self.limit)
+
+
+class Timings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Seconds compare never, between runs of one machine, or always.  They may grow by ``ratio``; below ``floor``
+    seconds all are the same.
+
+    Those of a plan with ``timings = true`` compare wherever processor and versions agree, without a floor.
+    """
+
+    compare: Literal["never", "same-machine", "always"] = "never"
+    ratio: float = 1.5
+    floor: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.ratio) and self.ratio >= 1):
+            raise InputError(f"timings ratio = {self.ratio} is not 1 or more.", _REMEDY)
+        _not_negative("timings floor", self.floor)
+
+
+class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The allowance of every metric that no rule is about, and the rules.
+
+    flags: whether rows whose flags changed are incomparable.
+    suspicious_digits: a gain of more than that many digits is better, and marked as one to look into.
+    """
+
+    floor: str | float | None = 4
+    loss_bits: str | float | None = None
+    noise: str | float | None = 2
+    duration: str | float | None = 0.05
+    value: str | float | None = 1e-6
+    suspicious_digits: float = 3
+    flags: Literal["incomparable", "ignore"] = "incomparable"
+    timings: Timings = msgspec.field(default_factory=Timings)
+    rule: tuple[Rule, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _not_negative("suspicious_digits", self.suspicious_digits)
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """The numbers that decide about one metric, in decades: log10 of the floor in eps, allowed loss, the same of an
+    error that is truncation, factor of the band; fractions of durations and values; log10 of the limit; ignored or not.
+    """
+
+    floor: float
+    loss: float
+    truncation: float
+    noise: float
+    duration: float
+    value: float
+    limit: float | None = None
+    ignore: bool = False
+
+
+class Lookup:
+    """The limits of each metric of a policy, each worked out once."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self._patterns = [(glob(r.measure), glob(r.case), glob(r.metric)) for r in policy.rule]
+        self._of_rule = [_limits(rule, policy) for rule in policy.rule]
+        self._of_rest = _limits(Rule(), policy)
+        self._found: dict[tuple[tuple[int, ...], str], Limits] = {}
+
+    def row(self, measure: str, case: str) -> tuple[int, ...]:
+        """The rules that are about a row."""
+        return tuple(
+            index for index, (m, c, _) in enumerate(self._patterns) if m.fullmatch(measure) and c.fullmatch(case)
+        )
+
+    def metric(self, rules: tuple[int, ...], name: str) -> Limits:
+        """The limits of a metric in a row that these rules are about."""
+        if not rules:
+            return self._of_rest
+        key = rules, name
+        if key not in self._found:
+            first = next((i for i in rules if self._patterns[i][2].fullmatch(name)), None)
+            self._found[key] = self._of_rest if first is None else self._of_rule[first]
+        return self._found[key]
+
+
+def load(path: Path) -> Policy:
+    """The policy in a TOML file; raises InputError for a key that is unknown, a negative number, an empty pattern."""
+    try:
+        return msgspec.convert(tomllib.loads(read_whole(path).decode("utf-8")), Policy)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"The policy {str(path)[:200]} cannot be read: {reason}.", "Give a TOML file.") from None
+    except InputError as error:
+        raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
+    except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"The policy {path} is not valid: {invalid(error)}.", _REMEDY) from None
+
+
+def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = None) -> Policy:
+    """The policy with another floor or loss for what no rule is about; raises InputError for a negative one."""
+    if floor is not None:
+        policy = msgspec.structs.replace(policy, floor=floor)
+    if loss_bits is not None:
+        policy = msgspec.structs.replace(policy, loss_bits=loss_bits, loss_digits=None)
+    return policy
+
+
+def _limits(rule: Rule, policy: Policy) -> Limits:
+    def number(name: str) -> float:
+        given = getattr(rule, name)
+        return float(exact(getattr(policy, name) if given is None else given))
+
+    digits, bits = rule.loss_digits, rule.loss_bits
+    if digits is None and bits is None:
+        digits, bits = policy.loss_digits, policy.loss_bits
+    if digits is not None:
+        loss = truncation = float(exact(digits))
+    elif bits is not None:
+        loss = truncation = float(exact(bits)) * BITS
+    else:
+        loss, truncation = _LOSS, _TENTH
+    floor = log10(exact(policy.floor if rule.floor is None else rule.floor))
+    limit = None if rule.limit is None else log10(exact(rule.limit))
+    return Limits(
+        -math.inf if floor is None else floor,
+        loss,
+        truncation,
+        number("noise"),
+        number("duration"),
+        number("value"),
+        -math.inf if rule.limit is not None and limit is None else limit,
+        rule.ignore,
+    )
+
+
+def _not_negative(name: str, given: str | float) -> None:
+    if physical(exact(given), name) < 0:
+        shown = f"{given:g}" if isinstance(given, float) else given
+        raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
+
+
+def glob(pattern: str) -> re.Pattern[str]:
+    """A pattern of `*`, `?` and `[...]`; raises InputError for an empty one, or one whose bracket is not closed."""
+    if not pattern or pattern.count("[") > pattern.count("]"):
+        raise InputError(f"{pattern!r} is no glob pattern.", "Use *, ? and [...], such as drift_*_max.")
+    return re.compile(translate(pattern))
+
+
+# The largest error that rounding explains in a row, from the row's own body, start and horizon.
+#
+# The roundings of n steps walk at random, the body turns on meanwhile, and the motion amplifies what there is.  So in
+# units of the quantity an error is rounding noise up to
+#
+#     100 · eps · √max(n, τ) · max(τ, A),    τ = 1 + rate · |horizon|,
+#
+# which is 100 · eps · τ^1.5 on a regular motion followed with one step per unit of its own time, and more by the
+# amplification A (:mod:`heavytop.top.amplification`) beyond τ.  A is computed from the data of the row, only where the
+# rest does not suffice.  The drift of a first integral neither turns on nor is amplified: 100 · eps · √max(n, τ).
+
+
+MARGIN = 2.0
+"""Decades above what the roundings of a run amount to on average."""
+_FASTER = 0.5
+"""A chaotic motion that double does not follow may be amplified faster by such a part than until there."""
+_DRIFT = "drift"
+Motion = tuple[System, Parameters, tuple[Fraction, ...]]
+_RELATIONS = ("hess", "goryachev_chaplygin")
+"""Conserved on one level set alone: the motion amplifies what leaves it."""
+
+
+class RoundingBound:
+    """How large rounding can make the errors of a row, each as log10.
+
+    row: of the side of a comparison that is trusted.  Without body and start its rate counts as 1, and its
+    amplification as what the row itself says.
+    """
+
+    def __init__(self, row: Row, kind: ReportedKind) -> None:
+        self.row = row
+        self.kind = kind
+
+    def explains(self, quantity: Quantity | None, size: float) -> bool:
+        """Whether rounding makes an error of that quantity, or a difference of two, as large as 10^size."""
+        found = MARGIN + (1 - self.row.bits) * BITS + math.log10(self._roundings) / 2 + self._unit(quantity)
+        if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
+            return size <= found
+        found += math.log10(self._turns)
+        if size <= found:
+            return True
+        amplified = min(self._amplified(self.row.horizon), math.log10(self.kind.largest_amplification))
+        return size <= found + max(0.0, amplified - math.log10(self._turns))
+
+    def explains_times(self, time: str, part: float) -> bool:
+        """Whether rounding moves an escape at ``time`` by that part of it.
+
+        An error that grows like the amplification A(t), about e^(rate t), comes to a threshold earlier by ln(100)/rate
+        where it is 100 times as large; one is up to 100 times larger than usual, another as much smaller.
+        """
+        return part * self._amplified(time) <= 2 * MARGIN
+
+    @cached_property
+    def _given(self) -> tuple[HeavyTop, State] | None:
+        data = self.row.data
+        if data is None or not data.omega or not data.gamma:
+            return None
+        try:
+            rotor = _exact(data.rotor) if data.rotor else None
+            top = HeavyTop(_exact(data.inertia), exact(data.weight), _exact(data.centre), rotor)
+            return top, State(_exact(data.omega), _exact(data.gamma))
+        except InputError:
+            return None
+
+    @cached_property
+    def _motion(self) -> Motion | None:
+        if self._given is None:
+            return None
+        try:
+            which = system(self.row.system)
+            return which, which.parameters(*self._given), tuple(self._given[1].flat)
+        except InputError:
+            return None
+
+    @cached_property
+    def _rate(self) -> Fraction:
+        return Fraction(1) if self._motion is None else rate(*self._motion)
+
+    @cached_property
+    def _turns(self) -> float:
+        return 1 + float(min(self._rate * abs(exact(self.row.horizon)), Fraction(10**300)))
+
+    @property
+    def _roundings(self) -> float:
+        return max(self._turns, float(self.row.steps))
+
+    def _amplified(self, horizon: str) -> float:
+        """log10 of A up to a time."""
+        if self._motion is None:
+            return math.log10(self.row.amplification or 1.0)
+        found = math.log10(amplification(*self._motion, exact(horizon)))
+        return found + _FASTER * max(0.0, found - math.log10(FOLLOWED))
+
+    def _unit(self, quantity: Quantity | None) -> float:
+        """log10 of the size of a quantity along the motion."""
+        turning = max(math.log10(self._rate) if self._rate else 0.0, 0.0)
+        if quantity is None or self._motion is None:
+            return turning
+        if quantity.name == _DRIFT:
+            return self._integral(quantity.component)
+        if quantity.component == "omega":
+            return math.log10(self._rate) if self._rate else 0.0
+        return 0.0 if quantity.component == "gamma" else turning
+
+    def _integral(self, name: str) -> float:
+        """log10 of the size of the terms of a first integral."""
+        assert self._motion is not None
+        assert self._given is not None
+        which, p, _ = self._motion
+        found = next((each for each in holding(*self._given, which) if each.name == name), None)
+        size = Fraction(0) if found is None else largest(found, p, self._rate)
+        return (log10(size) or 0.0) if size else 0.0
+
+
+def _exact(texts: Sequence[str]) -> tuple[Fraction, ...]:
+    return tuple(map(exact, texts))
+
+
+_BY_CHANCE = 1.4
+"""One rerun in ten has a band wider by more than that: further, a candidate's own band is not allowed for."""
+_LEAST = 0.05
+"""Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
+_LEAST_LOST = 0.3
+"""The same where the motion loses all digits before the end: its errors are as large as it is, and a rerun that comes
+near the motion again by chance makes the band."""
+STEP_CONTROL = 1.2
+"""Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error
+by that at most; reruns that are no further apart are reproducible, whatever their size."""
+
+
+def allowed_loss(old: Metric, new: Metric) -> float:
+    """Half-width in decades of the 95 % interval of the ratio, for a change to the worse.
+
+    Both bands in quadrature, that of the candidate no wider than 1.4 times that of the baseline.
+    """
+    band = old.band or 0.0
+    return math.hypot(band, min(_BY_CHANCE * band, new.band or 0.0))
+
+
+def allowed_gain(old: Metric, new: Metric) -> float:
+    """The same for a change to the better, with both bands as they are."""
+    return math.hypot(old.band or 0.0, new.band or 0.0)
+
+
+def of_starts(metric: Metric, row: Row) -> Metric:
+    """The metric with its band; over n starts no wider than ½ log10 n, by which one of them can raise a RMS."""
+    widest = math.log10(row.starts) / 2
+    if row.starts == 1 or metric.band is None or metric.band <= widest:
+        return metric
+    return msgspec.structs.replace(metric, band=widest)
+
+
+def seldom_apart(band: float | None) -> bool:
+    """Whether reruns with that band are so close together that nothing need be asked about them."""
+    return band is None or math.sqrt(2) * band <= STEP_CONTROL
+
+
+def irreproducible(metric: Metric, least: float, bound: RoundingBound | None) -> str:
+    """Why the band of a metric is no rounding noise; "" where it is.
+
+    least: log10 of what the error counts as at least.  bound: None for a band that does not come from reruns.
+    """
+    if bound is None or not metric.band or metric.log10 is None:
+        return ""
+    gap = math.sqrt(2) * metric.band
+    if metric.kind == "duration":
+        noise = bound.explains_times(metric.value, 10**gap - 1)
+    else:
+        noise = seldom_apart(metric.band) or bound.explains(metric.quantity, apart(max(metric.log10, least), gap))
+    return "" if noise else f"not reproducible within rounding: {gap:.2g} decades between reruns"
+
+
+def apart(size: float, gap: float) -> float:
+    """log10 of 10^(size + gap) − 10^size."""
+    return size + gap + math.log10(-math.expm1(-gap * math.log(10))) if gap > 0 else -math.inf
+
+
+def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: float) -> bool:
+    """Whether value and band of the candidate together exceed those of the baseline: only then its noise matters.
+
+    What the value itself has gained, the noise may take of it, up to the allowed loss.
+    """
+    if new.kind == "value":
+        return True
+    if new.kind == "duration":
+        ends = [-math.inf if m.log10 is None else m.log10 - (m.band or 0.0) for m in (old, new)]
+        return ends[1] < ends[0]
+    before, after = (max(_size(m), floor) for m, floor in zip((old, new), least, strict=True))
+    spared = min(loss, max(0.0, before - after))
+    return after + (new.band or 0.0) > before + (old.band or 0.0) + spared
+
+
+def noisier(kind: ReportedKind, old: Metric, new: Metric, lost: bool = False) -> bool:
+    """Whether the candidate's band is wider than the baseline's by more than chance.
+
+    lost: whether the motion has lost all significant digits before the end.
+    """
+    if old.band is None or new.band is None or new.band <= old.band:
+        return False
+    factor = kind.noise_factor or 1.0
+    if not kind.noise_is_added(old):
+        return new.band > factor * max(old.band, _LEAST_LOST if lost else _LEAST)
+    # in decades such noise is as much wider as the number is smaller
+    return _added(new) > _added(old) + math.log10(factor)
+
+
+def _size(metric: Metric) -> float:
+    return -math.inf if metric.log10 is None else metric.log10
+
+
+def _added(metric: Metric) -> float:
+    """log10 of how far the noise moves a number, in its own unit; -inf where there is none."""
+    if metric.log10 is None:
+        return -math.inf
+    return math.log10(10 ** max(metric.band or 0.0, _LEAST / 10) - 1) + metric.log10

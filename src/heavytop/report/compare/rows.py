@@ -1,0 +1,608 @@
+"""One row of a baseline against the same row of a candidate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator
+from fractions import Fraction
+from statistics import median
+from typing import Any, Literal
+
+import msgspec
+
+from heavytop.measure.growth import BENT, CLASSES, Interval
+from heavytop.measure.rounding_noise import least
+from heavytop.measure.scalar import UNRESOLVED
+from heavytop.precision import exact, log10
+from heavytop.records import NOISE, NOT_MEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.report.compare.noise import (
+    BITS,
+    Limits,
+    Lookup,
+    Policy,
+    RoundingBound,
+    allowed_loss,
+    apart,
+    irreproducible,
+    noisier,
+    of_starts,
+    reaches_further,
+    seldom_apart,
+)
+from heavytop.report.compare.verdicts import (
+    BAND,
+    MISSING,
+    NAN,
+    SAME,
+    SUCCESS,
+    Judged,
+    Verdict,
+    beyond_limit,
+    judge,
+    judge_outcomes,
+    judge_repeated,
+    judge_seconds,
+    size,
+    weaker,
+)
+from heavytop.report.document.kind import Kinds, kind_of
+from heavytop.report.store.checks import contradictions, inconsistent, interval_of, law_text, log_size, other_data
+
+# Laws of growth in a comparison: whether one can be, and one against another.
+
+
+_GROWTH = (*CLASSES, "exponential")
+_WIDER = 5.0
+"""The interval of a rerun may be wider by that factor: of 1,400 pairs of ensembles of 16 starts, none is by 4.2."""
+_SPAN = 2.0
+"""The fitted span of a rerun may begin later, or end earlier, by that factor."""
+_DETECTS = math.log10(8)
+"""Decades.  The smallest detectable fault of a rerun is larger by a factor of 6.6 at most, in the same pairs."""
+_BY_CHANCE = 1.4
+"""Of a rerun the interval counts as no wider than that of the baseline by this factor, as its noise bands do."""
+_APART = 0.1
+"""Exponents of two reruns are apart by that part of the width of the baseline's interval: of the dozens of laws in a
+report some intervals just do not meet.  Figures: docs/compare.md."""
+_BENDS_APART = 0.5
+"""The same of bends, each the difference of two exponents over half of the span."""
+_LOST_AT = 0.3
+"""Decades by which the time of the last digit may come earlier, beyond what the noise of the error itself makes it."""
+
+
+def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Judged:
+    """A change of class is a change; within a class, exponents or bends whose intervals do not meet.
+
+    A law that is resolved in one report only is judged as within a class: of two ensembles of one motion one may bend
+    by a little more than a law may.  What it says less of than the other is judged too.
+    noise: decades by which noise alone may move the error that the law is about.
+    rerun: whether the two are of two runs.  Intervals that just do not meet may then be chance, and so may two classes
+    with exponents half way between them; of one and the same series they are not.
+    """
+    for law in (old, new):
+        if problem := inconsistent(law):
+            return Verdict.INCOMPARABLE, problem
+    if old.growth != new.growth:
+        if "unresolved" not in (old.growth, new.growth) and not (rerun and _between_classes(old, new)):
+            worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
+            return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
+        if "exponential" in (old.growth, new.growth) or None in (old.exponent, new.exponent):
+            return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
+    if new.starts < old.starts:
+        return Verdict.INCOMPARABLE, f"{old.starts} starts against {new.starts}"
+    for judged in (_exponents(old, new, rerun), _bends(old, new, rerun)):
+        if judged[0] is not Verdict.SAME:
+            break
+    if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
+        return judged
+    return _power_of_law(old, new, noise) or judged
+
+
+def _between_classes(old: Law, new: Law) -> bool:
+    """Whether the powers of two laws are so near that each might be of the class of the other."""
+    if "exponential" in (old.growth, new.growth) or old.exponent is None or new.exponent is None:
+        return False
+    return abs(new.exponent - old.exponent) <= BENT
+
+
+def _exponents(old: Law, new: Law, rerun: bool) -> Judged:
+    if old.exponent is None or new.exponent is None:
+        known = old.exponent is not None or new.exponent is not None
+        return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
+    if old.low is not None and new.low is not None:
+        return _apart("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _APART)
+    (low, high), (new_low, new_high) = interval_of(old), interval_of(new)
+    if new_low > high or new_high < low:
+        return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
+    return SAME
+
+
+def _bends(old: Law, new: Law, rerun: bool) -> Judged:
+    """Where the class of one alone is known: of two laws of a class neither bends by more than a law may."""
+    if "unresolved" not in (old.growth, new.growth) or old.growth == new.growth:
+        return SAME
+    if old.bend is None or new.bend is None:
+        return Verdict.INCOMPARABLE, "the growth is resolved in one report only, and how it bends is not known of both"
+    return _apart("bend towards the end", old.bend, new.bend, sum(new.bend) / 2, rerun, _BENDS_APART)
+
+
+def _apart(what: str, old: Interval, new: Interval, middle: float, rerun: bool, gap: float) -> Judged:
+    """Two intervals, that of the candidate about ``middle``, which counts as no wider than that of the baseline.
+
+    One that is wider by more than chance is worse.  Those of a rerun are apart by ``gap`` widths of the baseline's.
+    """
+    width, own = (interval[1] - interval[0] for interval in (old, new))
+    part = min(1.0, (_BY_CHANCE if rerun else 1.0) * width / own) if own > 0 else 1.0
+    low, high = (middle + (end - middle) * part for end in new)
+    least = gap * width if rerun else 0.0
+    if low - old[1] > least:
+        return Verdict.WORSE, f"a larger {what}"
+    if old[0] - high > least:
+        return Verdict.BETTER, f"a smaller {what}"
+    if own > _WIDER * width:
+        return Verdict.WORSE, f"noise: the interval of the {what} is {own:.2g} wide, not {width:.2g}"
+    return SAME
+
+
+def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
+    """What the law of the candidate says less of: its detection power, its span, the time of the last digit."""
+    for name in ("first", "last", "detects"):
+        if getattr(old, name) is not None and getattr(new, name) is None:
+            return Verdict.INCOMPARABLE, f"the law no longer says {name}"
+    spans = [_log(law.first) - _log(law.last) for law in (old, new)]
+    if _log(new.last) < _log(old.last) - math.log10(_SPAN) or spans[1] > spans[0] + math.log10(_SPAN):
+        return Verdict.INCOMPARABLE, f"fitted from {new.first} to {new.last}, not from {old.first} to {old.last}"
+    if _log(new.detects) > _log(old.detects) + max(_DETECTS, noise):
+        return Verdict.WORSE, f"detects a fault of {new.detects} a step, not of {old.detects}"
+    if "unresolved" in (old.growth, new.growth) and None in (old.lost_at, new.lost_at):
+        return None  # it is not extrapolated
+    if "unresolved" not in (old.growth, new.growth) and old.growth != new.growth:
+        return None  # extrapolated by two powers
+    if new.lost_at is not None:
+        power = CLASSES.get(new.growth, math.inf)
+        earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)
+        if earlier > _LOST_AT + (noise / power if power else 0.0):
+            before = old.lost_at or "any"
+            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
+    elif old.lost_at is not None:
+        return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
+    return None
+
+
+def _log(text: str | None) -> float:
+    """log10 of decimal text; 0 for none, -inf for 0."""
+    if text is None:
+        return 0.0
+    found = log10(exact(text))
+    return -math.inf if found is None else found
+
+
+# One series of a baseline against the same series of a candidate.
+
+
+_NO_NUMBER = (NAN, MISSING)
+_LOST_SHARE = 10
+"""One in so many samples, and two, may no longer be resolved."""
+
+
+def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly: bool) -> Judged:
+    """The same samples, as many of them numbers, and no larger: single samples are noise, their median is not.
+
+    allowed: decades by which the median of the ratios may grow, or where the series must agree ``exactly`` the part of
+    its largest value by which each may be off.  floor: log10 below which all errors are the same.
+    """
+    if old.times != new.times and list(map(exact, old.times)) != list(map(exact, new.times)):
+        return Verdict.INCOMPARABLE, "other times"
+    pairs = list(zip(old.values, new.values, strict=True))
+    if any(b == NAN and a not in _NO_NUMBER for a, b in pairs):
+        return Verdict.WORSE, "a value is no longer a number"
+    if any(b == MISSING and a not in _NO_NUMBER for a, b in pairs):
+        return Verdict.INCOMPARABLE, "a value is no longer measured"
+    lost = sum(b == UNRESOLVED != a for a, b in pairs)
+    if lost > 2 + len(pairs) / _LOST_SHARE:
+        return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"
+    numbers = [pair for pair in pairs if not {*pair} & {*_NO_NUMBER, UNRESOLVED}]
+    if not numbers:
+        return SAME
+    if exactly:
+        values = [(exact(a), exact(b)) for a, b in numbers]
+        most = Fraction(allowed) * max(abs(a) for a, _ in values)
+        off = any(abs(b - a) > most for a, b in values)
+        return (Verdict.WORSE, "a value that must agree does not") if off else SAME
+    grown = median(max(log_size(b), floor) - max(log_size(a), floor) for a, b in numbers)
+    return (Verdict.WORSE, f"{grown / BITS:.1f} bits lost at half of the samples") if grown > allowed else SAME
+
+
+_STEPS = 2
+"""The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
+another method."""
+_ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
+
+
+class Finding(msgspec.Struct, frozen=True, gc=False):
+    """One metric of one row: verdict, the two values as text, and why.
+
+    name: of the metric, "" for a whole row.  of: "" for a metric, series, growth for the law of one, seconds for a
+    timing.  slight: a loss of truncation that is allowed of other errors.
+    """
+
+    row: Identity
+    name: str
+    verdict: Verdict
+    baseline: str | None
+    candidate: str | None
+    reason: str = ""
+    of: Literal["", "series", "growth", "seconds"] = ""
+    slight: bool = False
+
+    @property
+    def metric(self) -> str:
+        """What policies and other programs call it: ``drift_energy_max``, ``growth drift_energy``."""
+        return f"{self.of} {self.name}".lstrip()
+
+    @property
+    def method(self) -> tuple[str, str]:
+        """Whose it is: the integrator and its format."""
+        return self.row.key.subject.name, self.row.key.precision
+
+    def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
+        """The finding; where it is slight and its integrator gained more than that, the same."""
+        if not self.slight or self.method not in mended:
+            return self
+        return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
+
+    @property
+    def timing(self) -> bool:
+        """Whether it is about seconds."""
+        return self.of == "seconds"
+
+    def to_json(self) -> dict[str, Any]:
+        """The row of `compare --json`."""
+        return self.row.named | {
+            "metric": self.metric,
+            "verdict": self.verdict.value,
+            "baseline": self.baseline,
+            "candidate": self.candidate,
+            "reason": self.reason,
+        }
+
+
+class RowComparison:
+    """Compares rows under one policy.
+
+    timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
+    list_same: False to count what plainly stayed the same, in :attr:`same`.
+    failed: rows of the candidate that failed in both reports, in the same way.
+    checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
+    """
+
+    def __init__(
+        self,
+        policy: Policy,
+        kinds: Kinds,
+        timed: bool,
+        list_same: bool,
+        checked: tuple[bool, bool] = (False, False),
+        repeated: bool = False,
+    ) -> None:
+        self.policy = policy
+        self.kinds = kinds
+        self.list_same = list_same
+        self.checked = checked
+        self.same = 0
+        self.failed: list[Row] = []
+        self.lookup = Lookup(policy)
+        self.timed = timed
+        self.repeated = repeated
+
+    def ignores(self, row: Row) -> bool:
+        """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
+        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.key.kind, row.case), "").ignore
+
+    def limits(self, row: Row, metric: str) -> Limits:
+        """The limits of a metric of a row."""
+        rules = self.lookup.row(row.key.kind, row.case) if self.policy.rule else ()
+        return self.lookup.metric(rules, metric)
+
+    def compare(self, old: Row, new: Row) -> list[Finding]:
+        """All findings about a row that both reports have."""
+        key = old.identity
+        if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
+            return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
+        if (judged := self._outcomes(old, new)) is not None:
+            return [] if self.ignores(old) else [*self._whole(key, old, new, *judged), *self._limits(key, old, new)]
+        if reason := self._incomparable(old, new):
+            if self.ignores(old):
+                return []
+            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+        if new.outcome != SUCCESS and not self.ignores(old):
+            self.failed.append(new)
+        rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
+        found = self._metrics(key, rules, old, new)
+        if old.laws or new.laws:
+            found += self._laws(key, rules, old, new)
+        if old.series:
+            found += self._series(key, rules, old, new)
+        if not self.ignores(old):
+            found += self._row(key, old, new)
+        if self.repeated and BAND in old.seconds:
+            found += self._repeated(key, rules, old, new)
+        elif self.timed:
+            found += self._seconds(key, rules, old, new)
+        return found
+
+    def _whole(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
+        """The finding about a row that is judged by its outcome."""
+        if verdict is Verdict.SAME and new.outcome != UNSUPPORTED:
+            self.failed.append(new)
+        if verdict is Verdict.SAME and not self.list_same:
+            self.same += 1
+            return []
+        return [Finding(key, "", verdict, old.outcome, new.outcome, why)]
+
+    def _outcomes(self, old: Row, new: Row) -> Judged | None:
+        """The verdict of rows of one motion of which one, or both, did not reach the horizon; None else."""
+        if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
+            return None
+        if None not in (old.data, new.data) and other_data(old.data, new.data):
+            return None
+        judged = judge_outcomes(old, new, self.lookup.metric((), "").duration)
+        return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
+
+    def _limits(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+        """What is beyond its limit in a row that has no numbers in the baseline."""
+        if new.outcome == SUCCESS and self.policy.rule:
+            rules = self.lookup.row(old.key.kind, old.case)
+            for name, metric in new.metrics.items():
+                limits = self.lookup.metric(rules, name)
+                if not limits.ignore and (judged := beyond_limit(metric, limits)) is not None:
+                    yield Finding(key, name, judged[0], None, metric.value, judged[1])
+
+    def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
+        loss = self.lookup.metric((), "").truncation
+        found = []
+        for name, metric in old.metrics.items():
+            match = new.metrics.get(name)
+            if (
+                # most metrics of most reports: two numbers that differ by less than they may under every rule
+                not rules
+                and match is not None
+                and metric.log10 is not None
+                and match.log10 is not None
+                and metric.kind == match.kind == "error"
+                and -loss <= metric.log10 - match.log10 <= loss
+                and metric.quantity == match.quantity
+                and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
+                and seldom_apart(metric.band)
+            ):
+                if self.list_same:
+                    found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                else:
+                    self.same += 1
+            elif not (limits := self.lookup.metric(rules, name)).ignore:
+                if match is None:
+                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    continue
+                verdict, why = self._metric(metric, match, limits, old, new)
+                slight = verdict is Verdict.WORSE and self._is_slight(metric, match, limits, old, new)
+                found.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
+        if new.metrics.keys() != old.metrics.keys():
+            found += [
+                Finding(key, name, Verdict.NEW, None, metric.value)
+                for name, metric in new.metrics.items()
+                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
+            ]
+        return found
+
+    def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
+        """The noise of the baseline first, then the values, then the noise of the candidate, which is worse where it is
+        more than chance and reaches further than that of the baseline.
+        """
+        if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
+            return SAME  # both stopped before there was one
+        least_of = least(old.metrics, metric), least(new.metrics, match)
+        kind = kind_of(old, self.kinds)
+        bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
+        if why := irreproducible(metric, least_of[0], bound):
+            return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
+        known, found = of_starts(metric, old), of_starts(match, new)
+        truncated = self._is_truncation(metric, match, old, new)
+        assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
+        noise = assumed if metric.band is None else kind.least_band(old.starts)
+        if noise > (known.band or 0.0):
+            known = msgspec.structs.replace(known, band=noise)
+        eps = self._eps(metric.quantity, old)
+        allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
+        judged = judge(known, found, allowed, eps, self.policy.suspicious_digits, least_of, bound)
+        changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
+        if changed and self._is_by_rounding(metric, match, old):
+            return SAME
+        if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
+            return judged
+        if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
+            return _ANOTHER
+        if metric.band is not None and match.band is None and match.log10 is not None:
+            return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
+        why = irreproducible(match, least_of[1], bound)
+        if not why and noisier(kind, metric, match, bool(old.reference.until)):
+            why = f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+        if why and reaches_further(metric, match, least_of, limits.loss):
+            return Verdict.WORSE, why
+        return judged
+
+    def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        for name in dict.fromkeys((*old.laws, *new.laws)):
+            limits = self.lookup.metric(rules, f"growth {name}")
+            if limits.ignore:
+                continue
+            a, b = old.laws.get(name), new.laws.get(name)
+            judged: Judged
+            if a is None or b is None:
+                judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
+            else:
+                # the same series again has no other roundings, so that another law of it is no chance
+                rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
+                judged = judge_law(a, b, self._noise(name, old, limits), rerun)
+                if judged[0] is Verdict.SAME and a.quantity != b.quantity:
+                    judged = _ANOTHER
+            before, after = (None if law is None else law_text(law) for law in (a, b))
+            yield Finding(key, name, judged[0], before, after, judged[1], "growth")
+
+    def _series(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        """What changed in a series: that of a candidate which is the same is not a finding."""
+        for name, series in old.series.items():
+            limits = self.lookup.metric(rules, f"series {name}")
+            match = new.series.get(name)
+            if limits.ignore or match == series:
+                continue
+            if match is None:
+                before = f"{len(series.values)} samples"
+                yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
+                continue
+            exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
+            allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
+            if not exactly and limits.noise and self._is_series_by_rounding(name, old, new):
+                allowed = math.inf
+            judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
+            if judged[0] is Verdict.SAME and series.quantity != match.quantity:
+                judged = _ANOTHER
+            if judged[0] is not Verdict.SAME:
+                found = [f"{len(each.values)} samples" for each in (series, match)]
+                yield Finding(key, name, judged[0], found[0], found[1], judged[1], "series")
+
+    def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+        """What makes numbers of a row incomparable beside the numbers themselves."""
+        if old.finite and not new.finite:
+            yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
+        if old.steps != new.steps and self.policy.flags != "ignore":
+            few, many = sorted((old.steps, new.steps))
+            if few * _STEPS < many:
+                yield Finding(key, "", Verdict.INCOMPARABLE, str(old.steps), str(new.steps), "other steps")
+        if old.evaluations is not None and self.policy.flags != "ignore":
+            counts = [row.evaluations or 0 for row in (old, new)]
+            if min(counts) * _STEPS < max(counts):
+                before, after = (str(row.evaluations) for row in (old, new))
+                yield Finding(key, "", Verdict.INCOMPARABLE, before, after, "other evaluations of the field")
+        if old.order != new.order and self.policy.flags != "ignore":
+            yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
+        fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
+        needed, found = -(-_samples(old) // fewer), _samples(new)
+        if found < needed:
+            why = "fewer samples: the largest of them is smaller"
+            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{found} samples", why)
+        rounded = old.input_rounding
+        if rounded is not None and new.input_rounding != rounded:
+            eps = exact(2) ** (1 - old.bits)
+            if new.input_rounding is None or exact(new.input_rounding) > max(exact(rounded), eps):
+                why = "the data were rounded by more"
+                yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
+
+    def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        for name in sorted(old.seconds.keys() & new.seconds.keys()):
+            if not self.lookup.metric(rules, f"seconds {name}").ignore:
+                verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
+                before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
+                yield Finding(key, name, verdict, before, after, why, "seconds")
+
+    def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
+        limits = self.lookup.metric(rules, "seconds run")
+        if not limits.ignore:
+            for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
+                before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))
+                yield Finding(key, name, judged[0], before, after, judged[1], "seconds")
+
+    def _incomparable(self, old: Row, new: Row) -> str:
+        """Why two rows cannot be compared; empty where they can."""
+        if reason := self._inconsistent(old, new):
+            return reason
+        if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
+            return f"horizon {old.horizon} against {new.horizon}"
+        if old.bits != new.bits:
+            return f"{old.bits} bits against {new.bits}"
+        if old.starts != new.starts:
+            return f"{old.starts} starts against {new.starts}"
+        if reason := other_data(old.data, new.data):
+            return reason
+        if (old.steps == 0) != (new.steps == 0):
+            return f"{old.steps} steps against {new.steps}"
+        if old.flags != new.flags and self.policy.flags != "ignore":
+            names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
+            return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
+        if old.measured != new.measured:
+            return f"{old.measured or 'nothing'} is measured, and {new.measured or 'nothing'}"
+        return weaker(old.reference, new.reference)
+
+    def _inconsistent(self, old: Row, new: Row) -> str:
+        """What in one of the rows contradicts something else in it."""
+        for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
+            if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
+                return f"the {which} contradicts itself: {problem}"
+        return ""
+
+    def _eps(self, quantity: Quantity | None, row: Row) -> float:
+        """log10 of the eps of a row, or of what its roundings add up to."""
+        return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
+
+    def _is_by_rounding(self, metric: Metric, match: Metric, old: Row) -> bool:
+        """Of a row whose noise was not measured: whether roundings alone make errors as large as either of the two."""
+        if old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
+            return False
+        kind = kind_of(old, self.kinds)
+        largest = max(size(metric), size(match))
+        return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
+
+    def _is_truncation(self, metric: Metric, match: Metric, old: Row, new: Row) -> bool:
+        """Whether two errors differ by truncation: of the same steps, further apart than roundings bring them.
+
+        Where no step is asked for, and reruns have not told what roundings do, evaluations tell that the steps are the
+        same ones: those that step control rejects are counted in them.
+        """
+        kind, subject = kind_of(old, self.kinds), old.key.subject
+        reruns = metric.band is not None and kind.noise_is_reruns(metric)
+        steps = subject.step or (old.steps and (old.evaluations or reruns))
+        if not steps or (old.steps, old.evaluations) != (new.steps, new.evaluations):
+            return False
+        if metric.kind != "error" or metric.log10 is None or match.log10 is None:
+            return False
+        if not (reruns or kind.assumed_band(subject)):
+            return False
+        low, high = sorted((metric.log10, match.log10))
+        return not RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
+
+    def _is_slight(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> bool:
+        """Whether a loss counts as one of truncation alone."""
+        lost = size(match) - size(metric)
+        allowed = lost <= limits.loss and beyond_limit(match, limits) is None
+        return allowed and lost > limits.truncation and self._is_truncation(metric, match, old, new)
+
+    def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
+        """The same of what a series is largest."""
+        pairs = zip(_of_series(name, old, "max"), _of_series(name, new, "max"), strict=False)
+        found = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
+        return bool(found) and all(found)
+
+    def _noise(self, name: str, row: Row, limits: Limits) -> float:
+        """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""
+        bands = [of_starts(metric, row) for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
+        widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
+        return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
+
+
+def _support(old: Row, new: Row) -> tuple[Verdict, str] | None:
+    """The verdict where a row was or is not supported; None where the other was not measured either."""
+    if old.outcome == new.outcome:
+        return Verdict.SAME, ""
+    if new.outcome == UNSUPPORTED:
+        return (Verdict.WORSE, "no longer supported") if old.outcome == "success" else None
+    return (Verdict.BETTER, "now supported") if new.outcome == "success" else None
+
+
+def _samples(row: Row) -> int:
+    """How many samples the largest values of a row are over; at least those of its series, where it does not say."""
+    return row.samples or max((len(series.times) for series in row.series.values()), default=0)
+
+
+def _of_series(name: str, row: Row, *statistics: str) -> list[Metric]:
+    """The metrics of a row that sum up its series of that name."""
+    found = ((metric.quantity, metric) for metric in row.metrics.values())
+    return [metric for q, metric in found if q and q.statistic in statistics and q.over("").text == name]

@@ -1,0 +1,393 @@
+"""One number against another of the same kind: the verdict and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from enum import Enum
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
+from heavytop.precision import exact, log10
+from heavytop.records import (
+    CONTRADICTION,
+    FAILED,
+    OUT_OF_REACH,
+    OUT_OF_TIME,
+    UNMEASURED,
+    UNSUPPORTED,
+    Against,
+    Metric,
+    Row,
+)
+from heavytop.report.compare.noise import (
+    BITS,
+    STEP_CONTROL,
+    Limits,
+    RoundingBound,
+    Timings,
+    allowed_gain,
+    allowed_loss,
+    apart,
+)
+
+_ROUNDED = 2e-6
+"""Two logarithms of six decimals cannot tell a smaller difference."""
+_UNRESOLVED = math.log10(1 + RESOLVED_RADII)
+"""Decades by which the bound of an unresolved error may move with its reference as it was: it is |midpoint| + radius,
+from one radius to eleven."""
+
+
+class Verdict(Enum):
+    """What became of a metric, or of a whole row."""
+
+    SAME = "same"
+    BETTER = "better"
+    WORSE = "worse"
+    MISSING = "missing"
+    NEW = "new"
+    INCOMPARABLE = "incomparable"
+
+
+NAN, MISSING = "nan", "missing"
+"""Words in the place of a number: the value is none, or it was not measured."""
+Judged = tuple[Verdict, str]
+"""A verdict and why."""
+SAME: Judged = (Verdict.SAME, "")
+
+
+def judge(
+    old: Metric,
+    new: Metric,
+    limits: Limits,
+    eps: float,
+    suspicious: float,
+    least: tuple[float, float],
+    bound: RoundingBound | None = None,
+) -> Judged:
+    """Two values of one metric.
+
+    eps: log10 of the format's, or of what its roundings add up to.  suspicious: digits.  least: what an error counts as
+    at least, as log10, in each row.  bound: the most that noise makes of it; None where its band says so by itself.
+    """
+    if old.kind != new.kind:
+        return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
+    if (word := _no_number(old, new, limits)) is not None:
+        return word
+    if old.kind == "error":
+        return _errors(old, new, limits, limits.floor + eps, suspicious, least, bound)
+    if old.kind == "duration":
+        return _durations(old, new, limits, bound)
+    return _values(old, new, limits)
+
+
+def _no_number(old: Metric, new: Metric, limits: Limits) -> Judged | None:
+    """The verdict where a value is not a number in one row or in both; None where both are.
+
+    NaN is worse than any number, and never the same, not even as itself.  What was not measured is incomparable.
+    """
+    if MISSING not in (old.value, new.value) and old.value != new.value:
+        if new.value == NAN:
+            return Verdict.WORSE, "no longer a number"
+        if old.value == NAN:
+            return beyond_limit(new, limits) or (Verdict.BETTER, "now a number")
+    for metric in (old, new):
+        if metric.value in (NAN, MISSING) or (metric.value == UNRESOLVED and old.kind == "error" and not metric.bound):
+            return Verdict.INCOMPARABLE, f"the value is {metric.value}"
+    return None
+
+
+def size(metric: Metric) -> float:
+    """log10 of an error, or of its bound where it is unresolved; -inf for 0 and for words such as nan."""
+    return -math.inf if metric.size is None else metric.size
+
+
+def _errors(
+    old: Metric,
+    new: Metric,
+    limits: Limits,
+    floor: float,
+    suspicious: float,
+    least: tuple[float, float],
+    bound: RoundingBound | None,
+) -> Judged:
+    """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
+    bound: never better, and incomparable where the bound itself would be worse, or where it has fallen so far that it
+    is another error or another reference.
+    """
+    a, b = max(size(old), floor, least[0]), max(size(new), floor, least[1])
+    if limited := beyond_limit(new, limits):
+        return limited
+    noise = limits.noise * (allowed_loss(old, new) if b > a else allowed_gain(old, new))
+    if noise > STEP_CONTROL and b - a > max(limits.loss, STEP_CONTROL) and bound is not None:
+        noise = noise if bound.explains(old.quantity, apart(a, b - a)) else STEP_CONTROL
+    allowed = max(limits.loss, noise) + _ROUNDED
+    if new.value == UNRESOLVED:
+        return _unresolved(old, new, b - a, allowed)
+    if a == b or (old.value == UNRESOLVED and b <= a):
+        return SAME
+    if math.isinf(a) or math.isinf(b):
+        return (Verdict.WORSE, "no longer exactly 0") if b > a else (Verdict.BETTER, "now exactly 0")
+    lost = b - a
+    if abs(lost) <= allowed:
+        return SAME
+    beyond = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
+    if lost > 0:
+        return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{beyond}"
+    odd = "; suspicious: look for a reason" if -lost > suspicious else ""
+    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{beyond}{odd}"
+
+
+def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
+    """lost: decades from the error or bound of the baseline to the bound of the candidate, above the floor."""
+    if lost > allowed:
+        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
+    # two bounds are those of a reference, and the floor is about errors
+    moved = size(new) - size(old) if old.value == UNRESOLVED else lost
+    if abs(moved) > allowed + _UNRESOLVED:
+        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {abs(moved):.1f} decades away"
+    return SAME
+
+
+def beyond_limit(new: Metric, limits: Limits) -> Judged | None:
+    """The verdict of a number beyond the limit of a policy, whatever the baseline was; None of any other."""
+    if limits.limit is None or new.value == "never" or new.kind == "value":
+        return None
+    if new.kind == "duration":
+        return (Verdict.WORSE, "below its limit") if size(new) < limits.limit else None
+    if size(new) <= limits.limit:
+        return None
+    if new.value == UNRESOLVED:
+        return Verdict.INCOMPARABLE, "limit not resolved"
+    return Verdict.WORSE, "above its limit"
+
+
+def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | None) -> Judged:
+    """Longer is better; never is longest."""
+    if limited := beyond_limit(new, limits):
+        return limited
+    if old.value == new.value:
+        return SAME
+    if old.value == "never":
+        return Verdict.WORSE, f"now at {new.value}"
+    if new.value == "never":
+        return Verdict.BETTER, "now never"
+    if old.log10 is None:
+        return Verdict.BETTER, f"now at {new.value}"
+    ratio = 10 ** min(size(new) - old.log10, 300.0)
+    shorter, longer = (
+        10 ** min(limits.noise * band, 300.0) for band in (allowed_loss(old, new), allowed_gain(old, new))
+    )
+    by_noise = ratio * shorter >= 1 and (bound is None or bound.explains_times(old.value, 1 - ratio))
+    if ratio < 1 - limits.duration and not by_noise:
+        return Verdict.WORSE, f"{1 - ratio:.0%} earlier"
+    if ratio > longer and ratio > 1 + limits.duration:
+        return Verdict.BETTER, f"{ratio - 1:.0%} later"
+    return SAME
+
+
+def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
+    """A value must agree, whichever way it went."""
+    if old.value == new.value:
+        return SAME
+    differs = Verdict.WORSE, "a value that must agree does not"
+    if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
+        return differs
+    a, b = exact(old.number), exact(new.number)
+    off = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
+    return SAME if abs(a - b) <= Fraction(off) * max(abs(a), abs(b)) else differs
+
+
+def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
+    """Seconds by their own rule."""
+    if not (math.isfinite(old) and math.isfinite(new)):
+        return Verdict.INCOMPARABLE, "no finite time"
+    ratio = max(new, timings.floor) / max(old, timings.floor)
+    if ratio > timings.ratio:
+        return Verdict.WORSE, f"{ratio:.2g} times as long"
+    if ratio * timings.ratio < 1:
+        return Verdict.BETTER, f"{1 / ratio:.2g} times as fast"
+    return SAME
+
+
+# The seconds of repeated runs of one row against those of another, on one machine.
+
+
+BAND = "band"
+"""Of seconds: half-width in decades of the interval that holds the middle 95 % of the runs."""
+_WIDEST = 0.25
+"""Decades.  Runs that scatter by a factor of 3 say nothing of a machine's speed."""
+
+
+def judge_repeated(
+    old: Mapping[str, float], new: Mapping[str, float], ratio: float, noise: float
+) -> Iterator[tuple[str, Judged]]:
+    """The name of a timing and its verdict: of the median, of the fastest run, and of how much the runs scatter.
+
+    A median or a least may grow by ``ratio``, or by ``noise`` times what two runs of the baseline are apart; what the
+    candidate's scatter by excuses nothing.
+    """
+    if missing := [name for name in ("run", "least", BAND) if name not in new]:
+        yield missing[0], (Verdict.INCOMPARABLE, "its runs are no longer repeated for a comparison")
+        return
+    if not all(math.isfinite(seconds) for each in (old, new) for seconds in each.values()):
+        yield "run", (Verdict.INCOMPARABLE, "no finite time")
+        return
+    if old[BAND] > _WIDEST:
+        yield BAND, (Verdict.INCOMPARABLE, f"runs of the baseline scatter by a factor of {10 ** (2 * old[BAND]):.2g}")
+        return
+    allowed = max(math.log10(ratio), noise * math.sqrt(2) * old[BAND])
+    for name in ("run", "least"):
+        yield name, _apart(old.get(name, 0.0), new[name], allowed)
+    if new[BAND] > _WIDEST:
+        yield BAND, (Verdict.INCOMPARABLE, f"its runs scatter by a factor of {10 ** (2 * new[BAND]):.2g}")
+
+
+def _apart(old: float, new: float, allowed: float) -> Judged:
+    if min(old, new) <= 0:
+        return SAME if old == new else (Verdict.INCOMPARABLE, "a run that took no time")
+    grown = math.log10(new / old)
+    if abs(grown) <= allowed:
+        return SAME
+    if grown > 0:
+        return Verdict.WORSE, f"{10**grown:.3g} times as long, where {10**allowed:.2g} is allowed"
+    return Verdict.BETTER, f"{10**-grown:.3g} times as fast, where {10**allowed:.2g} is allowed"
+
+
+# What became of a row as a whole: of two rows of which one, or neither, reached its horizon.
+
+
+SUCCESS = "success"
+_NO_INTEGRATORS = (OUT_OF_REACH, CONTRADICTION, UNSUPPORTED)
+"""Outcomes that say nothing of what is measured: of its reference, or of what it declares that it cannot do."""
+
+
+def ended(row: Row, which: str) -> str:
+    """``the candidate ended as failed at t = 0: it returned NaN``."""
+    why = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
+    return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
+
+
+def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
+    """The verdict of the outcomes; None where both are success, or the same and numbers decide.
+
+    A run that no longer reaches its horizon is worse, whatever ended it, and one that now does is better.  Of two that
+    failed neither has a number: the same where they failed in the same way, else incomparable.  Of two that stopped
+    early the one that stops earlier by more than the allowed part ``duration`` is worse.
+    """
+    before, after = old.outcome, new.outcome
+    if before == after == SUCCESS:
+        return None
+    for row, which in ((old, "baseline"), (new, "candidate")):
+        if row.outcome in _NO_INTEGRATORS:
+            return Verdict.INCOMPARABLE, ended(row, which)
+    if before == SUCCESS:
+        return Verdict.WORSE, ended(new, "candidate")
+    if after == SUCCESS:
+        return Verdict.BETTER, f"it reaches its horizon, and {ended(old, 'baseline')}"
+    if before != after:
+        return Verdict.INCOMPARABLE, f"{ended(old, 'baseline')}, {ended(new, 'candidate')}"
+    if before in (FAILED, OUT_OF_TIME):
+        return Verdict.SAME, "failed in both reports"
+    return _reached(old, new, duration)
+
+
+def _reached(old: Row, new: Row, duration: float) -> Judged | None:
+    """The verdict of two runs that stopped early in the same way, by how far they came."""
+    first, second = (abs(exact(row.time_reached)) for row in (old, new))
+    if second < first * (1 - exact(duration)):
+        return Verdict.WORSE, f"{ended(new, 'candidate')}, the baseline at {old.time_reached}"
+    return None
+
+
+# Whether what a candidate was compared with is weaker than what its baseline was compared with.
+
+
+_RADIUS_DECADES = 1.0
+"""A radius may grow by that much: that of a reference for the same bits does not move at all."""
+_DIGITS_KEPT = 0.8
+"""Part of the certified digits that must stay; other data of the same format lose a tenth."""
+_TIME_KEPT = 0.5
+"""Part of the certified time, and of the certified starts, that must stay."""
+_COMPUTED_DECADES = 2.0
+"""What two computed runs agree within varies by a decade from one ensemble to the next."""
+
+
+def weaker(old: Against, new: Against) -> str:
+    """Why a candidate's reference is another or proves less than that of the baseline; empty where it is as good.
+
+    Proven is proven, whichever closed form or enclosure it was: a better certificate makes no difference.
+    """
+    if old == new:
+        return ""
+    if old.how != new.how:
+        return f"compared with {_kind(old)} and with {_kind(new)}"
+    if old.how == "equations" and old.method != new.method:
+        return f"compared with {old.method!r} and {new.method!r}"
+    if _is_proven(old) and not _is_proven(new):
+        return "the reference is no longer proven"
+    if _earlier(old.until, new.until):
+        return "the reference is valid until an earlier time"
+    if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES):
+        return "the radius of the reference is larger, or not said"
+    if not _kept(_digits(old), _digits(new), lambda before, after: after >= _DIGITS_KEPT * before):
+        return f"the reference is certified to {_digits_text(new)} digits, not {_digits_text(old)}"
+    starts = _starts(old), _starts(new)
+    if starts[0] is not None and (starts[1] is None or starts[1] < _TIME_KEPT * starts[0]):
+        return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
+    if not _kept(_times(old), _times(new), lambda before, after: after >= before + math.log10(_TIME_KEPT)):
+        return "the reference is certified at an earlier time"
+    return ""
+
+
+def _kind(reference: Against) -> str:
+    return {"none": "first integrals alone", "equations": reference.method}.get(
+        reference.how, f"a {reference.how} reference"
+    )
+
+
+def _is_proven(reference: Against) -> bool:
+    return reference.how == "proven" and all(each.proven != "computed" for each in reference.certificates)
+
+
+def _digits(reference: Against) -> tuple[float, ...]:
+    return tuple(math.inf if each.digits is None else each.digits for each in reference.certificates)
+
+
+def _digits_text(reference: Against) -> str:
+    return " and ".join("all" if math.isinf(each) else str(each) for each in _digits(reference)) or "no"
+
+
+def _starts(reference: Against) -> int | None:
+    """How many starts are certified."""
+    return next((each.starts for each in reference.certificates if each.starts is not None), None)
+
+
+def _times(reference: Against) -> tuple[float, ...]:
+    """log10 |t| of each certificate."""
+    return tuple(_log(each.time) for each in reference.certificates)
+
+
+def _log(text: str) -> float:
+    """log10 |number|, -inf for 0; nan for what is not a number, which is within no bound."""
+    try:
+        size = log10(exact(text))
+    except InputError:
+        return math.nan
+    return -math.inf if size is None else size
+
+
+def _grew(old: str, new: str, decades: float) -> bool:
+    return bool(old) and (not new or not _log(new) <= _log(old) + decades)
+
+
+def _earlier(old: str, new: str) -> bool:
+    """Whether a truth that had an end, or none, ends at less than half of the time now."""
+    return bool(new) and not (old and _log(new) >= _log(old) + math.log10(_TIME_KEPT))
+
+
+def _kept(old: tuple[Any, ...], new: tuple[Any, ...], enough: Callable[[Any, Any], bool]) -> bool:
+    """Whether each number that the baseline says is there, and is enough."""
+    return len(new) >= len(old) and all(map(enough, old, new))

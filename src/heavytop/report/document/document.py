@@ -1,0 +1,319 @@
+"""What a report says of its rows: blocks with typed cells.  A kind of measurement gives one list of them, and the
+terminal, the page, JSON and Markdown show it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from enum import Flag, auto
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from heavytop.errors import InputError
+from heavytop.measure.integrator import HEYOKA
+from heavytop.precision import decimal_text, exact, log10
+from heavytop.records import Identity, Metric, Quantity, Report, Row, Series
+from heavytop.report.document.svg import COLOURS, MARKERS, Picture
+from heavytop.top.equations import HEAVY_TOP
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# What a row is called, for people.
+
+
+def computed_by(row: Row) -> str:
+    """`` NAME`` of the integrator, "" for heyoka and for what is not computed: behind the case in tables."""
+    subject = row.key.subject
+    return f" {subject.name}" if subject.what == "computed" and subject.name != HEYOKA else ""
+
+
+def row_name(row: Identity, with_kind: bool = True) -> str:
+    """Its kind, case, system where it is not the heavy top, subject and format."""
+    key = row.key
+    system = "" if key.system == HEAVY_TOP.name else key.system
+    parts = (key.kind if with_kind else "", row.case, system, row.integrator, key.precision)
+    return " ".join(part for part in parts if part)
+
+
+def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
+    """The integrator and what is asked of it; "" for heyoka.  Many starts are named where single ones are too."""
+    subject = row.key.subject
+    name = "" if subject.name == HEYOKA else subject.name
+    mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
+    return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
+
+
+def with_source(name: str, source: str) -> str:
+    """A label with the report that it is of, where there are several."""
+    return f"{name}, {source}" if source else name
+
+
+def short(value: str, digits: int = 3) -> str:
+    """A metric's text with few digits; words stay as they are."""
+    try:
+        number = exact(value)
+    except InputError:
+        return value
+    if number == 0:
+        return "0"
+    if Fraction(1, 1000) <= abs(number) < 10**5:
+        return f"{float(number):.{digits + 2}g}"
+    text = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}"
+    mantissa, _, exponent = text.partition("E")
+    if exact(text) == number:  # a time such as 10^6 has no more digits
+        mantissa = mantissa.rstrip("0").removesuffix(".")
+    return f"{mantissa}e{int(exponent)}"
+
+
+# A part of the page, and what its pictures share: legends, names that can be shown, logarithms of what is measured.
+#
+# Sources are ("", report), or ("baseline", ...) and ("candidate", ...): what lies in several is drawn on the same axes.
+# Plots are bounded in number; what is left out is said.
+
+
+MOST_PLOTS = 12
+TIME = "|t| (time units of the data)"
+DASHED = (0, (6.0, 3.0))
+_DASHES = ("", "6 3", "2 2", "8 2 2 2")
+"""Of SVG, in line widths; the first is a whole line."""
+
+Sources = Sequence[tuple[str, Report]]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
+
+    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
+    """
+
+    label: str
+    colour: int
+    marker: str = ""
+    dash: str = ""
+    old: bool = False
+    line: bool = True
+
+
+class Answers(NamedTuple):
+    """What the pictures of a section come to: cells under their columns; the first of each row names it."""
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(slots=True)
+class Section:
+    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn.
+
+    answers: what the pictures come to, above them.  place: the sections stand in the order of their places.
+    """
+
+    id: str
+    title: str
+    text: list[str]
+    answers: Answers | None = None
+    pictures: list[Picture] = field(default_factory=list)
+    legend: dict[str, Key] = field(default_factory=dict)
+    columns: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    across: int = 3
+    place: int = 100
+
+    def key(self, key: Key) -> Key:
+        """``key``, which from now on is in the legend."""
+        return self.legend.setdefault(key.label, key)
+
+    def drop_empty_columns(self) -> None:
+        """Take columns in which no row has anything out of the numbers."""
+        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        self.columns = [self.columns[index] for index in used]
+        self.rows = [[row[index] for index in used] for row in self.rows]
+
+
+_ROOM = 40
+
+
+def clip(text: str, most: int = 60) -> str:
+    """A name that can be shown: one line, no control characters, cut where it is long."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
+    if len(text) <= most:
+        return line
+    return f"{line[: most - 1]}…" + (f" ({len(text)} characters)" if most >= _ROOM else "")
+
+
+def logarithm(value: str | None) -> float | None:
+    """log10 |value| of a report's text; None for 0 and for what is not a number."""
+    try:
+        return log10(exact(value)) if value is not None else None
+    except InputError:
+        return None
+
+
+def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
+    """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
+    found = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
+    pairs = [(x + math.log10(scale), y - shift) for x, y in found if x is not None and y is not None]
+    return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+class Keys:
+    """Entries of curves by their labels, in the order in which they come: a baseline has the look of its candidate."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {}
+
+    def key(self, label: str, source: str = "") -> Key:
+        """The entry of a curve of that label in the report ``source``."""
+        place = self._places.setdefault(label, len(self._places))
+        return numbered(f"{label}, {source}" if source else label, place, source == "baseline")
+
+
+def numbered(label: str, place: int, old: bool = False) -> Key:
+    """The entry of the curve that is the ``place``-th: no two of the first thirty-six look alike; further ones, from
+    one turn through the colours to the next, differ in their dashes.
+    """
+    turn = place // len(COLOURS)
+    marker = MARKERS[(place + turn) % len(MARKERS)]
+    return Key(clip(label, 50), place % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
+
+
+def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
+    """One curve, or points, as its legend has it.
+
+    every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.
+    """
+    colour = COLOURS[key.colour]
+    style: dict[str, Any] = {"lw": 4.5, "alpha": 0.5, "mfc": "none", "ms": size + 2} if key.old else {"ms": size}
+    spread = every if key.line and len(x) > 1 else None
+    dashes: Any = (0, tuple(map(float, key.dash.split()))) if key.dash else "-"
+    style |= {"ls": dashes if key.line else "none", "marker": key.marker, "mec": colour, "markevery": spread}
+    axes.plot(x, y, color=colour, label=key.label, **style)
+
+
+def left_out(section: Section, count: int, what: str) -> None:
+    """Say how many are not drawn."""
+    if count > 0:
+        section.notes.append(f"{count} more {what}{'s' if count > 1 else ''} not drawn; report.json has them all.")
+
+
+def scientific(logarithm: float) -> str:
+    """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
+    exponent = math.floor(logarithm + 1e-9)
+    mantissa = 10 ** (logarithm - exponent)
+    return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"
+
+
+class In(Flag):
+    """Where a block is shown: in the short summary at the end of a run, in the full one (JSON and Markdown have the
+    blocks of that), on the page.
+    """
+
+    SHORT = auto()
+    FULL = auto()
+    PAGE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A measured number in few digits, with its rounding noise in decades where that is asked for."""
+
+    metric: Metric | None
+    digits: int = 3
+    noise: bool = False
+
+    def __str__(self) -> str:
+        """``2.3e-13 ± 0.12``; "-" where there is none."""
+        if self.metric is None:
+            return "-"
+        band = self.metric.band if self.noise else None
+        return short(self.metric.value, self.digits) + (f" ± {band:.2f}" if band else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A verdict: refuted, holds or undecided."""
+
+    text: str
+
+    def __str__(self) -> str:
+        """The verdict."""
+        return self.text
+
+
+Cell = str | Value | Word | Quantity
+
+
+def cell_text(cell: Cell) -> str:
+    """A cell in words."""
+    return cell.text if isinstance(cell, Quantity) else str(cell)
+
+
+@dataclass(frozen=True, slots=True)
+class Headline:
+    """The answer of a kind in a sentence, behind a verdict where it has one.  That of the first place opens a page."""
+
+    text: str
+    word: Word | None = None
+    shown: In = In.FULL | In.PAGE
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A sentence, behind a verdict where it has one.  style: of a line of a card, "", "soft" or "big"."""
+
+    text: str
+    word: Word | None = None
+    style: str = ""
+    shown: In = In.FULL
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Cells under their columns; the first of each row names it.
+
+    notes: sentences above it.  words: how many first columns are words, the others are numbers.  left: the last one is
+    words too.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    notes: Sequence[str] = ()
+    words: int = 1
+    left: bool = False
+    shown: In = In.FULL
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """Lines that belong together, a small table, a note below."""
+
+    title: str
+    lines: Sequence[Note]
+    table: Table | None = None
+    note: str = ""
+    shown: In = In.PAGE
+
+
+Make = Callable[[Sources, Iterable[str]], Section | None]
+"""A section from the rows of all kinds that ask for it, and the cases to draw first; None for no picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A section of the page with pictures."""
+
+    make: Make
+    shown: In = In.PAGE
+
+
+Block = Headline | Note | Table | Card | Chart
+Document = Mapping[str, Sequence[Block]]
+"""The blocks of each kind that has rows, in the order of the summary."""

@@ -1,0 +1,95 @@
+"""A comparison in words and a table, for people on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from heavytop.display import printable
+from heavytop.report.compare.compare import Differences, WorseMotions
+from heavytop.report.compare.findings import line
+from heavytop.report.compare.rows import Finding
+from heavytop.report.compare.verdicts import Verdict
+from heavytop.report.document.document import row_name, short
+from heavytop.report.render.text import table, wrapped
+
+_MOST = 200
+"""Rows listed, and metrics of the table of all: more scroll away."""
+_STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
+
+
+def comparison(result: Differences, full: bool = False) -> RenderableType:
+    """Verdict and findings first, then a line for each row that changed, the worst first, then what else differs.
+
+    full: every metric that changed in place of a line for each row.
+    """
+    parts: list[RenderableType] = [Text(headline(result), style="bold")]
+    parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
+    if result.rows:
+        parts += [Text(), *(_metrics(result) if full else _rows(result))]
+    for each in result.motions:
+        parts += _motions(each)
+    if result.environment:
+        parts += [Text(), Text("Environments differ:", style="bold")]
+        changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
+        parts += [Text(each) for change in changes for each in wrapped(change, "    ", "  ")]
+    return Group(*parts)
+
+
+def _rows(result: Differences) -> Iterator[RenderableType]:
+    """A line for each row, the worst first; broken between words alone."""
+    for change in result.rows[:_MOST]:
+        verdict = change.verdict.value
+        lines = wrapped(printable(f"{verdict:12}  {row_name(change.identity)}: {line(change)}"), " " * 14)
+        for number, each in enumerate(lines):
+            shown = Text(each)
+            shown.stylize(_STYLE.get(change.verdict, ""), 0, 0 if number else len(verdict))
+            yield shown
+    if len(result.rows) > _MOST:
+        yield Text(f"and {len(result.rows) - _MOST} more: --json lists all, --html FILE draws them")
+    yield Text("Every metric: --full", style="dim")
+
+
+def _motions(found: WorseMotions) -> Iterator[RenderableType]:
+    """The motions of a survey that lost most, each with its command, to paste into a shell."""
+    if not found.first:
+        return
+    yield Text()
+    yield Text(
+        printable(f"Motions of {row_name(found.row)} that got worse: {found.worse} of {found.joined}"), style="bold"
+    )
+    for motion in found.first:
+        yield Text(f"  {motion.text}")
+        yield Text(" \\\n".join(wrapped(printable(motion.command), "      ", "    ", 78)), style="dim")
+    if found.worse > len(found.first):
+        yield Text(f"  and {found.worse - len(found.first)} more")
+
+
+def _metrics(result: Differences) -> Iterator[RenderableType]:
+    columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
+    yield table(columns, map(_cells, result.changed[:_MOST]), words=6)
+    if len(result.changed) > _MOST:
+        yield Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them")
+
+
+def _cells(finding: Finding) -> list[str | Text]:
+    verdict = Text(finding.verdict.value, style=_STYLE.get(finding.verdict, ""))
+    return [verdict, row_name(finding.row), metric_name(finding), *values(finding), finding.reason]
+
+
+def headline(result: Differences) -> str:
+    """The verdict and how many findings of each."""
+    tally = ", ".join(f"{count} {verdict.value}" for verdict, count in result.tally.items())
+    return f"Verdict: {result.verdict} ({tally})"
+
+
+def metric_name(finding: Finding) -> str:
+    """The metric of a finding, or that it is about the row as a whole."""
+    return finding.metric or "whole row"
+
+
+def values(finding: Finding) -> tuple[str, str]:
+    """The two values with few digits; a dash where there is none."""
+    return short(finding.baseline or "-"), short(finding.candidate or "-")

@@ -1,0 +1,375 @@
+"""A report in the formats of tools that follow numbers from commit to commit.
+
+Every number is such that smaller is better: log10 of the relative error (digits right with a minus sign) and of the
+largest drift of each first integral, none below the eps of its format; exponents of growth laws; seconds.  What is not
+a number in a report (a row that failed, an error that is NaN) is none here either: :data:`LOST` counts these.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+from heavytop.display import printable
+from heavytop.errors import InputError, quoted
+from heavytop.measure.scalar import digits_kept
+from heavytop.records import UNSUPPORTED, Quantity, Report, Row
+from heavytop.report.compare.compare import Differences
+from heavytop.report.compare.findings import folded, line, statistics
+from heavytop.report.compare.verdicts import Verdict
+from heavytop.report.document.document import (
+    Block,
+    Card,
+    Cell,
+    Headline,
+    In,
+    Note,
+    Table,
+    Value,
+    Word,
+    cell_text,
+    row_name,
+)
+from heavytop.report.document.kind import Kinds, document, headlines, kind_of
+from heavytop.report.render import FORMATS
+from heavytop.report.render.comparison import headline, metric_name, values
+from heavytop.report.render.text import drifts, failed
+from heavytop.report.store.parquet import COLUMNS, lines
+from heavytop.version import version
+
+LOST = "rows without a number"
+_TOTAL = "heavytop"
+_LARGEST = "error_max"
+"""Of a row that has no digits right: work against precision."""
+
+
+class Measure(NamedTuple):
+    """A number of a row; smaller is better.  low, high: its 95 % interval, where it has one."""
+
+    name: str
+    value: float
+    unit: str
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def slug(self) -> str:
+        """Its name in lower case, joined by hyphens."""
+        return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
+
+
+def measures(row: Row) -> Iterator[Measure]:
+    """The numbers of a row."""
+    if row.outcome != "success":
+        return
+    eps = (1 - row.bits) * math.log10(2) if row.bits else None
+    if (kept := digits_kept(row)) is not None:
+        yield Measure("log10 of the error", -kept + 0.0, "decades")
+    elif (metric := row.metrics.get(_LARGEST)) is not None and metric.log10 is not None:
+        yield Measure("log10 of the error", metric.log10, "decades")
+    for name, metric in drifts(row):
+        size = metric.log10 if metric.log10 is not None else eps if metric.value == "0" else None
+        if size is not None:
+            yield Measure(f"log10 of the drift of {name}", size if eps is None else max(size, eps), "decades")
+    for name, law in row.laws.items():
+        if law.exponent is not None:
+            yield Measure(f"exponent of {name}", law.exponent, "exponent", law.low, law.high)
+    if "run" in row.seconds:
+        yield Measure("seconds", row.seconds.get("least", row.seconds["run"]), "s")
+
+
+def export(report: Report, to: str, kinds: Kinds) -> str:
+    """The text of the file for that tool; raises InputError for another."""
+    if to not in FORMATS:
+        raise InputError(f"There is no export to {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
+    return str(resolve_name(FORMATS[to])(report, kinds))
+
+
+def _named(report: Report, kinds: Kinds) -> Iterator[tuple[str, Row | None, list[Measure]]]:
+    """Each row's name and numbers, and the count of the rows that have none."""
+    lost = 0
+    for row in report.rows:
+        found = list(measures(row))
+        lost += _is_lost(row, kinds)
+        yield printable(row_name(row.identity)), row, found
+    yield _TOTAL, None, [Measure(LOST, float(lost), "rows")]
+
+
+def _is_lost(row: Row, kinds: Kinds) -> bool:
+    """Whether a row failed, or has an error that is not finite where none may overflow."""
+    overflowed = row.outcome == "success" and not row.finite and not kind_of(row, kinds).may_overflow
+    return failed(row, kinds) or overflowed
+
+
+def bencher(report: Report, kinds: Kinds) -> str:
+    """Bencher Metric Format: benchmark -> measure -> value with its limits."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for name, _, numbers in _named(report, kinds):
+        for each in numbers:
+            limits = {"lower_value": each.low, "upper_value": each.high}
+            entry = {"value": each.value} | {key: limit for key, limit in limits.items() if limit is not None}
+            found.setdefault(name, {})[each.slug] = entry
+    return _json(found)
+
+
+def github_action_benchmark(report: Report, kinds: Kinds) -> str:
+    """`customSmallerIsBetter` of github-action-benchmark: a list of name, unit, value."""
+    found = []
+    for name, row, numbers in _named(report, kinds):
+        for each in numbers:
+            entry: dict[str, Any] = {"name": f"{name}: {each.name}", "unit": each.unit, "value": each.value}
+            if each.low is not None and each.high is not None:
+                entry["range"] = f"{each.low:.3f} to {each.high:.3f}"
+            found.append(entry | ({"extra": printable(row.against)} if row is not None else {}))
+    return _json(found)
+
+
+def asv(report: Report, kinds: Kinds) -> str:
+    """The results file of airspeed velocity, version 2: `results/MACHINE/COMMIT-ENVIRONMENT.json`."""
+    about = report.environment
+    machine = {
+        "machine": str(about.get("machine", "unknown")),
+        "os": str(about.get("system", "unknown")),
+        "cpu": str(about.get("processor", "unknown")),
+    }
+    results = {}
+    for name, row, numbers in _named(report, kinds):
+        for each in numbers:
+            results[f"{name}: {each.name}"] = [[each.value], [], version()]
+        if row is not None and not numbers and _is_lost(row, kinds):
+            results[f"{name}: log10 of the error"] = [[None], [], version()]
+    return _json(
+        {
+            "version": 2,
+            "commit_hash": str(about.get("commit")).removesuffix("-dirty"),
+            "env_name": "heavytop",
+            "date": 0,
+            "params": machine | {"python": str(about.get("python", "unknown"))},
+            "python": str(about.get("python", "unknown")),
+            "requirements": {name: str(text) for name, text in about.get("packages", {}).items()},
+            "env_vars": {},
+            "result_columns": ["result", "params", "version"],
+            "results": results,
+            "durations": {},
+        }
+    )
+
+
+def junit(report: Report, kinds: Kinds) -> str:
+    """A test case a row: one that failed is an error, one that is not supported is skipped."""
+    bad = sum(_is_lost(row, kinds) for row in report.rows)
+    skipped = sum(row.outcome == UNSUPPORTED for row in report.rows)
+    counts = {"tests": len(report.rows), "failures": 0, "errors": bad, "skipped": skipped, "time": 0}
+    suite = ElementTree.Element("testsuite", {"name": "heavytop"} | {key: str(count) for key, count in counts.items()})
+    for row in report.rows:
+        name = printable(row_name(row.identity, with_kind=False))
+        seconds = f"{row.seconds.get('run', 0.0):.6f}"
+        case = ElementTree.SubElement(suite, "testcase", classname=row.key.kind, name=name, time=seconds)
+        if row.outcome == UNSUPPORTED:
+            ElementTree.SubElement(case, "skipped", message=printable(row.against))
+        elif _is_lost(row, kinds):
+            ElementTree.SubElement(case, "error", message=printable(row.against), type=row.outcome)
+        if numbers := list(measures(row)):
+            text = "\n".join(f"{each.name}: {each.value:.6g} {each.unit}" for each in numbers)
+            ElementTree.SubElement(case, "system-out").text = printable(text)
+    ElementTree.indent(suite)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
+
+
+def metrics_csv(report: Report, kinds: Kinds) -> str:
+    """A line for each metric and growth law, with the columns of `--parquet`."""
+    made = io.StringIO()
+    writer = csv.writer(made, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(lines(report.rows))
+    return made.getvalue()
+
+
+def _json(document: Any) -> str:
+    return json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+# A comparison as JUnit XML: one test case a metric, for the test pages of CI systems.
+
+
+_FAILURE = {Verdict.WORSE}
+_ERROR = {Verdict.MISSING, Verdict.INCOMPARABLE}
+
+
+def comparison_junit(result: Differences) -> str:
+    """Worse is a failure; missing and incomparable are errors; everything else passes."""
+    count = result.tally
+    suite = ElementTree.Element(
+        "testsuite",
+        name="heavytop compare",
+        tests=str(len(result.findings)),
+        failures=str(sum(count.get(verdict, 0) for verdict in _FAILURE)),
+        errors=str(sum(count.get(verdict, 0) for verdict in _ERROR)),
+        skipped="0",
+        time="0",
+    )
+    properties = ElementTree.SubElement(suite, "properties")
+    for name, old, new in result.environment:
+        ElementTree.SubElement(properties, "property", name=printable(name), value=printable(f"{old} -> {new}"))
+    for finding in result.findings:
+        where = f"{finding.row.key.kind}.{row_name(finding.row, with_kind=False)}"
+        name = metric_name(finding)
+        case = ElementTree.SubElement(suite, "testcase", classname=printable(where), name=printable(name), time="0")
+        message = f"{finding.verdict.value}: {finding.baseline or '-'} -> {finding.candidate or '-'}; {finding.reason}"
+        if finding.verdict in _FAILURE | _ERROR:
+            kind = "failure" if finding.verdict in _FAILURE else "error"
+            ElementTree.SubElement(case, kind, message=printable(message), type=finding.verdict.value)
+        elif finding.verdict is not Verdict.SAME:
+            ElementTree.SubElement(case, "system-out").text = printable(message)
+    ElementTree.indent(suite)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
+
+
+# A comparison for a pull request: GitHub-flavoured Markdown, short.
+
+
+_MOST, _MOST_METRICS = 50, 100
+"""Rows and quantities of the tables."""
+_COMMENT = 60_000
+"""Characters: a comment of a forge takes no more than 65,536."""
+_LONGEST = 120
+
+
+def comparison_markdown(result: Differences, page: Path | None = None) -> str:
+    """Verdict and findings, a line for each row with the worst first, differences of the environments, the page.
+
+    Where that is too long for a comment, quantities and then rows are left out; the findings never are.
+    """
+    head = ["### heavytop: " + headline(result), "", *(f"- {escaped(sentence)}" for sentence in result.sentences), ""]
+    rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
+    end = []
+    if result.environment:
+        end += ["<details><summary>Environments differ</summary>", "", "| | baseline | candidate |", "|---|---|---|"]
+        end += ["| " + " | ".join(map(escaped_cell, difference)) + " |" for difference in result.environment[:_MOST]]
+        end += ["", "</details>", ""]
+    if page is not None:
+        # no link: a comment does not lie beside the file
+        end += [f"Both on the same axes: {escaped_cell(page.name)}.", ""]
+    texts = ("\n".join(lines) for lines in ([*head, *rows, *metrics, *end], [*head, *rows, *end], head))
+    return next((text for text in texts if len(text) <= _COMMENT), "\n".join(head))
+
+
+def _rows(result: Differences) -> list[str]:
+    cells = ((c.verdict.value, row_name(c.identity), line(c)) for c in result.rows[:_MOST])
+    lines = [
+        "| verdict | row | what changed |",
+        "|---|---|---|",
+        *("| " + " | ".join(map(escaped_cell, c)) + " |" for c in cells),
+    ]
+    return [*lines, *(["", f"and {len(result.rows) - _MOST} more."] if len(result.rows) > _MOST else []), ""]
+
+
+def _metrics(result: Differences) -> list[str]:
+    """What changed in each row, largest, rms and last value of one quantity in one line; folded."""
+    head = ["<details><summary>Every quantity that changed</summary>", ""]
+    head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
+    found = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
+    cells = (
+        (c.verdict.value, row_name(c.identity), statistics(c, name, group), *values(group[0]), group[0].reason)
+        for c, name, group in found
+    )
+    lines = ["| " + " | ".join(map(escaped_cell, each)) + " |" for each in cells]
+    more = ["", f"and {len(lines) - _MOST_METRICS} more."] if len(lines) > _MOST_METRICS else []
+    return [*head, *lines[:_MOST_METRICS], *more, "", "</details>", ""]
+
+
+def escaped_cell(text: str) -> str:
+    """Text in a cell of a table, cut where it is long."""
+    text = " ".join(printable(text).split())
+    return escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
+
+
+def escaped(text: str) -> str:
+    """Text that Markdown takes as it is, without line breaks."""
+    return re.sub(r"([\\`*_{}\[\]<>|#~@&])", r"\\\1", " ".join(printable(text).split()))
+
+
+# What a report says, for programs and for pull requests: its document as JSON and as Markdown.
+
+
+def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
+    """The blocks of each kind, without charts: a cell is text, or an object that says what it is."""
+    found = document(report, kinds, In.FULL)
+    said = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in found.items()]
+    return {"plan": report.plan, "measurements": len(report.rows), "kinds": said}
+
+
+def _block(block: Block) -> dict[str, Any]:
+    name = {"block": type(block).__name__.lower()}
+    match block:
+        case Headline() | Note():
+            return name | {"verdict": block.word and block.word.text, "text": block.text}
+        case Table():
+            rows = [[_cell(cell) for cell in row] for row in block.rows]
+            return name | {
+                "title": block.title,
+                "notes": list(block.notes),
+                "columns": list(block.columns),
+                "rows": rows,
+            }
+        case Card():
+            inside: list[Block] = [*block.lines, *([block.table] if block.table else [])]
+            return name | {"title": block.title, "note": block.note, "blocks": [_block(each) for each in inside]}
+    raise TypeError(block)
+
+
+def _cell(cell: Cell) -> Any:
+    match cell:
+        case Value():
+            known = cell.metric
+            said = None if known is None else (known.value, known.log10, known.band, known.kind)
+            return said and dict(zip(("value", "log10", "band", "kind"), said, strict=True))
+        case Word():
+            return {"verdict": cell.text}
+        case Quantity():
+            return {"quantity": cell.text}
+    return cell
+
+
+def to_markdown(report: Report, kinds: Kinds) -> str:
+    """GitHub-flavoured Markdown: the headlines, then the notes, tables and cards of each kind."""
+    found = document(report, kinds, In.FULL)
+    plan = f"### Plan {escaped(report.plan.get('name', '?'))}: {len(report.rows)} measurements"
+    lines = [plan, "", *(f"- {_said(each)}" for each in headlines(found, kinds)), ""]
+    for blocks in found.values():
+        lines += [line for block in blocks if not isinstance(block, Headline) for line in _markdown(block)]
+    return "\n".join(lines) + "\n"
+
+
+def _said(block: Headline | Note) -> str:
+    return (f"**{block.word.text}** " if block.word else "") + escaped(block.text)
+
+
+def _markdown(block: Block) -> Iterator[str]:
+    match block:
+        case Note():
+            yield from (_said(block), "")
+        case Card():
+            yield from (f"#### {escaped(block.title)}", "", *(f"- {_said(each)}" for each in block.lines), "")
+            if block.table:
+                yield from _markdown(block.table)
+        case Table():
+            if block.title:
+                yield from (f"#### {escaped(block.title)}", "")
+            yield from (line for note in block.notes for line in (escaped(note), ""))
+            yield _row([escaped_cell(column) for column in block.columns])
+            yield _row(["---" if place < block.words else "---:" for place in range(len(block.columns))])
+            yield from (_row([escaped_cell(cell_text(cell)) for cell in row]) for row in block.rows)
+            yield ""
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

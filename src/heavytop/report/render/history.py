@@ -1,0 +1,235 @@
+"""Metrics over several reports, with the steps between one and the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+import msgspec
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from heavytop.display import printable
+from heavytop.records import Identity
+from heavytop.report.compare.compare import compare
+from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.verdicts import Verdict
+from heavytop.report.document.document import Key, Section, clip, draw, logarithm, numbered, row_name, scientific, short
+from heavytop.report.document.kind import Kinds
+from heavytop.report.document.svg import COLOURS, End, Picture, decades, finish, new_axes, quiet_style, room, spoken
+from heavytop.report.render.text import table
+from heavytop.report.store.checks import law_text
+from heavytop.report.store.store import AnyReport
+
+MARK = {
+    Verdict.WORSE: "▲",
+    Verdict.BETTER: "▼",
+    Verdict.INCOMPARABLE: "≠",
+    Verdict.MISSING: "✗",
+    Verdict.NEW: "+",
+}
+_LEGEND = "▲ worse than before  ▼ better  ≠ incomparable  ✗ missing  + new"
+
+
+class Track(msgspec.Struct, frozen=True):
+    """One metric of one row.  values: one a report, None where it has none.  steps: the verdict that each change from
+    one report to the next has, by the number of the later report, the same left out; with the reason.
+    """
+
+    row: Identity
+    metric: str
+    values: list[str | None]
+    steps: dict[int, tuple[Verdict, str]]
+
+
+def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[Track]:
+    """The tracks of every row and metric, in the order in which they first come up."""
+    tracks: dict[tuple[Identity, str], Track] = {}
+
+    def track(row: Identity, metric: str) -> Track:
+        return tracks.setdefault((row, metric), Track(row, metric, [None] * len(reports), {}))
+
+    outcomes: list[dict[Identity, str]] = [{} for _ in reports]
+    for number, report in enumerate(reports):
+        for row in report.rows:
+            outcomes[number][row.identity] = row.outcome
+            for name, metric in row.metrics.items():
+                track(row.identity, name).values[number] = metric.value
+            for name, law in row.laws.items():
+                track(row.identity, f"growth {name}").values[number] = law_text(law)
+    for number in range(1, len(reports)):
+        for finding in compare(reports[number - 1], reports[number], policy, kinds).changed:
+            found = track(finding.row, finding.metric)
+            found.steps[number] = finding.verdict, finding.reason
+            if not finding.metric:
+                found.values[:] = [outcome.get(finding.row) for outcome in outcomes]
+            elif finding.timing:
+                found.values[number - 1], found.values[number] = finding.baseline, finding.candidate
+    return list(tracks.values())
+
+
+def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any]:
+    """The document of `history --json`."""
+    return {
+        "reports": list(names),
+        "tracks": [
+            {
+                **track.row.named,
+                "metric": track.metric,
+                "values": track.values,
+                "steps": [
+                    {"report": number, "verdict": verdict.value, "reason": reason}
+                    for number, (verdict, reason) in sorted(track.steps.items())
+                ],
+            }
+            for track in tracks
+        ],
+    }
+
+
+def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableType:
+    """A table with one column a report, steps marked."""
+    heads = [Text(printable(f"{number}  {name}")) for number, name in enumerate(names, 1)]
+    if not tracks:
+        return Group(
+            *heads,
+            Text("\nNothing changed, or nothing matches. --metric '*' shows what did not change too.", style="bold"),
+        )
+    numbers = [str(number) for number in range(1, len(names) + 1)]
+    shown = table(["row", "metric", *numbers], map(cells, tracks), words=2)
+    return Group(*heads, Text(_LEGEND, style="dim"), Text(), shown)
+
+
+def cells(track: Track) -> list[str]:
+    """A line of the table: row, metric, the value and the mark of each report."""
+    marks = [MARK[track.steps[number][0]] if number in track.steps else " " for number in range(len(track.values))]
+    values = [f"{short(value or '-')} {mark}" for value, mark in zip(track.values, marks, strict=True)]
+    return [row_name(track.row), track.metric or "whole row", *values]
+
+
+# A history as a page: one chart for each row over the reports, every step beyond noise marked.
+
+
+MOST_PICTURES, MOST_CURVES = 120, 6
+_STEPS = {
+    Verdict.WORSE: Key("worse than the report before", 5, "^", line=False),
+    Verdict.BETTER: Key("better", 5, "v", line=False),
+    Verdict.INCOMPARABLE: Key("incomparable", 5, "D", line=False),
+}
+_NAME = 12
+"""Characters of a report's name on an axis."""
+
+
+def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Sequence[Track]) -> str:
+    """The page of ``tracks`` over ``reports``; the same input gives the same bytes.
+
+    names: of the reports, the oldest first.  A metric without a positive number at two reports or more is in the table
+    of its row alone; of a row the first six metrics are drawn, and of more than 120 rows the first, those with steps
+    before the others.
+    """
+    from heavytop.report.render.page import render
+
+    with quiet_style():
+        changed, unchanged = _sections(_ticks(names, reports), tracks)
+    steps = [verdict for track in tracks for verdict, _ in track.steps.values()]
+    return render(
+        "history.html.j2",
+        reports=[
+            [str(number), clip(name), clip(str(report.plan.get("name", "?"))), *_made(report)]
+            for number, (name, report) in enumerate(zip(names, reports, strict=True), 1)
+        ],
+        tally={verdict.value: steps.count(verdict) for verdict in Verdict if verdict in steps},
+        count=len(tracks),
+        changed=changed,
+        unchanged=unchanged,
+    )
+
+
+def _made(report: AnyReport) -> tuple[str, str]:
+    """Version of heavytop and commit of a report, as far as it says so."""
+    version = report.environment.get("packages", {}).get("heavytop", "")
+    return clip(str(version)), clip(str(report.environment.get("commit") or "")[:12])
+
+
+def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
+    """What stands on the axis for each report: heavytop's version, else the name of its folder, else its number, the
+    first by which all differ.
+    """
+    versions = [_made(report)[0] for report in reports]
+    if all(versions) and len(set(versions)) == len(versions):
+        return [clip(version, _NAME) for version in versions]
+    folders = [clip(PurePath(name).name or name, _NAME) for name in names]
+    return folders if len(set(folders)) == len(folders) else [str(number) for number in range(1, len(names) + 1)]
+
+
+def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
+    """One for each row of the reports, in their order: those with a step, and those without."""
+    found: tuple[list[Section], list[Section]] = [], []
+    rows: dict[str, list[Track]] = {}
+    for track in tracks:
+        rows.setdefault(row_name(track.row), []).append(track)
+    drawn = sorted(rows, key=lambda name: not any(track.steps for track in rows[name]))[:MOST_PICTURES]
+    for number, (name, own) in enumerate(rows.items()):
+        section = Section(f"row-{number}", clip(name, 120), [])
+        section.columns = ["metric", *(str(index) for index in range(1, len(ticks) + 1))]
+        section.rows = [[clip(track.metric or "whole row"), *_page_cells(track)] for track in own]
+        drawable = sorted((track for track in own if len(_points(track)) > 1), key=_interest)
+        if drawable and name in drawn:
+            section.pictures.append(_picture(section, drawable[:MOST_CURVES], ticks, f"h{number}"))
+        missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
+        if missing > 0:
+            section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
+        found[not any(track.steps for track in own)].append(section)
+    return found
+
+
+def _interest(track: Track) -> tuple[bool, bool]:
+    """Tracks with steps first, and of a quantity the largest over the samples."""
+    return not track.steps, track.metric.endswith(("_rms", "_final"))
+
+
+def _page_cells(track: Track) -> list[str]:
+    """The values with few digits, each step with its mark and its verdict."""
+    cells = [short(value or "–") for value in track.values]
+    for number, (verdict, _) in track.steps.items():
+        cells[number] += f" {MARK.get(verdict, '')} {verdict.value}"
+    return cells
+
+
+def _points(track: Track) -> dict[int, float]:
+    """log10 |value| by the number of the report, where there is one; none for verdicts, which are 0 or 1."""
+    if set(track.values) <= {"0", "1", None}:
+        return {}
+    logs = {number: logarithm(value) for number, value in enumerate(track.values)}
+    return {number: value for number, value in logs.items() if value is not None}
+
+
+def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], name: str) -> Picture:
+    """The metrics of one row over the reports, each named at its end, their steps marked."""
+    labels = [clip(track.metric or "whole row", 30) for track in tracks]
+    axes = new_axes("report", "value", 2.4 + 0.17 * len(tracks), room(labels))
+    alternative: list[str] = []
+    reasons: list[str] = []
+    ends: list[End] = []
+    heights: list[float] = []
+    for place, (track, label) in enumerate(zip(tracks, labels, strict=True)):
+        points, key = _points(track), numbered(label, place)
+        draw(axes, key, [number + 1 for number in points], list(points.values()), every=None)
+        for number, (verdict, reason) in sorted(track.steps.items()):
+            mark = _STEPS.get(verdict)
+            if mark and number in points:
+                draw(axes, section.key(mark), [number + 1], [points[number]], size=7)
+            reasons.append(f"{label} {verdict.value} at {number + 1}: {reason}")
+        last = max(points)
+        ends.append(End(label, COLOURS[key.colour], last + 1, points[last]))
+        values = ", ".join(f"{number + 1}: {scientific(value)}" for number, value in points.items())
+        alternative.append(f"{label} over the reports: {values}.")
+        heights += points.values()
+    axes.set_xlim(0.7, len(ticks) + 0.3)
+    shown = range(0, len(ticks), -(-len(ticks) // 6))
+    axes.set_xticks([number + 1 for number in shown], [printable(ticks[number]) for number in shown])
+    pad = max(1.0, 0.15 * (max(heights) - min(heights)))
+    axes.set_ylim(min(heights) - pad, max(heights) + pad)
+    decades(axes.yaxis, 5)
+    return finish(axes, section.title, spoken(alternative), name, clip("; ".join(reasons), 200), ends)

@@ -1,0 +1,382 @@
+"""One motion, computed or known, as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
+
+import msgspec
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.display import printable
+from heavytop.features.events.functions import Events, ReferenceEvents
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.certify import bits_of
+from heavytop.measure.derivatives import PARAMETERS, STARTS, DerivativeBall, Derivatives
+from heavytop.measure.motion import Motion
+from heavytop.measure.reference import Reference
+from heavytop.precision import REAL_BITS, decimal_text, dot, exact, exact_text
+from heavytop.report.document.document import short
+from heavytop.top.attitude import Output, perpendicular, rows_of
+from heavytop.top.equations import NAMES, VARIABLES
+
+# The table of one motion, computed or known: what a terminal, a CSV file and a LaTeX table show of it.
+
+
+_GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
+_BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
+_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_attitude", "xi")
+_LINES = 45
+"""Lines of a LaTeX table that fit on a page."""
+_DIGITS_A_LINE = 48
+"""Digits of a number on a line of a LaTeX table; a multiple of 3, in which they are grouped."""
+_MORE_BITS = 64
+_KNOWN = ("precision", "integrator", "outcome", "steps")
+"""Facts of a computed motion, by the keys that `heavytop score` reads."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """name: in a CSV file.  label: on a terminal.  tex: in math mode."""
+
+    name: str
+    label: str
+    tex: str
+
+
+@dataclass(frozen=True, slots=True)
+class MotionTable:
+    """The values of a motion at its times, and the facts that make them citable.
+
+    facts: key and text, in order.  times: as they were given.
+    values: one line a time, (value, radius) for each column, as text; the radius of what is not proven is None.
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    columns: tuple[Column, ...]
+    times: tuple[str, ...]
+    values: tuple[tuple[tuple[str, str | None], ...], ...]
+
+    def of_case(self, name: str | None) -> MotionTable:
+        """The same, whose facts say the case that the motion is; None for data that are none's."""
+        return self if name is None else replace(self, facts=(*self.facts[:2], ("name", name), *self.facts[2:]))
+
+    def csv(self) -> str:
+        """A header of comments, the names of the columns, a line a time; radii in the last columns.
+
+        `heavytop score` reads it.
+        """
+        proven = any(radius is not None for line in self.values for _, radius in line)
+        names = ["t", *(column.name for column in self.columns)]
+        names += [f"{column.name}_radius" for column in self.columns] if proven else []
+        lines = [f"# {key}: {text}" for key, text in self.facts] + [",".join(names)]
+        for time, line in zip(self.times, self.values, strict=True):
+            radii = [str(radius) for _, radius in line] if proven else []
+            lines.append(",".join([time, *(value for value, _ in line), *radii]))
+        return "\n".join(lines) + "\n"
+
+    def latex(self) -> str:
+        """A table with siunitx and booktabs: a line a number, its radius behind ±; the facts as comments and caption.
+
+        Of more lines than a page has it is a longtable.
+        """
+        body = [self._tex_lines(place) for place in range(len(self.times))]
+        long = sum(map(len, body)) > _LINES
+        rows = ("\n" + r"\addlinespace" + "\n").join("\n".join(lines) for lines in body)
+        packages = "siunitx, booktabs" + (", longtable" if long else "")
+        facts = dict(self.facts)
+        head = [f"% {key}: {_one_line(text)}" for key, text in self.facts]
+        head += [f"% needs \\usepackage{{{package}}}" for package in packages.split(", ")]
+        caption = r"\caption{" + _caption(facts) + "}"
+        top = "\n".join([r"\toprule", r"$t$ & & \\", r"\midrule"])
+        if long:
+            parts = [r"\begin{longtable}{@{}lll@{}}", caption + r"\\", top, r"\endhead", r"\bottomrule", r"\endfoot"]
+            parts += [rows, r"\end{longtable}"]
+        else:
+            parts = [r"\begin{table}", r"\centering", caption, r"\begin{tabular}{@{}lll@{}}", top, rows]
+            parts += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+        return "\n".join([*head, *parts]) + "\n"
+
+    def _tex_lines(self, place: int) -> list[str]:
+        """The lines of one time."""
+        found = []
+        for index, (column, (value, radius)) in enumerate(zip(self.columns, self.values[place], strict=True)):
+            first = _tex_number(self.times[place]) if index == 0 else ""
+            parts = _tex_parts(value, radius)
+            found.append(rf"{first} & ${column.tex}$ & {parts[0]} \\")
+            found += [rf" & & {part} \\" for part in parts[1:]]
+        return found
+
+
+def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
+    """The table of a computed motion: states, ξ and Euler angles where asked for, outputs."""
+    run = motion.trajectory
+    columns, parts = _states(), [motion.states]
+    if motion.attitude is not None and motion.angles is not None:
+        columns = (*columns, *_xi(), *(Column(name, mark, _GREEK[mark]) for name, mark in _ANGLES))
+        parts += [motion.attitude, motion.angles]
+    for output in motion.outputs:
+        columns = (*columns, *_columns_of(output))
+        parts.append([list(_flat(value)) for value in motion.output_texts(output)])
+    document = motion.to_json()
+    facts = [*_made_by(command, version), *_data_of(document), ("system", run.problem.system.name)]
+    facts += [(key, str(document[key])) for key in _KNOWN]
+    lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
+    values = tuple(tuple((value, None) for value in line) for line in lines)
+    return MotionTable((*facts, *_outputs_of(motion.outputs)), columns, tuple(motion.written_times), values)
+
+
+def of_reference(found: Reference, outputs: Sequence[Output], command: str, version: str) -> MotionTable:
+    """The table of a known motion: states, ξ where asked for, outputs, each with its radius."""
+    columns, parts = _states(), [found.states]
+    if found.attitude is not None:
+        columns, parts = (*columns, *_xi()), [*parts, found.attitude]
+    for output in outputs:
+        columns = (*columns, *_columns_of(output))
+        parts.append([list(_flat(value)) for value in found.balls(output)])
+    facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(found)), ("system", found.system)]
+    facts += [("precision", _wide_format(found)), ("digits", str(found.digits)), ("method", found.method)]
+    if found.attitude_method not in (None, found.method):
+        facts.append(("method of the attitude", str(found.attitude_method)))
+    lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
+    values = tuple(tuple((ball.value, ball.radius) for ball in line) for line in lines)
+    return MotionTable((*facts, *_outputs_of(outputs)), columns, tuple(map(str, found.times)), values)
+
+
+_ANGLES = (("phi", "φ"), ("theta", "θ"), ("psi", "ψ"))
+
+
+def _states() -> tuple[Column, ...]:
+    marks = [f"Ω{axis}" for axis in (1, 2, 3)] + [f"γ{axis}" for axis in (1, 2, 3)]
+    return tuple(Column(name, mark, _tex_mark(mark)) for name, mark in zip(VARIABLES, marks, strict=True))
+
+
+def _xi() -> tuple[Column, ...]:
+    return tuple(Column(f"xi{axis}", f"ξ{axis}", _tex_mark(f"ξ{axis}")) for axis in (1, 2, 3))
+
+
+def _columns_of(output: Output) -> tuple[Column, ...]:
+    """The columns of an output; Euler angles are named by their sequence, the vector of Ω in space by its axes."""
+    if output.name == "euler":
+        letters = zip(output.columns, "abc", strict=True)
+        return tuple(
+            Column(name, f"{letter} {output.sequence}", rf"{letter}_{{\mathrm{{{output.sequence}}}}}")
+            for name, letter in letters
+        )
+    if output.name == "omega-space":
+        return tuple(
+            Column(name, f"Ω{axis}", rf"\Omega_{axis}") for name, axis in zip(output.columns, "xyz", strict=True)
+        )
+    if output.name == "position":
+        return tuple(Column(name, name, name) for name in output.columns)
+    return tuple(Column(name, name, f"{name[0]}_{{{name[1:]}}}") for name in output.columns)
+
+
+def _tex_mark(mark: str) -> str:
+    return f"{_GREEK[mark[0]]}_{mark[1:]}"
+
+
+def _flat(value: Any) -> list[Any]:
+    """The numbers of a nested list."""
+    return [part for each in value for part in _flat(each)] if isinstance(value, list) else [value]
+
+
+def _made_by(command: str, version: str) -> list[tuple[str, str]]:
+    return [("command", _one_line(command)), ("version", version)]
+
+
+def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
+    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key tells it."""
+    found = [(key, document[key]) for key in _DATA if document.get(key) is not None]
+    if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in found):
+        x, y, z = (exact(part) for part in document["gamma"])
+        xi = tuple(exact(part) for part in document["xi"])
+        if x * x + y * y + z * z == dot(xi, xi) == 1 and xi != perpendicular((x, y, z)):
+            found.append(("start_matrix", [exact_text(part) for row in rows_of((x, y, z), xi) for part in row]))
+    return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in found]
+
+
+def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
+    """What makes an output definite: sequence, point, pivot."""
+    found = []
+    for output in outputs:
+        if output.name == "euler":
+            found.append(("sequence", output.sequence))
+        if output.name == "position":
+            for key, place in (("point", output.point), ("pivot", output.pivot if any(output.pivot) else None)):
+                found += [] if place is None else [(key, ", ".join(map(str, place)))]
+    return found
+
+
+def _wide_format(found: Reference) -> str:
+    """A format in which data and times are rounded so little that the numbers of a reference do not show it.
+
+    `heavytop score` rounds the data of a file to the format that the file names.
+    """
+    last = max((abs(exact(str(time))) for time in found.times), default=exact(0))
+    bits = bits_of(found.digits) + _MORE_BITS + 2 * int(last).bit_length()
+    return f"real:{min(bits, REAL_BITS[-1])}"
+
+
+def _one_line(text: str) -> str:
+    return printable(" ".join(text.split()))
+
+
+def _caption(facts: dict[str, str]) -> str:
+    """What a reader of the table alone must know."""
+    made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
+    known = [(key, facts[key]) for key in ("name", *_DATA, *made) if key in facts]
+    said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
+    return f"{said}. heavytop {_escaped(facts['version'])}."
+
+
+def _escaped(text: str) -> str:
+    for mark in "\\{}$&#%_^~":
+        text = text.replace(mark, {"\\": "/", "^": r"\^{}", "~": r"\~{}"}.get(mark, "\\" + mark))
+    return text.replace("'", "{'}")
+
+
+def _breakable(text: str) -> str:
+    return _escaped(text).replace("/", r"/\allowbreak ")
+
+
+def _tex_number(text: str) -> str:
+    r"""A number in \num; a fraction as one."""
+    above, slash, below = text.partition("/")
+    return rf"$\num{{{above}}}/\num{{{below}}}$" if slash else rf"\num{{{text}}}"
+
+
+def _tex_parts(value: str, radius: str | None) -> list[str]:
+    """A number and its radius, the digits on as many lines as they take."""
+    if value in ("nan", "inf", "-inf"):
+        return ["undefined" if value == "nan" else rf"${value.replace('inf', chr(92) + 'infty')}$"]
+    mantissa, _, power = value.lower().partition("e")
+    whole, _, decimals = mantissa.partition(".")
+    pieces = [decimals[i : i + _DIGITS_A_LINE] for i in range(0, len(decimals), _DIGITS_A_LINE)] or [""]
+    first = whole + (f".{pieces[0]}" if pieces[0] else "")
+    tail = rf" \pm \num{{{radius}}}" if radius is not None else ""
+    if len(pieces) == 1:
+        return [rf"$\num{{{first}{f'e{power}' if power else ''}}}{tail}$"]
+    more = [r"\,".join(piece[i : i + 3] for i in range(0, len(piece), 3)) for piece in pieces[1:]]
+    more[-1] += (rf" \times 10^{{{int(power)}}}" if power else "") + tail
+    return [rf"$\num{{{first}}}$", *(rf"$\quad {part}$" for part in more)]
+
+
+# Events as tables for people.
+
+
+def events_text(found: Sequence[Events | ReferenceEvents]) -> RenderableType:
+    """Each function with its events: the time, the state, and whether the function rises."""
+    parts: list[RenderableType] = []
+    for each in found:
+        parts += [Text(), Text(f"Events {printable(each.function)}: {len(each)}, {each.guarantee}", style="bold")]
+        if isinstance(each, Events) and each.outcome is not Outcome.SUCCESS:
+            parts.append(Text(f"Looked up to t = {decimal_text(each.time_reached, 6)} only: {each.outcome.message}."))
+        if isinstance(each, Events):
+            times, states = each.time_texts(), each.texts()
+        else:
+            times = [f"{ball.value} ± {ball.radius}" for ball in each.times]
+            states = [[f"{ball.value} ± {ball.radius}" for ball in state] for state in each.states]
+        for time, direction, state in zip(times, each.directions, states, strict=True):
+            table = Table(box=None, show_header=False)
+            table.add_row("t", Text(f"{time}, {'rising' if direction > 0 else 'falling'}", overflow="fold"))
+            for name, value in zip(NAMES, state, strict=True):
+                table.add_row(name, Text(value, overflow="fold"))
+            parts.append(table)
+    return Group(*parts)
+
+
+# Proven derivatives of a motion as lines for people: one a derivative, so that nothing is cut at 80 columns.
+
+
+def derivative_lines(times: Sequence[str], found: Derivatives) -> list[RenderableType]:
+    """The method, then the derivatives at each time, each with its radius, and the Lyapunov exponent."""
+    parts: list[RenderableType] = [Text(), Text(f"derivatives: {found.method}")]
+    for index, time in enumerate(times):
+        for matrices, columns in ((found.start, STARTS), (found.data, PARAMETERS)):
+            if matrices is not None:
+                parts += [Text(), _entries(time, matrices[index], columns)]
+        exponent = None if found.lyapunov is None else found.lyapunov[index]
+        if exponent is not None:
+            parts += [Text(), Text(f"finite-time Lyapunov exponent {exponent.value} ± {exponent.radius}")]
+    return parts
+
+
+def _entries(time: str, matrix: Sequence[Sequence[DerivativeBall]], columns: Sequence[str]) -> Table:
+    table = Table(box=None, show_header=False)
+    table.add_row("t", Text(time, overflow="fold"))
+    for name, row in zip(NAMES, matrix, strict=True):
+        for column, entry in zip(columns, row, strict=True):
+            table.add_row(f"∂{name}/∂{column}", Text(f"{entry.value} ± {entry.radius}", overflow="fold"))
+    return table
+
+
+def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
+    """States, what was asked for beside them, and the drift of the first integrals."""
+    run = motion.trajectory
+    precision = run.problem.precision
+    head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}"
+    if run.order:  # some peers tell neither
+        head += f", {run.steps} steps of order {run.order}"
+    parts: list[RenderableType] = [Text(head), *_attitude_at_start(table)]
+    parts += _at_each_time(table)
+    if not motion.complete:
+        why = f" {run.integrator} says: {printable(run.flags['failure'])}" if "failure" in run.flags else ""
+        parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.{why}", style="bold")]
+    elif motion.drift:
+        found = [(metric.quantity, metric) for metric in motion.drift.values()]
+        worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
+        drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
+        parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
+    if lost := run.amplification_text():
+        parts += [Text(), Text(f"{lost[:1].upper()}{lost[1:]}.")]
+    return Group(*parts, *_undefined(table))
+
+
+def reference_text(found: Reference, table: MotionTable) -> RenderableType:
+    """Proven states, and what was asked for beside them, with the radius of each number."""
+    parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
+    if found.attitude_method not in (None, found.method):
+        parts.append(Text(f"attitude: {found.attitude_method}"))
+    parts += _attitude_at_start(table)
+    derivatives = [] if found.derivatives is None else derivative_lines(found.times, found.derivatives)
+    return Group(*parts, *_at_each_time(table), *_undefined(table), *derivatives)
+
+
+def _attitude_at_start(table: MotionTable) -> list[RenderableType]:
+    """ξ(0), where there is an attitude."""
+    facts = dict(table.facts)
+    return [Text(f"xi(0) = ({facts['xi']})")] if "xi" in facts else []
+
+
+def _at_each_time(table: MotionTable) -> list[RenderableType]:
+    """A table for each time, a line a number; digits that are too many for a line go on below each other."""
+    parts: list[RenderableType] = []
+    for time, line in zip(table.times, table.values, strict=True):
+        lines = Table(box=None, show_header=False)
+        lines.add_column(no_wrap=True)
+        lines.add_column(overflow="fold")
+        lines.add_column(no_wrap=True)
+        lines.add_row("t", Text(time, overflow="fold"))
+        for column, (value, radius) in zip(table.columns, line, strict=True):
+            lines.add_row(column.label, Text(value, overflow="fold"), "" if radius is None else f"± {radius}")
+        parts += [Text(), lines]
+    return parts
+
+
+def _undefined(table: MotionTable) -> list[RenderableType]:
+    """What is said where Euler angles are not defined."""
+    places = [
+        time
+        for time, line in zip(table.times, table.values, strict=True)
+        for column, (value, _) in zip(table.columns, line, strict=True)
+        if value == "nan" and column.label[:2] in ("a ", "c ")
+    ]
+    if not places:
+        return []
+    at = ", ".join(list(dict.fromkeys(places))[:6])
+    return [Text(), Text(f"At t = {at} the first and the last Euler angle are not defined (gimbal lock).")]

@@ -1,0 +1,487 @@
+"""A report, or a comparison of two, as one self-contained page: no script, nothing loaded from elsewhere."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup, escape
+from msgspec.structs import replace as replace_struct
+
+from heavytop.features.work_precision.curves import ERRORS, leads, panels, seconds_text
+from heavytop.files import replace
+from heavytop.harness.plan import BUILT_IN
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
+from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
+from heavytop.precision import exact
+from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.report.compare.compare import Differences
+from heavytop.report.compare.findings import Change, folded, line, statistics
+from heavytop.report.compare.rows import Finding
+from heavytop.report.document.document import (
+    Card,
+    Cell,
+    Chart,
+    Document,
+    Headline,
+    In,
+    Make,
+    Note,
+    Section,
+    Sources,
+    Table,
+    Value,
+    cell_text,
+    clip,
+    computed_by,
+    logarithm,
+    row_name,
+    scientific,
+    short,
+    with_source,
+)
+from heavytop.report.document.kind import Kinds, document, headlines, kind_of
+from heavytop.report.document.svg import quiet_style
+from heavytop.report.render.text import drifts, failed, unsupported
+
+MOST_ROWS = 500
+MOST_WORST = 50
+MOST_FAILURES = 50
+MOST_METRICS = 100
+MOST_CHANGED = 200
+
+
+def write_report(report: Report, path: Path, kinds: Kinds) -> None:
+    """Write the page of ``report`` to ``path``; raises InputError where it cannot be written."""
+    replace(path, report_page(report, kinds).encode())
+
+
+def report_page(report: Report, kinds: Kinds) -> str:
+    """The page of ``report``; the same report gives the same bytes."""
+    rows, left_out = detailed(report.rows)
+    failures = [row for row in report.rows if failed(row, kinds)]
+    found = document(report, kinds, In.PAGE)
+    blocks = [block for blocks in found.values() for block in blocks]
+    not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
+    return render(
+        "report.html.j2",
+        report=report,
+        headlines=_headlines(found, kinds)
+        or [Headline(f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
+        notes=[block for block in blocks if isinstance(block, Note)],
+        cards=[block for block in blocks if isinstance(block, Card)],
+        failures=failures[:MOST_FAILURES],
+        failed=len(failures),
+        not_supported=unsupported(report.rows),
+        lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
+        gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
+        not_finite=not_finite,
+        overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
+        sections=sections([("", report)], kinds),
+        groups=_by_kind(rows),
+        left_out=left_out,
+        environment=report.environment,
+        commands=[] if report.beside else commands(report),
+        dirty=str(report.environment.get("commit")).endswith("-dirty"),
+    )
+
+
+def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
+    """The answer of each kind; one that has cards is repeated in a sentence only where it opens the page alone."""
+    said = headlines(found, kinds)
+    with_cards = [blocks for blocks in found.values() if any(isinstance(block, Card) for block in blocks)]
+    return [each for number, each in enumerate(said) if not number or not any(each in blocks for blocks in with_cards)]
+
+
+def _gave_up(row: Row, kinds: Kinds) -> bool:
+    """Whether a run ended early that may: a finding about its integrator, in its chart."""
+    return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
+
+
+def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
+    """The page of a comparison: verdict, changed rows, both reports on the same axes."""
+    sources = [("baseline", baseline), ("candidate", candidate)]
+    return render(
+        "comparison.html.j2",
+        report=candidate,
+        baseline=baseline,
+        comparison=comparison,
+        tally={verdict.value: count for verdict, count in comparison.tally.items()},
+        changed=comparison.rows[:MOST_CHANGED],
+        left_out=max(0, len(comparison.rows) - MOST_CHANGED),
+        sections=sections(sources, kinds, dict.fromkeys(change.identity.case for change in comparison.rows)),
+        differences=[[clip(part, 200) for part in each] for each in comparison.environment],
+        environment=candidate.environment,
+    )
+
+
+def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[Section]:
+    """The parts of the page that have pictures, each from the rows of the kinds that ask for it, and the tables."""
+    asked: dict[Make, set[str]] = {}
+    tables: dict[str, Section] = {}
+    for source, report in sources:
+        for name, blocks in document(report, kinds, In.PAGE).items():
+            for block in blocks:
+                if isinstance(block, Chart):
+                    asked.setdefault(block.make, set()).add(name)
+                elif isinstance(block, Table):
+                    _add(tables, block, source)
+    with quiet_style():
+        made = [make(_only(sources, names), first) for make, names in asked.items()]
+    found = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
+    for section in found:
+        section.drop_empty_columns()
+    return found
+
+
+def _only(sources: Sources, names: Container[str]) -> Sources:
+    """The sources with the rows of these kinds alone."""
+    return [
+        (source, replace_struct(report, rows=[row for row in report.rows if row.key.kind in names]))
+        for source, report in sources
+    ]
+
+
+def _add(tables: dict[str, Section], table: Table, source: str) -> None:
+    """Take the rows of a table of a report into the section of that title."""
+    new = Section(f"table-{len(tables)}", table.title, list(table.notes), columns=list(table.columns))
+    rows = ([clip(cell_text(cell), 120) for cell in row] for row in table.rows)
+    tables.setdefault(table.title, new).rows += [[with_source(name, source), *cells] for name, *cells in rows]
+
+
+def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
+    """The rows shown one by one, the first and the worst of the others, and how many are left out."""
+    rest = sorted(rows[MOST_ROWS:], key=_badness)[:MOST_WORST]
+    return [*rows[:MOST_ROWS], *rest], max(0, len(rows) - MOST_ROWS - len(rest))
+
+
+def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.key.kind or "other", []).append(row)
+    return found
+
+
+def _badness(row: Row) -> tuple[bool, bool, float]:
+    kept = digits_kept(row)
+    return row.outcome == "success", row.finite, float("inf") if kept is None else kept
+
+
+def main_metric(row: Row) -> str:
+    """What a line about a row says first: an error if it has one that is a number, else what its kind is about."""
+    errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
+    errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
+    name = next(iter(errors or row.metrics), None)
+    if name is None:
+        return "no metric"
+    return f"{_MAIN.get(name, clip(name.replace('_', ' '), 60))} {short(row.metrics[name].value)}"
+
+
+_MAIN = {RELATIVE.text: "relative error", ERRORS[0].text: "error"}
+
+
+def metric_cells(row: Row) -> list[list[str]]:
+    """Name, value, and rounding noise in decades of the first metrics."""
+    return [
+        [
+            clip(name, 80),
+            clip(metric.value, 40) + (f" (below {short(metric.bound)})" if metric.bound else ""),
+            f"{metric.band:.2f}" if metric.band else "",
+        ]
+        for name, metric in islice(row.metrics.items(), MOST_METRICS)
+    ]
+
+
+def quantities(changed: Change) -> list[tuple[str, Finding]]:
+    """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
+    return [(statistics(changed, name, found), found[0]) for name, found in folded(changed)]
+
+
+def commands(report: Report) -> list[str]:
+    """How to make the report again, as far as the report knows."""
+    name = report.plan.get("name", "")
+    version = report.environment.get("packages", {}).get("heavytop", "")
+    commit = str(report.environment.get("commit") or "").removesuffix("-dirty")
+    lines = [f"git checkout {clip(commit)}"] if commit else [f"# heavytop {clip(str(version))}"]
+    lines += [
+        "python3 -m venv .venv && .venv/bin/pip install --require-hashes -r constraints/run.txt",
+        ".venv/bin/pip install --no-deps --no-build-isolation .",
+        f".venv/bin/heavytop run --plan {name if name in BUILT_IN else 'FILE.toml'} --out again",
+        ".venv/bin/heavytop compare report.json again",
+    ]
+    return lines
+
+
+def unbroken(text: str) -> Markup:
+    """The text escaped, each number such as 6.85E-49 in one piece, which browsers would break behind its sign."""
+    return Markup(re.sub(r"[\d.]+[eE]-\d+", r'<span class="number">\g<0></span>', str(escape(text))))
+
+
+def render(template: str, **context: Any) -> str:
+    """A template of this room as text, everything escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("heavytop.report.render"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "clip": clip,
+        "said": cell_text,
+        "unbroken": unbroken,
+        "short": short,
+        "row_name": row_name,
+        "main_metric": main_metric,
+        "metric_cells": metric_cells,
+        "change": line,
+        "folded": quantities,
+    }
+    environment.globals |= {"most_metrics": MOST_METRICS}
+    return environment.get_template(template).render(**context)
+
+
+# What rows come to: the headlines of kinds of measurement, and the tables that several kinds share.
+
+
+_ALONG = Quantity(SOLUTION_ERROR, "along")
+_HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
+
+
+def digits_headline(rows: Sequence[Row]) -> Headline | None:
+    """The fewest significant digits at the longest horizon: of a third-party integrator beside heyoka's, else
+    of heyoka beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has
+    lost all significant digits, counts where there is no other.
+    """
+    finished = [row for row in rows if row.outcome == "success"]
+    known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
+    at_least = "" if known else "at least "
+    known = known or [(row, kept) for row in finished if (kept := _at_least(row)) is not None]
+    known = [each for each in known if not each[0].reference.until] or known
+    theirs = [each for each in known if each[0].key.subject.name not in (HEYOKA, MULTIWORD)]
+    ours = [each for each in known if each[0].key.subject.name == HEYOKA]
+    beside = HEYOKA if theirs else MULTIWORD
+    second = {_place(row): kept for row, kept in known if row.key.subject.name == beside}
+    own = theirs or ours or known
+    chosen = [each for each in own if theirs and _place(each[0]) in second] or own
+    if not chosen:
+        return None
+    last = max(abs(exact(row.horizon)) for row, _ in chosen)
+    row, kept = min((each for each in chosen if abs(exact(each[0].horizon)) == last), key=lambda each: each[1])
+    digits = f"{digits_text(kept)} of {digits_of(row.bits)} significant digits"
+    said = f"{clip(row.key.subject.name, 40)} has {at_least}{digits}"
+    said += f" at T = {short(row.horizon)} ({clip(row.case, 40)} in {clip(row.precision, 20)})"
+    other = second.get(_place(row))
+    return Headline(said + ("." if other is None else f", {beside} {digits_text(other)}."))
+
+
+def _at_least(row: Row) -> float | None:
+    """Digits right that the absolute error of Ω and γ proves, for it is no smaller than the relative one."""
+    errors = [row.metric(SOLUTION_ERROR, part, "max") for part in ("omega", "gamma")]
+    sizes = [error.log10 for error in errors if error is not None and error.log10 is not None]
+    return -max(sizes) if len(sizes) == len(errors) else None
+
+
+def _place(row: Row) -> tuple[str, int, str]:
+    return row.case, row.bits, row.horizon
+
+
+def named(rows: Sequence[Row]) -> Callable[[Row], str]:
+    """What a row is called among these: its case, and its integrator where they have several."""
+    several = len({row.key.subject.name for row in rows}) > 1
+    return lambda row: f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
+
+
+def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT) -> list[Table]:
+    """A line a motion, a column a format, or an integrator where all are in one format; of two rows in one place the
+    later.  No table without rows.
+    """
+    names, one_format = named(rows), len({row.precision for row in rows}) == 1
+    lines: dict[str, dict[str, str]] = {}
+    for row in rows:
+        name, column = (row.key.case, row.key.subject.name) if one_format else (names(row), row.precision)
+        lines.setdefault(name, {})[column] = cell(row)
+    if not lines:
+        return []
+    in_order = sorted(rows, key=lambda row: (0, "") if one_format else (row.bits, row.precision))
+    columns = list(dict.fromkeys(row.key.subject.name if one_format else row.precision for row in in_order))
+    cells = [[found.get(column, "-") for column in columns] for found in lines.values()]
+    widest = max(13, min(39, 62 // len(columns) - 2))
+    columns = [clip(column, widest) for column in columns]
+    room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
+    room = min(max(room, 16), 39)
+    named_cells = [line for name, found in zip(lines, cells, strict=True) for line in _in_lines(name, found, room)]
+    return [Table(title, ["", *columns], named_cells, shown=shown)]
+
+
+def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
+    """The line of a motion; where case and integrator do not fit beside each other, one below the other."""
+    case, comma, integrator = name.partition(", ")
+    if len(name) <= room or not comma:
+        return [[clip(name, room), *cells]]
+    return [[clip(f"{case},", room), *("" for _ in cells)], ["  " + clip(integrator, room - 2), *cells]]
+
+
+def digits_columns(rows: Sequence[Row]) -> list[Table]:
+    """Digits right at every sample, each with its time; of two horizons the longer."""
+    known: dict[tuple[str, str, str], Row] = {}
+    for row in rows:
+        place = row.key.case, row.key.subject.name, row.precision
+        if digits_kept(row) is not None and (place not in known or _end(row) >= _end(known[place])):
+            known[place] = row
+    found = list(known.values())
+    more = "; of the attitude" if any(map(_attitude_asked, found)) else ""
+    return in_columns(f"Digits right, to |t|{more}", _digits_until, found)
+
+
+def attitude_columns(rows: Sequence[Row]) -> list[Table]:
+    """The largest errors of attitude and position, where a row was asked for them."""
+    title = "Largest error of the attitude (rad), of the position"
+    return in_columns(title, _attitude_errors, list(filter(_attitude_asked, rows)), In.FULL | In.PAGE)
+
+
+def _attitude_asked(row: Row) -> bool:
+    return row.metric(*_ATTITUDE) is not None or NOT_CARRIED.items() <= row.flags.items()
+
+
+_ATTITUDE, _POSITION = (ATTITUDE_ERROR, "", "max"), (POSITION_ERROR, "", "max")
+
+
+def _attitude_errors(row: Row) -> str:
+    found = [str(Value(metric, 2)) for each in (_ATTITUDE, _POSITION) if (metric := row.metric(*each))]
+    return ", ".join(found) or NOT_CARRIED["attitude"]
+
+
+def _until(row: Row) -> str:
+    return (row.reference.until or (row.horizon if row.outcome == "success" else row.time_reached)).removeprefix("-")
+
+
+def _end(row: Row) -> float:
+    found = logarithm(_until(row))
+    return -math.inf if found is None else found
+
+
+def _digits_until(row: Row) -> str:
+    kept, end = digits_kept(row), _end(row)
+    assert kept is not None
+    exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
+    time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
+    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}{_digits_of_attitude(row)}"
+
+
+def _digits_of_attitude(row: Row) -> str:
+    """−log10 of the largest angle in radians, at most the digits of the format, where the row was asked for it."""
+    error = row.metric(*_ATTITUDE)
+    if error is None:
+        return f"; {NOT_CARRIED['attitude']}" if _attitude_asked(row) else ""
+    most = row.bits * math.log10(2)
+    return f"; {digits_text(most if error.log10 is None else min(most, max(0.0, -error.log10)))}"
+
+
+def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:
+    """Digits right, distance from the true motion and drift of every integral, a line a row."""
+    columns = ["case", "format", "T", "steps", "outcome", "digits right", "error along", "across"]
+    columns.append("drift of each integral")
+    return Table(title, columns, [_motion(row) for row in rows], notes, left=True)
+
+
+def _motion(row: Row) -> list[Cell]:
+    errors = (row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
+    kept = digits_kept(row)
+    digits = "-" if kept is None else digits_text(kept)
+    return [
+        row.case + computed_by(row),
+        row.precision,
+        row.horizon,
+        str(row.steps),
+        row.outcome,
+        digits + (f" from {row.reference.until}" if row.reference.until else ""),
+        *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
+        "  ".join(f"{name} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
+    ]
+
+
+def fastest(rows: Sequence[Row]) -> Headline | None:
+    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
+    error of all.
+    """
+    found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
+    if not found:
+        return _least_error(rows)
+    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in found]
+    (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
+    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, found, strict=True) if winner == first]
+    behind = {other for winner, other in ends if winner == first}
+    where = f"{count} of {len(found)} motions" if rest else f"all {len(found)} motions"
+    where = clip(found[0][0].case, 40) if len(found) == 1 else where
+    low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
+    times = low if low == high else f"{low} to {high}"
+    other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
+    said = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
+    return Headline("; ".join([said, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
+
+
+def _least_error(rows: Sequence[Row]) -> Headline | None:
+    best = [(line.best, case, line.label) for case, lines in panels(rows).items() for line in lines if line.best]
+    if not best:
+        return None
+    point, case, label = min(best, key=lambda each: each[0].log10)
+    said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
+    return Headline(f"{said}, in {seconds_text(point.seconds)}.")
+
+
+def laws_headline(rows: Sequence[Row]) -> Headline | None:
+    """The laws that most of the healthy runs follow, of third-party integrators where there are any, and how many of
+    the planted faults have another law than these.
+    """
+    theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
+    healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
+    parts = [_followed(healthy, drifts=False), _followed(healthy, drifts=True)]
+    said = ", ".join(part for part in parts if part)
+    faults = [row for row in rows if row.key.subject.bias]
+    told = sum(_told(row, healthy) for row in faults)
+    if faults and said:
+        said += f"; {told} of {len(faults)} planted faults show another law"
+    return Headline(f"{said[0].upper()}{said[1:]}.") if said else None
+
+
+def _followed(rows: Sequence[Row], drifts: bool) -> str:
+    """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``, and what a third of them or more do besides."""
+    laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
+    of = sum(bool(_laws(row, drifts)) for row in rows)
+    if not laws:
+        return ""
+    most, *next_to_it = laws.most_common(2)
+    both = [most, *(each for each in next_to_it if 3 * each[1] >= of > 1)]
+    # regular motions before those that amplify every error
+    (growth, count), *others = sorted(both, key=lambda each: each[0] == "exponential")
+    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
+    law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
+    name = rows[0].key.subject.name
+    whose = "" if name in (HEYOKA, MULTIWORD) else f" of {clip(name, 40)}"
+    return f"first integrals drift {law}" if drifts else f"errors{whose} along the flow grow {law}"
+
+
+def _laws(row: Row, drifts: bool) -> list[Law]:
+    """Of the error along the flow, or of the first integrals; what is exactly 0 has none."""
+    found = [(law, law.quantity) for law in row.laws.values() if law.exponent is not None or law.growth != "bounded"]
+    if drifts:
+        return [law for law, quantity in found if quantity and quantity.name == DRIFT]
+    return [law for law, quantity in found if quantity == _ALONG]
+
+
+def _told(row: Row, healthy: Sequence[Row]) -> bool:
+    """Whether a law of the faulty ensemble is another than the healthy one of the same motion."""
+    same = [each for each in healthy if (each.case, each.precision) == (row.case, row.precision)]
+    expected = {law.growth for each in same for law in _laws(each, drifts=False)}
+    return any(law.growth not in {*expected, "unresolved"} for law in _laws(row, drifts=False)) if expected else False

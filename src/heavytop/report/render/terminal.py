@@ -1,0 +1,281 @@
+"""A report on a terminal: in full, and in the at most 25 lines of 80 columns that end a run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from io import StringIO
+from itertools import chain, islice
+from math import inf
+
+from msgspec.structs import replace
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.text import Text
+
+from heavytop.display import printable
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
+from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
+from heavytop.records import UNMEASURED, Quantity, Report, Row, Series
+from heavytop.report.compare.verdicts import size
+from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
+from heavytop.report.document.kind import Kinds, document, headlines
+from heavytop.report.render.text import WORD_STYLES, Lines, failed, failure, head, title, unsupported, wrapped
+
+WIDTH = 80
+LINES = 21
+"""The command says in four more where the report is and what shows the rest."""
+MOST_ROWS = 1000
+"""More rows than these are counted, not listed."""
+_MOST_FAILURES = 3
+_MOST_OF_ONE = 4
+"""Lines of a failure."""
+_FEWEST = 2
+
+
+_STYLES = {"soft": "dim", "big": "bold"}
+"""Of lines."""
+
+
+def summary(report: Report, kinds: Kinds) -> RenderableType:
+    """What every kind of measurement says of its rows, then what did not reach its horizon."""
+    found = document(report, kinds, In.FULL)
+    parts: list[RenderableType] = [head(report, len(report.rows))]
+    parts += [_Sentence(each.text, each.word) for each in headlines(found, kinds)]
+    for blocks in found.values():
+        parts += [Text(), *_shown([block for block in blocks if not isinstance(block, Headline)])]
+    others = Counter(row.key.kind for row in report.rows if row.outcome not in UNMEASURED and row.key.kind not in kinds)
+    said = [
+        f"Measure {name or 'without a name'}: {count} rows, which the page lists (--html FILE)"
+        for name, count in others.items()
+    ]
+    for sentence in filter(None, [*said, unsupported(report.rows)]):
+        parts += [Text(), Text(printable(sentence))]
+    if failures := [row for row in report.rows if failed(row, kinds)]:
+        parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
+        parts += [Text(printable(failure(row))) for row in failures]
+    return Group(*parts)
+
+
+class _Sentence:
+    """A sentence as wide as where it is printed, its verdict in colour; all lines but the first are indented more."""
+
+    def __init__(self, text: str, word: Word | None = None, style: str = "", indent: str = "") -> None:
+        self._text, self._word, self._style, self._indent = text, word, style, indent
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        word = "" if self._word is None else self._word.text
+        whole = printable(f"{word} {self._text}".lstrip())
+        lines = wrapped(whole, self._indent + "  ", self._indent, options.max_width)
+        for number, line in enumerate(lines):
+            said = Text(line, style=_STYLES.get(self._style, ""))
+            if word and not number:
+                begin = len(self._indent)
+                said.stylize(WORD_STYLES.get(word, "bold yellow"), begin, begin + len(word))
+            yield said
+
+
+def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableType]:
+    """The blocks of one kind; in a brief summary the title of a table stands above its first column."""
+    indent = "" if brief else "  "
+    for number, block in enumerate(blocks):
+        if isinstance(block, Table | Card) and number and not brief:
+            yield Text()
+        match block:
+            case Note() | Headline():
+                yield _Sentence(block.text, block.word, getattr(block, "style", ""), indent)
+            case Card():
+                yield title(block.title)
+                yield from (_Sentence(each.text, each.word, each.style, indent) for each in block.lines)
+            case Table():
+                if block.title and not brief:
+                    yield title(block.title)
+                yield from (_Sentence(note, indent=indent) for note in block.notes)
+                yield Lines(block.columns, block.rows, block.words, block.left, block.title if brief else "")
+            case Chart():
+                pass
+
+
+def _lines(parts: Iterable[RenderableType]) -> list[str]:
+    """What a terminal of 80 columns shows, without colours."""
+    console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
+    console.print(*parts, sep="\n", end="", highlight=False, markup=False)
+    assert isinstance(console.file, StringIO)
+    return [line.rstrip() for line in console.file.getvalue().splitlines()]
+
+
+def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
+    """The lines for ``rows``, which may be a stream of any length: none is held but the first 1,000."""
+    stream = iter(rows)
+    first = list(islice(stream, MOST_ROWS + 1))
+    failures: list[str] = []
+    number = bad = 0
+
+    def seen(given: Iterable[Row]) -> Iterable[Row]:
+        nonlocal number, bad
+        for row in given:
+            number += 1
+            if failed(row, kinds):
+                bad += 1
+                if len(failures) < _MOST_FAILURES:
+                    failures.append(failure(row).strip())
+            yield row
+
+    if len(first) <= MOST_ROWS:
+        held = list(seen(first))
+        found = document(replace(report, rows=held), kinds, In.SHORT)
+        parts = [_lines(_shown(blocks, brief=True)) for blocks in found.values()]
+        parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
+    else:
+        parts = [_counted(seen(chain(first, stream)))]
+    head = f"Plan {report.plan.get('name', '?')}: {number} measurements, "
+    head += f"{bad} did not reach {'its' if bad == 1 else 'their'} horizon:" if bad else "all finished."
+    if bad > len(failures):
+        failures[-1:] = [f"and {bad - len(failures) + 1} more"]
+    lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]
+    return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
+
+
+def _cut(line: str) -> str:
+    """A number that is cut says so."""
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…"
+
+
+def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
+    """The lines of all parts; where they are more than ``most``, the longest parts are cut in the middle, which say by
+    how much: the last line of a table is its finest setting.
+    """
+    sizes = [len(part) for part in parts]
+    while sum(sizes) > most and max(sizes) > _FEWEST:
+        sizes[sizes.index(max(sizes))] -= 1
+    found: list[str] = []
+    for part, length in zip(parts, sizes, strict=True):
+        found += part if length == len(part) else _without_middle(part, length)
+    return found[:most]
+
+
+def _without_middle(part: Sequence[str], size: int) -> list[str]:
+    """``size`` lines of a longer part, at least two: its first ones, how many are left out, and its last one."""
+    last = size > _FEWEST
+    left_out = len(part) - size + 1
+    lines = f"  and {left_out} {'line' if left_out == 1 else 'lines'} more"
+    return [*part[: size - 1 - last], lines, *(part[-1:] if last else [])]
+
+
+def _counted(rows: Iterable[Row]) -> list[str]:
+    """How rows of each kind and format ended, and the fewest digits."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    fewest: dict[tuple[str, str], tuple[float, str]] = {}
+    for row in rows:
+        group = row.key.kind, row.precision
+        counts.setdefault(group, Counter())[row.outcome] += 1
+        if (kept := digits_kept(row)) is not None:
+            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
+    lines = []
+    for group, outcomes in counts.items():
+        line = f"{' in '.join(group)}: " + ", ".join(f"{n} {outcome}" for outcome, n in sorted(outcomes.items()))
+        if group in fewest:
+            kept, case = fewest[group]
+            line += f"; fewest digits right {digits_text(kept)} ({case})"
+        lines += wrapped(line)
+    return lines
+
+
+# The laws by which drift and error grow, in the few lines at the end of a run.
+
+
+_OWN = (HEYOKA, MULTIWORD)
+_MEANS = {
+    "t^0.5": "less than rounding noise that adds up",
+    "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
+    "t^1.5": "rounding noise alone, the least there is",
+    "t^2": "every step errs in the same way and a first integral drifts; a smaller step or tolerance helps",
+    "exponential": "the motion amplifies every error",
+}
+"""Laws of the error along the flow."""
+_WIDTHS = {"integrals": 16, "along": 12, "across": 12}
+"""What is summed up, and the characters there are for it."""
+_COLUMNS = "", "integrals", "error along", "across"
+_FAR = 2.0
+"""Decades."""
+
+
+def laws_in_short(rows: Sequence[Row]) -> list[Block]:
+    """The laws, those of all first integrals as one; formats and motions with the same laws together.  Then what those
+    of third-party integrators mean.
+
+    Those of a variant, such as a planted fault, stand together for all motions.
+    """
+    united: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        united.setdefault(_united(row), []).append(row)
+    formats: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
+    for row in rows:
+        name = "" if row.key.subject.name == HEYOKA else row.key.subject.name
+        what = (name, row.key.subject.variant, row.key.case, _growths(united[_united(row)]))
+        formats.setdefault(what, []).append(row.precision)
+    cases: dict[tuple[str, ...], list[str]] = {}
+    for (name, variant, case, growths), precisions in formats.items():
+        runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
+        cases.setdefault((runs, *growths), []).append(case)
+    cells = [[f"{runs}: {', '.join(motions)}", *said] for (runs, *said), motions in cases.items()]
+    found: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
+    others = [row for row in rows if row.key.subject.name not in _OWN]
+    ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
+    said = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
+    return [*found, *(Note(sentence, shown=In.SHORT) for sentence in said)]
+
+
+def _united(row: Row) -> tuple[str, ...]:
+    """Equal for the rows whose laws are said as one: those of a variant, else a row alone."""
+    subject = row.key.subject
+    return subject.name, subject.variant, row.precision, "" if subject.variant else row.key.case
+
+
+def _growths(rows: Sequence[Row]) -> tuple[str, ...]:
+    """The classes of the laws of the first integrals, along and across the flow; of what is exactly 0 none."""
+    laws: dict[str, dict[str, None]] = {}
+    for law in (law for row in rows for law in row.laws.values()):
+        quantity = law.quantity or Quantity("")
+        what = "integrals" if quantity.name == DRIFT else quantity.component
+        if what in _WIDTHS and (law.growth, law.exponent) != ("bounded", None):
+            laws.setdefault(what, {})[law.growth] = None
+    return tuple(_either(laws.get(what, {}), width) for what, width in _WIDTHS.items())
+
+
+def _meaning(row: Row) -> str:
+    """What the law of a third-party integrator says about it."""
+    name = Quantity(SOLUTION_ERROR, "along").text
+    law = row.laws.get(name)
+    growth = "unresolved" if law is None else law.growth
+    grows = {
+        "unresolved": f"follows no single law{_lately(row.series.get(name))}",
+        "bounded": "is bounded",
+        "exponential": "grows exponentially",
+    }.get(growth, f"grows like {growth}")
+    means = f": {_MEANS[growth]}" if growth in _MEANS else ""
+    return f"{row.key.case}: the error of {row.key.subject.name} along the flow {grows}{means}."
+
+
+def _larger(row: Row, ours: Row) -> str:
+    """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
+    error, known = (each.metric(SOLUTION_ERROR, "along", "final") for each in (row, ours))
+    if error is None or known is None or size(error) - size(known) < _FAR:
+        return ""
+    return f" At the end it is {short(error.value)}, heyoka's {short(known.value)}."
+
+
+def _lately(series: Series | None) -> str:
+    """By which power an error grew over the last decade of t; "" where that is not known."""
+    known = {} if series is None else dict(zip(*points(series), strict=True))
+    if not known or max(known) - min(known) < 1:
+        return ""
+    end = max(known)
+    begin = min(known, key=lambda time: abs(end - 1 - time))
+    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
+
+
+def _either(growths: Iterable[str], width: int) -> str:
+    """The laws of several quantities: by name where there is room."""
+    found = list(growths)
+    return " or ".join(found) or "-" if len(" or ".join(found)) <= width else f"{len(found)} laws"

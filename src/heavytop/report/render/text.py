@@ -1,0 +1,223 @@
+"""Words and tables of a report for a terminal: what rich can print."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import inf
+from textwrap import wrap
+from typing import Any
+
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.display import printable
+from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scorer import DRIFT
+from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
+from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
+from heavytop.report.document.kind import Kinds, kind_of
+from heavytop.report.store.store import AnyReport
+
+
+def largest_over(rows: Iterable[Row]) -> str:
+    """``largest over N samples``, with the least and the most where rows have different numbers of them."""
+    counts = sorted({row.samples for row in rows if row.samples})
+    if not counts:
+        return "largest over the samples"
+    return f"largest over {counts[0]}{f' to {counts[-1]}' if len(counts) > 1 else ''} samples"
+
+
+DIGITS = "Digits right: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
+NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 95 % of it."
+
+
+def failed(row: Row, kinds: Kinds) -> bool:
+    """Whether a run did not reach its horizon; that one aborts may be what its rows are there to show.
+
+    What an integrator declares that it cannot do is no failure.
+    """
+    if row.outcome == UNSUPPORTED:
+        return False
+    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
+
+
+def unsupported(rows: Iterable[Row]) -> str:
+    """What integrators declare that they cannot do, in one line; empty where there is no such row."""
+    lacking = [row for row in rows if row.outcome == UNSUPPORTED]
+    why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
+    count = f"{len(lacking)} row{'s' if len(lacking) > 1 else ''}"
+    return f"Not supported, and not measured: {count}; {'; '.join(why)}." if lacking else ""
+
+
+def failure(row: Row) -> str:
+    """A run that did not reach its horizon, and why."""
+    if row.outcome in (FAILED, OUT_OF_TIME):
+        return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
+    if row.outcome in UNMEASURED:
+        return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
+    return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
+
+
+def head(report: AnyReport, rows: int) -> Text:
+    """The plan, how many measurements, and with which versions."""
+    packages = report.environment.get("packages", {})
+    versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
+    return Text(printable(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})"))
+
+
+WORD_STYLES = {"refuted": "bold red", "holds": "bold green"}
+"""Of verdicts; others are yellow."""
+
+
+def title(text: str) -> Text:
+    """The first line of a section."""
+    return Text(text, style="bold")
+
+
+@dataclass(slots=True)
+class Lines:
+    """A table without lines, as wide as where it is printed; where its words do not fit beside each other, a block for
+    each row: its first cell, and then every other one behind the name of its column.  No word is broken.
+
+    words: how many first columns are words; the others are numbers.  left: the last column is words too.
+    head: stands above the first column.
+    """
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell | Text]]
+    words: int = 1
+    left: bool = False
+    head: str = ""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """A table, or blocks."""
+        first, *others = map(printable, self.columns)
+        columns = [printable(self.head) or first, *others]
+        rows = [[_styled(cell) for cell in row] for row in self.rows]
+        cells = [columns, *([cell.plain for cell in row] for row in rows)]
+        widths = [
+            max(cell_len(word) for row in cells for word in [*row[i].split(" "), ""]) for i in range(len(columns))
+        ]
+        wides = [max(cell_len(row[index]) for row in cells) for index in range(len(columns))]
+        edge = not self.head
+        room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
+        if sum(widths) + 2 * len(widths) > options.max_width or (self.head and room < widths[0]):
+            yield from ([Text(self.head)] if self.head else [])
+            yield from _blocks(columns, rows, options.max_width)
+            return
+        if widths[0] + 2 <= room < wides[0]:
+            for row in rows:  # what is broken is indented
+                row[0] = Text("\n".join(wrapped(row[0].plain, "  ", "", room)), style=row[0].style)
+        made = Table(box=None, pad_edge=edge, header_style="dim")
+        for index, (column, width, wide) in enumerate(zip(columns, widths, wides, strict=True)):
+            words = index < self.words or (self.left and index == len(columns) - 1)
+            made.add_column(Text(column), justify="left" if words else "right", no_wrap=wide == width, min_width=width)
+        for row in rows:
+            made.add_row(*row)
+        yield made
+
+
+def _styled(cell: Cell | Text) -> Text:
+    if isinstance(cell, Text):
+        return cell
+    style = WORD_STYLES.get(cell.text, "bold yellow") if isinstance(cell, Word) else ""
+    return Text(printable(cell_text(cell)), style=style)
+
+
+def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) -> Iterator[Text]:
+    for first, *rest in rows:
+        yield first
+        pairs = zip(columns[1:], rest, strict=True)
+        said = ";  ".join(f"{column} {cell.plain}".strip() for column, cell in pairs if cell.plain.strip())
+        yield from map(Text, wrapped(said, "    ", "    ", width - 4))
+
+
+def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:
+    """A sentence in lines of so many columns, all but the first indented; no word is broken."""
+    return wrap(text, width, initial_indent=first, subsequent_indent=indent, **_WHOLE_WORDS)
+
+
+_WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[Cell | Text]], words: int = 1, left: bool = False) -> Lines:
+    """A table without lines; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
+    return Lines(columns, list(rows), words, left)
+
+
+def both(lines: Iterable[tuple[Row, Sequence[Cell]]]) -> list[list[Cell]]:
+    """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
+    found: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
+    for row, cells in lines:
+        same = row.key.case, computed_by(row), *map(cell_text, cells)
+        found.setdefault(same, ([], cells))[0].append(row)
+    return [
+        [(rows[0].key.case if len(rows) > 1 else rows[0].case) + computed_by(rows[0]), *cells]
+        for rows, cells in found.values()
+    ]
+
+
+def drifts(row: Row) -> list[tuple[str, Metric]]:
+    """The largest drift of each first integral."""
+    found = [(metric.quantity, metric) for metric in row.metrics.values() if metric.quantity]
+    return [(q.component, metric) for q, metric in found if (q.name, q.statistic) == (DRIFT, "max")]
+
+
+# The summary of a report with more rows than anybody reads.
+
+
+MOST_LISTED = 5000
+"""More rows than these nobody reads: `show` sums them up too."""
+
+
+def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
+    """The largest error of each metric with its rounding noise, the fewest digits right, and how many rows ended how,
+    by measure and format; then the hint.
+    """
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    largest: dict[tuple[str, str], dict[str, tuple[float, Metric, str]]] = {}
+    fewest: dict[tuple[str, str], tuple[float, str]] = {}
+    words: dict[tuple[str, str, str], Counter[str]] = {}
+    for row in rows:
+        group = row.key.kind, row.precision
+        counts.setdefault(group, Counter())[row.outcome] += 1
+        found = largest.setdefault(group, {})
+        if (kept := digits_kept(row)) is not None:
+            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
+        for name, metric in row.metrics.items():
+            if metric.kind != "error":
+                continue
+            if metric.log10 is None and metric.value != "0":
+                words.setdefault((*group, name), Counter())[metric.value] += 1
+            size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
+            if name not in found or size > found[name][0]:
+                found[name] = size, metric, row.case
+    parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
+    for group, found in largest.items():
+        outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
+        parts += [
+            Text(),
+            title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors over their samples"),
+        ]
+        lines: list[list[Cell]] = [
+            [
+                name,
+                Value(metric, noise=True),
+                case,
+                ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items()),
+            ]
+            for name, (_, metric, case) in found.items()
+        ]
+        if group in fewest:
+            lines.append(["digits right, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
+        parts.append(table(["metric", "largest", "in", "not available"], lines))
+    return Group(*parts, Text(), Text(hint))
+
+
+def all_good(rows: Iterable[Row], kinds: Kinds) -> bool:
+    """Whether no row has :func:`failed`."""
+    return not any(failed(row, kinds) for row in rows)

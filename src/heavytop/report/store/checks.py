@@ -1,0 +1,374 @@
+"""Whether the rows of a report can be: what no run writes is refused, with the row and its field."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from fractions import Fraction
+from math import isfinite
+from pathlib import Path
+
+import numpy
+
+from heavytop.display import printable
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.growth import NEAR, Interval, bent, nearest_class
+from heavytop.measure.scalar import UNRESOLVED
+from heavytop.precision import exact, log10, parse
+from heavytop.records import UNMEASURED, Data, Law, Metric, Quantity, Row, Series
+from heavytop.report.document.document import row_name
+from heavytop.report.document.kind import Kinds, ReportedKind, kind_of
+
+# Whether the rows of two reports are of one motion: the exact data of the top and its start.
+
+
+_PLAIN = re.compile(r"(-?[0-9]{1,400}(/[1-9][0-9]{0,399})? )+")
+"""Exact numbers as rows hold them, each with a space behind: told without the cost of reading them."""
+_VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
+
+
+def other_data(old: Data | None, new: Data | None) -> str:
+    """Why the data of a candidate are not those of its baseline; empty where they are, however they are written.
+
+    An ensemble of a baseline that does not name the start by which the random ones are drawn is compared by its top.
+    """
+    if old == new:
+        return ""
+    if old is None or new is None:
+        return f"only the {'candidate' if old is None else 'baseline'} says of which top and start it is"
+    of_top, of_start = ("inertia", "weight", "centre", "rotor"), ("omega", "gamma")
+    for name in of_top + of_start if old.omega else of_top:
+        before, after = (getattr(data, name) for data in (old, new))
+        if before != after and _numbers(before) != _numbers(after):
+            return f"other data: {name} {_text(before)} against {_text(after)}"
+    return ""
+
+
+def impossible(data: Data, starts: int) -> str:
+    """What in the data of a row of so many starts no run writes; empty where nothing is."""
+    for name in _VECTORS:
+        count = len(getattr(data, name))
+        if count != 3 and (count or name in _VECTORS[:2] or (starts == 1 and name != "rotor")):
+            return f"{count} components of {name}"
+    if bool(data.omega) != bool(data.gamma):
+        return "half a start"
+    texts = (data.weight, *data.inertia, *data.centre, *data.omega, *data.gamma, *data.rotor)
+    if not _PLAIN.fullmatch("".join(f"{text} " for text in texts)):
+        try:
+            _numbers(texts)
+        except InputError as error:
+            return error.cause
+    if any(text[0] not in "123456789" and exact(text) <= 0 for text in data.inertia):
+        return "a moment of inertia that is not positive"
+    return ""
+
+
+def _numbers(texts: str | tuple[str, ...]) -> list[Fraction]:
+    return [exact(text) for text in ((texts,) if isinstance(texts, str) else texts)]
+
+
+def _text(texts: str | tuple[str, ...]) -> str:
+    return (texts if isinstance(texts, str) else ", ".join(texts) or "none")[:120]
+
+
+# Whether the numbers of one row agree with one another.
+#
+# Each rule holds for every row that a run writes.  A row that breaks one was edited, or written by a broken program.
+
+
+CLOSE = 1e-5
+"""Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
+_SUCCESS = Outcome.SUCCESS.value
+_NO_NUMBER = ("nan", "missing")
+
+_HALF_WAY = 0.25 - NEAR
+"""Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
+
+
+def contradictions(row: Row, kind: ReportedKind) -> Iterator[str]:
+    """What in a row of that kind contradicts something else in it, as ``FIELD: REASON``."""
+    for name, metric in row.metrics.items():
+        if metric.band is not None and not kind.carries_band(metric):
+            yield f"{name}: a noise band where no run measures one"
+    if row.laws:
+        for name, law in row.laws.items():
+            if reason := inconsistent(law):
+                yield f"growth {name}: {reason}"
+            if law.starts > row.starts > 1:
+                yield f"growth {name}: a law of {law.starts} starts in a row of {row.starts}"
+    if row.data is not None and (reason := impossible(row.data, row.starts)):
+        yield f"data: {reason}"
+    if row.outcome != _SUCCESS:
+        return
+    yield from _reached(row)
+    yield from _sizes(row.metrics)
+    if row.series:
+        yield from _series(row, kind)
+    yield from kind.contradictions(row)
+
+
+def _reached(row: Row) -> Iterator[str]:
+    if row.time_reached != row.horizon and abs(exact(row.time_reached)) < abs(exact(row.horizon)):
+        yield f"time_reached: a success that reached only {row.time_reached} of {row.horizon}"
+    failed = row.metrics.get("starts_failed")
+    if failed is not None and failed.value != "0":
+        yield f"starts_failed: a success with {failed.value} starts that failed"
+    with suppress(InputError):  # what is evaluated exactly has no format, and a law has several
+        if parse(row.precision).bits != row.bits:
+            yield f"bits: {row.bits} in {row.precision}"
+
+
+def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
+    """A root mean square and a last value are no larger than the largest."""
+    for metric in metrics.values():
+        quantity = metric.quantity
+        if quantity is not None and metric.log10 is not None and quantity.statistic == "max":
+            for part in ("rms", "final"):
+                other = metrics.get(quantity.over(part).text)
+                if other is not None and other.log10 is not None and other.log10 > metric.log10 + CLOSE:
+                    yield f"{quantity.over(part).text}: larger than the largest"
+
+
+def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
+    for name, series in row.series.items():
+        if 0 < row.samples < len(series.times):
+            yield f"samples: {row.samples}, where {name} has {len(series.times)}"
+        if len(series.times) != len(series.values):
+            yield f"{name}: not one value for each time"
+            continue
+        if row.finite and any(value in _NO_NUMBER for value in series.values):
+            yield f"finite: said to be finite, but {name} holds nan or missing"
+        if series.quantity is not None and not kind.series_has_more(series.quantity):
+            yield from _against_metrics(series.quantity, series, row)
+
+
+def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
+    found = sizes(series)
+    largest, last = (row.metrics.get(quantity.over(part).text) for part in ("max", "final"))
+    if largest is not None and found and max(found) > bound(largest) + CLOSE:
+        yield f"{quantity.text}: the series is larger than {quantity.over('max').text}"
+    if last is not None and ended(series, row):
+        yield from _last(quantity.over("final").text, series.values[-1], last)
+
+
+def sizes(series: Series) -> list[float]:
+    """log10 of the values of a series that are numbers, -1e9 for 0."""
+    return [size for value in series.values if (size := size_of(value)) is not None]
+
+
+def ended(series: Series, row: Row) -> bool:
+    """Whether the last value of a series is that at the time which the row reached."""
+    times = series.times[-1:]
+    return times == [row.time_reached] or (bool(times) and exact(times[0]) == exact(row.time_reached))
+
+
+def _last(name: str, value: str, metric: Metric) -> Iterator[str]:
+    size = size_of(value)
+    words = (value == UNRESOLVED) != (metric.value == UNRESOLVED)
+    if words or (size is not None and abs(size - _floor(metric.log10)) > CLOSE):
+        yield f"{name}: {metric.value}, where its series ends with {value}"
+
+
+def _floor(size: float | None) -> float:
+    return -1e9 if size is None else max(size, -1e9)
+
+
+def size_of(value: str) -> float | None:
+    """log10 of a value of a series, -1e9 for 0; None for a word."""
+    if value in (*_NO_NUMBER, UNRESOLVED, "never"):
+        return None
+    return log_size(value)
+
+
+def log_size(text: str) -> float:
+    """log10 |number|, -1e9 for 0; told without the cost of an exact one where a float holds it."""
+    try:
+        size = abs(float(text))
+    except ValueError:
+        size = 0.0
+    return math.log10(size) if 1e-300 < size < 1e300 else _floor(log10(exact(text)))
+
+
+def bound(metric: Metric) -> float:
+    """log10 of the most that a metric can be; infinite where it is not finite or missing."""
+    if metric.log10 is not None:
+        return metric.log10
+    if metric.value == UNRESOLVED and metric.bound:
+        return _floor(metric.size) + 0.01
+    return -1e9 if metric.value == "0" else 1e9
+
+
+def law_text(law: Law) -> str:
+    """A growth law in a few words."""
+    if law.exponent is None:
+        return law.growth
+    span = "" if law.low is None or law.high is None else f" [{law.low:.3g}, {law.high:.3g}]"
+    return f"{law.growth}, exponent {law.exponent:.3g}{span}"
+
+
+def inconsistent(law: Law) -> str:
+    """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
+    if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
+        return "half an interval, or one without its exponent"
+    if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
+        return f"a span from {law.first} to {law.last}"
+    if law.exponent is None:
+        return "" if law.bend is None else "a bend without an exponent"
+    low, high = interval_of(law)
+    bend = law.bend or (0.0, 0.0)
+    if not all(map(math.isfinite, (law.exponent, low, high, *bend))):
+        return "an exponent or an interval that is not finite"
+    if not low <= law.exponent <= high or bend[0] > bend[1]:
+        return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
+    said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
+    if law.growth == "exponential":
+        return "" if law.exponent > 0 and law.bend is None else said
+    if law.low is None:
+        low, high = low - _HALF_WAY, high + _HALF_WAY
+    expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
+    return "" if law.growth == expected else said
+
+
+def interval_of(law: Law) -> Interval:
+    """That of the exponent; where it has none, the exponent alone."""
+    assert law.exponent is not None
+    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
+
+
+REMEDY = "Make it again with `heavytop run`."
+_CLOSE = 1e-5
+"""How far a log10 of six decimals may be from that of its value."""
+
+
+def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
+    """Raises InputError where a row is there twice."""
+    seen = set()
+    for row in rows:
+        if row.identity in seen:
+            raise InputError(f"{file} holds the row {printable(row_name(row.identity))[:60]} twice.", REMEDY)
+        seen.add(row.identity)
+
+
+def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
+    """Raises InputError where a row cannot be, or contradicts itself, naming it and its field."""
+    known: set[str] = set()
+    for row in rows:
+        # most rows reached the horizon of the row before
+        if (
+            row.horizon not in known
+            or row.time_reached != row.horizon
+            or row.outcome != "success"
+            or kind_of(row, kinds).needed
+            or row.laws
+            or not row.bits
+        ):
+            _check_row(file, row, kind_of(row, kinds))
+            known.add(row.horizon)
+    metrics = [metric for row in rows for metric in row.metrics.values()]
+    if doubtful := _doubtful(metrics):
+        for row in rows:
+            for name, metric in row.metrics.items():
+                if id(metric) in doubtful:
+                    _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
+    _check_series(file, rows)
+    for row in rows:
+        for problem in contradictions(row, kind_of(row, kinds)):
+            raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
+
+
+def _check_series(file: Path, rows: Iterable[Row]) -> None:
+    """Raises InputError where a series has not one value for each time, or a text that is not a number."""
+    for row in rows:
+        for name, series in row.series.items():
+            if len(series.times) != len(series.values):
+                raise InputError(f"{_where(file, row)}, {printable(name)[:60]}: not one value for each time.", REMEDY)
+            if not all(map(isfinite, _floats([*series.times, *series.values]))):
+                for text in (*series.times, *(value for value in series.values if value not in WORDS["value"])):
+                    _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
+
+
+def _floats(texts: Sequence[str]) -> list[float]:
+    """Numbers, told without the cost of exact ones; nan alone where a text is none, or one in Python's way only."""
+    joined = "".join(texts)
+    try:
+        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
+    except ValueError:
+        return [math.nan]
+
+
+def _doubtful(metrics: Sequence[Metric]) -> set[int]:
+    """The ids of the metrics that are not plainly a number with its logarithm; told in a few strokes."""
+    values = numpy.array(_floats([metric.value for metric in metrics]))
+    given = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
+    with numpy.errstate(all="ignore"):
+        # the logarithm of a negative number is none
+        plain = numpy.abs(numpy.log10(values) - given) < _CLOSE / 2
+    return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
+
+
+def _where(file: Path, row: Row) -> str:
+    return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
+
+
+def _check_row(file: Path, row: Row, kind: ReportedKind) -> None:
+    where = _where(file, row)
+    horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
+    if row.outcome not in _OUTCOMES:
+        raise InputError(f"{where}, outcome: {printable(row.outcome)[:60]!r} is none.", REMEDY)
+    if not row.bits and row.precision != "exact":
+        raise InputError(f"{where}, bits: a format without any.", REMEDY)
+    if row.outcome == "success" and abs(reached) < abs(horizon):
+        raise InputError(f"{where}: a success that reached only {row.time_reached} of {row.horizon}.", REMEDY)
+    # a time is rounded to the format, the horizon need not be
+    if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
+        raise InputError(f"{where}, time_reached: {row.time_reached} is beyond {row.horizon}.", REMEDY)
+    lacking = [name for name in kind.needed if name not in row.metrics]
+    if lacking and row.outcome not in UNMEASURED:
+        raise InputError(f"{where}: a row of {kind.name} without {', '.join(lacking)}.", REMEDY)
+    for name, law in row.laws.items():
+        _check_law(f"{where}, growth {printable(name)[:60]}", law)
+
+
+def _check_law(where: str, law: Law) -> None:
+    for name in ("first", "last", "detects", "lost_at"):
+        text = getattr(law, name)
+        if text is not None and _number(f"{where}, {name}", text) < 0:
+            raise InputError(f"{where}, {name}: {text} is negative.", REMEDY)
+
+
+_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
+WORDS = {
+    "error": ("nan", "missing", UNRESOLVED),
+    "duration": ("nan", "missing", "never"),
+    "value": ("nan", "missing", "never", UNRESOLVED),
+}
+"""What may stand in the place of a number, for each kind of metric."""
+
+
+def _check_metric(where: str, metric: Metric, finite: bool) -> None:
+    if metric.bound is not None and _number(where, metric.bound) < 0:
+        raise InputError(f"{where}: a negative bound {metric.bound}.", REMEDY)
+    if metric.value in WORDS[metric.kind]:
+        if metric.log10 is not None:
+            raise InputError(f"{where}: {metric.value} with a logarithm.", REMEDY)
+        if finite and metric.value == "nan":
+            raise InputError(f"{where}: said to be finite, but holds a NaN.", REMEDY)
+        return
+    number = _number(where, metric.value)
+    if number < 0 and metric.kind != "value":
+        raise InputError(f"{where}: a negative {metric.kind} {metric.value}.", REMEDY)
+    given, expected = metric.log10, log10(number)
+    if (given is None) != (expected is None) or (
+        given is not None and expected is not None and not abs(given - expected) < _CLOSE
+    ):
+        raise InputError(f"{where}: value {metric.value} and log10 {given} disagree.", REMEDY)
+
+
+def _number(where: str, value: str) -> Fraction:
+    try:
+        return exact(value)
+    except InputError as error:
+        raise InputError(f"{where}: {error.cause}", REMEDY) from None

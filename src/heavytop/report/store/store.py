@@ -1,0 +1,255 @@
+"""Reports on disk: written whole, validated on reading."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import re
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from importlib import metadata
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec.structs import replace as replace_struct
+
+from heavytop import records
+from heavytop.errors import InputError
+from heavytop.files import read_whole, replace, without_repeats
+from heavytop.harness.run import versions
+from heavytop.precision import available
+from heavytop.records import SCHEMA, Report, Row
+from heavytop.report.document.kind import Kinds
+from heavytop.report.store.checks import REMEDY, check_keys, check_rows
+from heavytop.version import commit
+
+FILE = "report.json"
+DIGEST = "report.json.sha256"
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+_NAME = 200
+_CHUNK = 100
+"""Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
+
+
+def write(report: Report, directory: Path, rows: Iterable[Row] | None = None) -> Path:
+    """DIRECTORY/report.json, a row a line, and beside it its SHA-256 in the format of ``sha256sum -c``.
+
+    rows: in place of those of the report, where they are too many to hold; written one by one.
+    """
+    digest = replace(directory / FILE, _pieces(report, report.rows if rows is None else rows))
+    replace(directory / DIGEST, [f"{digest}  {FILE}\n".encode()])
+    return directory / FILE
+
+
+def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
+    head: dict[str, Any] = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
+    if report.beside is not None:
+        head["beside"] = report.beside
+    between = msgspec.json.encode(head)[:-1] + b',"rows":[\n'
+    for row in rows:
+        yield between + msgspec.json.encode(row)
+        between = b",\n"
+    yield (b"" if between == b",\n" else between) + b"\n]}\n"
+
+
+class Brief:
+    """A report as a comparison needs it: its rows are read and checked each time that they are gone through, so that
+    some hundred thousand of them fit into memory.
+    """
+
+    def __init__(self, file: Path, parts: _Parts, kinds: Kinds) -> None:
+        self.file = file
+        self.plan = parts.plan
+        self.environment = parts.environment
+        self.rows = _Rows(file, parts.rows, kinds)
+
+
+class _Parts(msgspec.Struct, frozen=True):
+    schema: str
+    plan: dict[str, str]
+    environment: dict[str, Any]
+    rows: list[msgspec.Raw]
+
+
+class _Rows:
+    """The rows of a brief report; raises InputError at one that is wrong."""
+
+    def __init__(self, file: Path, rows: list[msgspec.Raw], kinds: Kinds) -> None:
+        self._file = file
+        self._kinds = kinds
+        self._rows = rows
+        self._decoder = msgspec.json.Decoder(Row)
+
+    def _decode(self, row: msgspec.Raw) -> Row:
+        return records.of_row(self._decoder.decode(row))
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, number: int) -> Row:
+        return self._decode(self._rows[number])
+
+    def __iter__(self) -> Iterator[Row]:
+        seen: set[int] = set()
+        for start in range(0, len(self._rows), _CHUNK):
+            rows: list[Row] = []
+            try:
+                rows.extend(map(self._decode, self._rows[start : start + _CHUNK]))
+            except _UNREADABLE as error:
+                place = f"row {start + len(rows) + 1}: {error}"
+                raise InputError(f"{self._file} is not a whole report: {place}.", REMEDY) from None
+            check_rows(self._file, rows, self._kinds)
+            hashes = {hash(row.identity) for row in rows}
+            if len(hashes) < len(rows) or hashes & seen:
+                check_keys(self._file, (self._decode(row) for row in self._rows))
+            seen |= hashes
+            yield from rows
+
+
+AnyReport = Report | Brief
+
+_Content = TypeVar("_Content", Report, _Parts)
+
+
+def read(path: Path, kinds: Kinds) -> Report:
+    """The report at ``path``, a file or a directory with a report.json.
+
+    Raises InputError for a file that is missing, truncated, of another program or schema, edited since it was written
+    (where its checksum lies beside it), or inconsistent in itself.
+    """
+    file, report = _read(path, Report)
+    report = replace_struct(report, rows=[records.of_row(row) for row in report.rows])
+    check_keys(file, report.rows)
+    check_rows(file, report.rows, kinds)
+    return report
+
+
+def read_brief(path: Path, kinds: Kinds) -> Brief:
+    """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
+    return Brief(*_read(path, _Parts), kinds)
+
+
+def whole(report: AnyReport) -> Report:
+    """The report with all of its rows."""
+    if isinstance(report, Report):
+        return report
+    return Report(SCHEMA, report.plan, report.environment, list(report.rows))
+
+
+def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
+    file = path
+    try:
+        file = path / FILE if path.is_dir() else path
+        content = read_whole(file)
+    except OSError as error:
+        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror or error}.", REMEDY) from None
+    with ThreadPoolExecutor(1) as beside:
+        digest = beside.submit(_has_its_digest, file, content)
+        try:
+            report = msgspec.json.decode(content, type=kind)
+            problem = ""
+        except _UNREADABLE as error:
+            problem = str(error)
+        as_written = digest.result()
+    if problem or report.schema != SCHEMA:
+        with suppress(*_UNREADABLE):
+            schema = msgspec.json.decode(content, type=_Schema).schema
+            if schema != SCHEMA:
+                raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", REMEDY)
+        raise InputError(f"{file} is not a whole report: {problem}.", REMEDY)
+    if not as_written:
+        _check_repeats(file, content)
+    if not isinstance(report.environment.get("packages", {}), dict):
+        raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
+    return file, replace_struct(report, plan=records.of_plan(report.plan))
+
+
+class _Schema(msgspec.Struct):
+    schema: str
+
+
+def _check_repeats(file: Path, content: bytes) -> None:
+    """Raises InputError where an object of the file has a key twice, of which the decoder takes the last unsaid."""
+    try:
+        json.loads(content, object_pairs_hook=without_repeats)
+    except InputError as error:
+        raise InputError(f"{file}: {error.cause}", REMEDY) from None
+    except RecursionError as error:
+        raise InputError(f"{file} is not a whole report: {error}.", REMEDY) from None
+
+
+def _has_its_digest(file: Path, content: bytes) -> bool:
+    """Whether the file's checksum lies beside it; raises InputError where that of another content does."""
+    beside = file.with_name(file.name + ".sha256")
+    if not beside.exists():
+        return False
+    expected = beside.read_text("utf-8", errors="replace").split()
+    if not expected or expected[0] != hashlib.sha256(content).hexdigest():
+        raise InputError(f"{file} was changed since it was written: its checksum differs.", REMEDY)
+    return True
+
+
+# The environment block of a report: everything outside the plan that can change bits.
+
+
+def environment() -> dict[str, Any]:
+    """Versions, processor, formats; ``commit`` of the checkout or of the wheel, where one is known."""
+    import flint
+    import heyoka
+    import numpy
+
+    return {
+        "packages": versions(),
+        "flint": str(flint.__FLINT_VERSION__),
+        "commit": commit(),
+        "python": platform.python_version(),
+        "implementation": platform.python_implementation(),
+        "system": platform.system(),
+        "machine": platform.machine(),
+        "processor": _processor(),
+        **_target(),
+        "llvm": _llvm_version(),
+        "simd_width_double": int(heyoka.recommended_simd_size()),
+        "extended_bits": int(numpy.finfo(numpy.longdouble).nmant) + 1,
+        "formats": {name: reason or "available" for name, reason in available().items()},
+        "code_cache": "none: every integrator was compiled in this run",
+    }
+
+
+def _target() -> dict[str, Any]:
+    """The processor and its features that heyoka compiles for."""
+    import heyoka
+
+    x = heyoka.make_vars("x")
+    said = str(heyoka.cfunc([x], [x]).llvm_states[0])
+    cpu = re.search(r"^Target CPU *: (.+)$", said, re.M)
+    features = re.search(r"^Target features *: (.+)$", said, re.M)
+    return {
+        "cpu_target": cpu[1] if cpu else "unknown",
+        "cpu_features": sorted(re.findall(r"\+([^,]+)", features[1])) if features else [],
+    }
+
+
+def _llvm_version() -> str:
+    """The version of the compiler inside heyoka's library, which says it nowhere else."""
+    for file in metadata.files("heyoka") or ():
+        if file.name.startswith("libheyoka"):
+            with open(file.locate(), "rb") as library, mmap(library.fileno(), 0, access=ACCESS_READ) as content:
+                at = content.find(b"LLVM_VERSION=")
+                found = re.match(rb"LLVM_VERSION=([0-9.]+)", content[at : at + 40]) if at >= 0 else None
+                return found[1].decode() if found else "unknown"
+    return "unknown"
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"
