@@ -179,7 +179,7 @@ def digits_of(bits: int) -> int:
 
 _SPARE = 3
 """Digits that the format must have beyond those written, or nothing was rounded."""
-_LEAST = 12
+LEAST = 12
 """Numbers that must agree."""
 _SINGLE = 24
 EXPLAINS = 1.5
@@ -209,7 +209,7 @@ class Rounding:
         return numpy.where(values == 0, 0.0, base ** (numpy.floor(numpy.log(size) / numpy.log(base)) + 1 - self.digits))
 
 
-def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = _LEAST) -> Rounding | None:
+def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = LEAST) -> Rounding | None:
     """The coarsest rounding that all numbers have; None where they are written in full, or fewer than ``least``."""
     numbers = [value for state in states for value in state if value]
     if len(numbers) < least:

@@ -169,6 +169,8 @@ _MARGIN = 30.0
 """How many errors of the samples a fitted number may be off."""
 _BIAS = 0.02
 """A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
+_SPARSE = 0.05
+"""Of the distance between short decimals, within which a number is none by accident."""
 _AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
@@ -332,7 +334,7 @@ def another_start(given: Examined) -> Found | None:
 
 def _is_round(new: Fraction, near: float) -> bool:
     """Whether a number is a short decimal, as none is by accident that is known within ``near``."""
-    return new == Fraction(decimal_text(new, SHORT)) and near <= _BIAS * 10.0**-SHORT * abs(float(new))
+    return new == Fraction(decimal_text(new, SHORT)) and near <= _SPARSE * 10.0**-SHORT * abs(float(new))
 
 
 def _shows_at_once(given: Examined, first: Array) -> bool:
@@ -507,7 +509,7 @@ def _signs(given: Examined) -> Iterator[FoundEquations]:
     yield "kinematic_sign", {}, given.error(other.supposed(given.times))
     for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
         found = replace(given, system=system).supposed(given.times, lifted, reversed_start)
-        yield kind, {}, given.error(None if found is None else found * _OMEGA_BACK)
+        yield kind, {}, given.error(None if found is None else found[:, :6] * _OMEGA_BACK)
 
 
 def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
@@ -576,10 +578,10 @@ class TimesHypothesis:
     fitted: bool = False
 
 
-def clock(given: Examined) -> tuple[TimesHypothesis, float] | None:
+def clock(given: Examined, fitted: bool) -> tuple[TimesHypothesis, float] | None:
     """The simplest of the suppositions about the times that are about as good as the best, and its error."""
     found = [(each, at.error(at.supposed(times))) for each, at, times in _without_numbers(given) if len(times)]
-    if len(given.rows) >= 3:
+    if fitted and len(given.rows) >= 3:
         found += _fitted(given)
     best = min((error for _, error in found), default=0.0)
     return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)

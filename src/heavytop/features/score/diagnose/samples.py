@@ -55,7 +55,11 @@ SMALL = 100
 DROP = 100.0
 """Errors must fall by so much for a supposition without a free number, and ..."""
 FITTED_DROP = 1000.0
-"""... by so much for one whose numbers were fitted."""
+"""... by so much for one whose numbers were fitted; ..."""
+LIKELY_DROP = 30.0
+"""... one without a free number by which it falls less is likely."""
+FIRST = (6, 2)
+"""Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,14 +249,14 @@ def examined(
         moment = [float(value) for value in top.moment]
     except OverflowError:
         return None
-    if not len(states) or numpy.isinf(array).any():
+    if not len(states) or numpy.isinf(array).any() or numpy.isnan(array).all():
         return None
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
     carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
     rate = float(max(spin, fall, carried)) or 1.0
     early = sum(abs(time) * rate <= _TURNS for time in ends)
     last = max(early, min(len(ends), _FEW))
-    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
+    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | set(range(min(last, _FEW)))
     rows = sorted(some if worst is None or worst >= last else some | {worst})
     found = Examined(top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or Frame())
     trusted = found.trusted()
