@@ -18,7 +18,7 @@ from time import perf_counter, process_time
 from heavytop.api.integrators import new_integrator
 from heavytop.cases import CASES
 from heavytop.harness.case_text import ensemble_of
-from heavytop.integrate.peers.command import Command, CommandIntegrator, Request, Session
+from heavytop.integrate.peers.command import Command, CommandIntegrator, ProgramRequest, Session
 from heavytop.integrate.registry import commands_in
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, exact, number
@@ -27,7 +27,7 @@ REQUESTS, STARTS = 10_000, 64
 STEP = exact(number(Fraction(1, 100), DOUBLE))
 
 
-def bare(program: Path, requests: list[Request]) -> float:
+def bare(program: Path, requests: list[ProgramRequest]) -> float:
     """Seconds of the program for all requests, read from a file and answered into nothing."""
     script = program.parent / "requests"
     script.write_bytes(b"heavytop-integrator 1\n" + b"".join(each.text(1) for each in requests) + b"quit\n")
@@ -37,7 +37,7 @@ def bare(program: Path, requests: list[Request]) -> float:
         return perf_counter() - began
 
 
-def asked(session: Session, requests: list[Request]) -> list[float]:
+def asked(session: Session, requests: list[ProgramRequest]) -> list[float]:
     """Seconds of each request here."""
     spent = []
     for each in requests:
@@ -57,7 +57,7 @@ def main() -> None:
         session = Session(command)
         case = CASES["lagrange"]
         problem = Problem.of(case.top, case.start, DOUBLE)
-        one = [Request(problem, [Fraction(1)], STEP, False)] * REQUESTS
+        one = [ProgramRequest(problem, [Fraction(1)], STEP, False)] * REQUESTS
         own = bare(folder / "mine", one) / REQUESTS
         spent = median(asked(session, one))
         print(f"a request for one time: {1e6 * spent:.1f} us, the program's own {1e6 * own:.1f} us,")
@@ -70,7 +70,7 @@ def main() -> None:
         print(f"the whole call of the integrator: {1e6 * median(whole):.1f} us")
         times = [exact(number(Fraction(300) * Fraction(f"{10 ** (k / 16):.4g}"), DOUBLE)) for k in range(-80, 1)]
         members = [Problem.of(*member, DOUBLE) for member in ensemble_of(case, STARTS, 1)]
-        row = [Request(member, times, STEP, False) for member in members]
+        row = [ProgramRequest(member, times, STEP, False) for member in members]
         session.close(1.0)
         rounds = [_growth(folder / "mine", command, row) for _ in range(8)]
         own, here, busy, behind, reader = map(min, zip(*rounds, strict=True))
@@ -81,7 +81,7 @@ def main() -> None:
         print(f"  that of the reader, beside it on another core, {reader:.3f} s")
 
 
-def _growth(program: Path, command: Command, row: list[Request]) -> tuple[float, ...]:
+def _growth(program: Path, command: Command, row: list[ProgramRequest]) -> tuple[float, ...]:
     """Wall time alone and here; processor time of the program alone and behind pipes, and of the reader."""
     before = _children()
     own, busy = bare(program, row), _children() - before

@@ -14,7 +14,7 @@ import pytest
 from heavytop.cases import CASES
 from heavytop.integrate.heyoka.engines import compiled, expressions
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
@@ -94,7 +94,7 @@ def test_samples_do_not_change_the_end(benchmark) -> None:
     assert number(times[-1], DOUBLE) == 10000
 
 
-@pytest.mark.parametrize("integrator", [propagate, propagate_words], ids=["heyoka", "multiword"])
+@pytest.mark.parametrize("integrator", [propagate, propagate_multiword], ids=["heyoka", "multiword"])
 def test_twenty_thousand_samples_against_one(benchmark, integrator) -> None:
     """T = 1000 in double: 20,000 regular samples, and the last alone, interleaved; processor seconds, least of 15."""
     times = [Fraction(k, 20) for k in range(1, 20001)]

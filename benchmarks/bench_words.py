@@ -17,8 +17,8 @@ import pytest
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka.engines import compiled, load
 from heavytop.integrate.multiword.engines import choose
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
 from heavytop.top.equations import HEAVY_TOP
@@ -74,9 +74,9 @@ def error(problem: Problem, tolerance: Fraction | None, span: Fraction) -> tuple
     """The largest error at ``span`` by words and by heyoka, each as it is handed over."""
     from heavytop.integrate.heyoka.motions import propagate
 
-    wide = propagate_words(problem.top, problem.start, [span], real(problem.precision.bits + 150)).states[0]
+    wide = propagate_multiword(problem.top, problem.start, [span], real(problem.precision.bits + 150)).states[0]
     found = []
-    for how in (propagate_words, propagate):
+    for how in (propagate_multiword, propagate):
         state = how(problem.top, problem.start, [span], problem.precision, tolerance=tolerance).states[0]
         found.append(max(abs(float(exact(a) - exact(b))) for a, b in zip(state, wide, strict=True)))
     return found[0], found[1]
@@ -120,14 +120,14 @@ def test_eight_motions_in_lanes(benchmark, precision: Precision) -> None:
         run(problems, [span], **options)
         return (perf_counter() - began) / motions * 1e6
 
-    turn(propagate_words_ensemble)
-    one, two = ([turn(propagate_words_ensemble, threads=n) for _ in range(5)] for n in (1, 2))
+    turn(propagate_multiword_ensemble)
+    one, two = ([turn(propagate_multiword_ensemble, threads=n) for _ in range(5)] for n in (1, 2))
     cost = f"{median(one):.3g} by one thread, {median(two):.3g} by two"
     benchmark.extra_info["microseconds_a_motion_and_unit"] = cost
     if precision is DOUBLE:
         turn(propagate_ensemble)
-        pairs = [(turn(propagate_words_ensemble, threads=1), turn(propagate_ensemble, threads=1)) for _ in range(5)]
+        pairs = [(turn(propagate_multiword_ensemble, threads=1), turn(propagate_ensemble, threads=1)) for _ in range(5)]
         benchmark.extra_info["microseconds_by_heyoka"] = f"{median(b for _, b in pairs):.3g}"
         benchmark.extra_info["words_over_heyoka"] = f"{median(a / b for a, b in pairs):.3g}"
     said(f"in lanes, {precision.name}", benchmark.extra_info)
-    benchmark.pedantic(turn, (propagate_words_ensemble,), rounds=1)
+    benchmark.pedantic(turn, (propagate_multiword_ensemble,), rounds=1)

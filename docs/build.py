@@ -2,9 +2,9 @@
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
 from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
-line from the program (command_reference.py).  Then every link inside the site is followed, the reference of Python
-is searched for names that are no part of the interface, and the words of pages, docstrings and messages are looked up
-among common misspellings.
+line from the program (command_reference.py), of the reports of `results/` from these.  Then every link inside the site
+is followed, the reference of Python is searched for names that are no part of the interface, and the words of pages,
+docstrings and messages are looked up among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
@@ -27,8 +27,20 @@ DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
 CLAIMS = DOCS / "_build" / "claims.md"
 COMMANDS = DOCS / "_build" / "commands.md"
+REPORTS = OUT / "results"
 ROOT = DOCS.parent
-SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
+SPELLED = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs",
+    "results",
+    "examples",
+    "src",
+    "benchmarks",
+    "tools",
+    "validation",
+]
 
 PUBLIC = ("heavytop.plot.", "heavytop.integrate.peers.double.", "heavytop.api.integrators.check_integrator")
 """What the reference of Python shows beside the names of ``heavytop`` itself."""
@@ -102,6 +114,15 @@ def write_claims() -> None:
     CLAIMS.write_text(page(found), "utf-8")
 
 
+def write_reports() -> None:
+    """The page of each report of `results/`, as `show --html` writes it."""
+    import heavytop as ht
+
+    REPORTS.mkdir(parents=True, exist_ok=True)
+    for digest in sorted((ROOT / "results").glob("*/report.json.sha256")):
+        (REPORTS / f"{digest.parent.name}.html").write_text(ht.read_report(digest.parent).to_html(), "utf-8")
+
+
 def main() -> int:
     """Build and check; returns the exit code."""
     parser = argparse.ArgumentParser(description="Build the site and check its links and spelling.")
@@ -117,6 +138,7 @@ def main() -> int:
     print(*[line for line in built.stderr.splitlines() if not line.startswith("[IPKernelApp]")], sep="\n")
     if built.returncode:
         return built.returncode
+    write_reports()
     found = [*broken_links(OUT.resolve()), *internals(OUT), *misspelt()]
     print("\n".join([*found, f"site: {OUT.relative_to(ROOT)}/index.html, {perf_counter() - began:.0f} s"]))
     return 1 if found else 0

@@ -15,7 +15,7 @@ from pygments.lexers.special import TextLexer
 import heavytop
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent / "tools")]
 # MathJax with its fonts in one file; the extension that the package is would copy 20 MB
 _MATHJAX = distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
 URLS = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["urls"]
@@ -80,7 +80,7 @@ nitpick_ignore_regex = [
 ]
 
 _MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
-_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Given", "Solved"}
+_CONSTRUCTED = {"HeavyTop", "State", "Body", "Attitude", "Integrator", "Precision", "Request", "Solution"}
 """Classes whose objects a user makes."""
 
 

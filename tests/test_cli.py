@@ -19,6 +19,8 @@ from heavytop.version import commit
 from support import in_process
 from support.helpers import VECTORS
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "heavytop"]
 TINY = """name = "tiny"
 [[measure]]

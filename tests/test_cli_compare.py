@@ -31,6 +31,7 @@ def heavytop(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
         return int(getattr(done, "code", None) or getattr(done, "exit_code", 0))
 
 
+@pytest.mark.slow
 def test_a_policy_decides_and_options_count_before_it(reports, monkeypatch, capsys) -> None:
     assert heavytop(monkeypatch, "compare", "old", "worse") == 1
     (reports / "policy.toml").write_text("loss_digits = 1")
@@ -60,6 +61,7 @@ def test_a_path_that_cannot_be_written_is_refused(reports, monkeypatch, capsys, 
 WRITTEN = {"--html": "page.html", "--markdown": "out.md", "--junit": "out.xml"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refused", WRITTEN)
 @pytest.mark.parametrize("name", ["nowhere/out", "old", "/dev/null", "same.out"])
 def test_all_files_are_written_or_none(reports, monkeypatch, capsys, refused: str, name: str) -> None:
@@ -114,6 +116,7 @@ def test_a_full_disk_leaves_no_file_behind(reports, monkeypatch, capsys, nth: in
     assert (reports / "out.md").read_text() == "of before"
 
 
+@pytest.mark.slow
 def test_a_page_that_cannot_be_written_leaves_no_table(reports, monkeypatch, capsys) -> None:
     pytest.importorskip("pyarrow")
     for page, table in (("nowhere/page.html", "rows.parquet"), ("page.html", "nowhere/rows.parquet")):
@@ -135,6 +138,7 @@ def test_nothing_is_written_where_a_report_is_wrong(reports, monkeypatch, capsys
     assert sorted(reports.iterdir()) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -154,6 +158,7 @@ def test_bad_input_is_refused_in_words(reports, monkeypatch, capsys, arguments: 
     assert captured.out == ""
 
 
+@pytest.mark.slow
 def test_a_report_of_very_many_rows_is_shown_by_its_worst(reports, monkeypatch, capsys) -> None:
     file = store.write(report(*(row(case=f"top[{i}]") for i in range(30))), reports / "old")
     for most, count in ((30, 30), (29, 1)):
@@ -169,6 +174,7 @@ def test_a_report_of_very_many_rows_is_shown_by_its_worst(reports, monkeypatch, 
     assert "twice" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch, capsys) -> None:
     assert heavytop(monkeypatch, "history", "old", "same", "worse") == 0
     text = capsys.readouterr().out
@@ -183,6 +189,7 @@ def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch,
     assert "Nothing changed" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_python_gives_what_the_commands_write(reports, monkeypatch, capsys) -> None:
     commands = {
         "history": ["history", "old", "same", "worse", "--html", "h.html", "--json"],

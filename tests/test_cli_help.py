@@ -9,6 +9,7 @@ import typer
 
 from heavytop.cli import app
 from heavytop.cli.app import SHELLS
+from heavytop.harness.plan import BUILT_IN
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 MOST = 55
@@ -37,11 +38,13 @@ def test_nothing_is_cut_at_80_columns() -> None:
         assert COMMANDS[name].help.partition("\n\n")[0] in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name: str) -> None:
     lines = heavytop(name, "--help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
     assert max(map(len, lines)) <= 80
     assert not any(line.rstrip().endswith("-") for line in lines)
+    assert not any("list[" in line for line in lines)
 
 
 LONG = {"run": "minutes", "selftest": "minute"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
@@ -52,6 +55,7 @@ def test_what_takes_long_says_how_long(name: str, words: str) -> None:
     assert words in " ".join(COMMANDS[name].help.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", SHELLS)
 def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
     script = heavytop("--completion", shell)
@@ -68,6 +72,7 @@ def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
     assert "selftest" not in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "names"),
     [("run --plan g", {"growth", "gate"}), ("list --case eu", {"euler"}), ("score --case eu", {"euler"})],
@@ -77,9 +82,15 @@ def test_names_of_plans_and_cases_are_completed(line: str, names: set[str]) -> N
     assert set(done.stdout.split()) == names
 
 
+@pytest.mark.slow
 def test_bash_reads_its_script_and_another_shell_is_refused() -> None:
     script = heavytop("--completion", "bash").stdout
     checked = subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True, check=False)
     assert checked.returncode == 0, checked.stderr
     refused = heavytop("--completion", "tcsh")
     assert (refused.returncode, "bash, zsh, fish" in refused.stderr) == (2, True)
+
+
+def test_the_help_of_run_names_every_plan_that_ships() -> None:
+    help_of = {parameter.name: parameter.help for parameter in COMMANDS["run"].params}
+    assert help_of["plan"].startswith(", ".join(BUILT_IN) + ", or a TOML file")

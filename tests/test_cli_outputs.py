@@ -87,6 +87,7 @@ def test_point_and_pivot_are_in_the_document() -> None:
         assert abs(float(place) - float(row[2]) - shift) < 1e-15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "more"), [("propagate", []), ("reference", ["--digits", "30"])])
 def test_csv_is_the_table_and_score_reads_it(command: str, more: list[str], tmp_path: Path) -> None:
     file = tmp_path / "table.csv"
@@ -119,6 +120,7 @@ def test_propagates_json_with_outputs_is_read_by_score(tmp_path: Path) -> None:
     assert len(read(file).states) == 2
 
 
+@pytest.mark.slow
 def test_latex_is_a_whole_table_of_siunitx_and_booktabs(tmp_path: Path) -> None:
     text = heavytop("reference", "--show", "quaternion", "--digits", "80", "--latex", "-")
     for part in (r"\usepackage{siunitx}", r"\usepackage{booktabs}", r"\toprule", r"\midrule", r"\bottomrule"):
@@ -156,6 +158,7 @@ def test_latex_needs_no_file() -> None:
     assert with_file_of_latex(["reference", "--latex", "x.tex"]) == ["reference", "--latex", "x.tex"]
 
 
+@pytest.mark.slow
 def test_eighty_digits_are_readable_on_eighty_columns() -> None:
     text = heavytop("reference", "--digits", "80", "--attitude")
     assert max(map(len, text.splitlines())) <= 80
@@ -168,6 +171,7 @@ def test_eighty_digits_are_readable_on_eighty_columns() -> None:
     assert first[2] == "±"
 
 
+@pytest.mark.slow
 def test_gimbal_lock_is_said_in_words() -> None:
     for command in ("propagate", "reference"):
         text = heavytop(command, "--show", "euler:ZXZ", centre="0,0,1", omega="0,0,3", gamma="0,0,1")
@@ -175,6 +179,7 @@ def test_gimbal_lock_is_said_in_words() -> None:
         assert "not defined" not in heavytop(command, "--show", "euler:ZXZ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["propagate", "reference"])
 @pytest.mark.parametrize(
     ("more", "message"),
@@ -219,6 +224,7 @@ def test_a_full_disk_leaves_the_file_of_before_and_no_part_of_another(
     assert (tmp_path / "table").read_text() == "of before"
 
 
+@pytest.mark.slow
 def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> None:
     options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
     command = [sys.executable, "-m", "heavytop", "reference", *options, "--csv", "a.csv", "--latex"]

@@ -54,6 +54,7 @@ def across(i: int, state: list) -> list:
     return [*state[:2], state[2] + 2e-9, *state[3:]]
 
 
+@pytest.mark.slow
 def test_the_first_lines_say_how_good_it_is() -> None:
     found = assess(given(spoilt=across))
     lines = printed(found)
@@ -68,6 +69,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
     assert found.peer.digits_right == assess(given()).digits_right
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["double-double", "real:600"])
 def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.score.measurement._EFFORT", 1e-6)
@@ -78,6 +80,7 @@ def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monke
     assert not any("heyoka" in line for line in printed(found)[:3])
 
 
+@pytest.mark.slow
 def test_without_a_reference_and_without_a_sample_no_digits_are_said() -> None:
     case = CASES["generic"]
     found = assess(given(case, [Fraction(3000)]))
@@ -90,6 +93,7 @@ def test_without_a_reference_and_without_a_sample_no_digits_are_said() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> None:
     run = ht.propagate(CASE.top, CASE.start, TIMES, DOUBLE)
     states = [[repr(float(v) * (-1 if i > 2 else 1)) for i, v in enumerate(state)] for state in run.states]
@@ -116,6 +120,7 @@ def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> 
     assert "Digits lost over time" in text
 
 
+@pytest.mark.slow
 def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     found = assess(given(spoilt=across))
     page = report_page(score_report(found, {"commit": "x"}), KINDS)
@@ -135,6 +140,7 @@ def write_motion(folder: Path, spoilt=lambda i, state: state, more: str = "") ->
     return str(folder / "motion.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoilt", [across, lambda i, state: [*state[:3], *(-x for x in state[3:])]])
 def test_the_page_of_score_and_that_of_its_report_are_the_same(spoilt, tmp_path: Path) -> None:
     motion, out = write_motion(tmp_path, spoilt), str(tmp_path / "out")
@@ -153,6 +159,7 @@ def test_the_page_of_score_and_that_of_its_report_are_the_same(spoilt, tmp_path:
     assert "heavytop report, plan score" in pages[1].read_text("utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("require", "spoilt", "more", "code", "said"),
     [
@@ -183,6 +190,7 @@ def test_a_number_of_digits_that_is_none_is_refused(require: str, tmp_path: Path
         ht.score(TIMES, given().states, top=CASE.top, start=CASE.start, require=require)
 
 
+@pytest.mark.slow
 def test_digits_that_nobody_knows_do_not_pass() -> None:
     def passed(case, times: list[Fraction], require: object) -> bool | None:
         run = ht.propagate(case.top, case.start, times)
@@ -204,6 +212,7 @@ def test_digits_that_nobody_knows_do_not_pass() -> None:
     assert "9 are resolved" in requirement(unsure, Fraction(10))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lagrange", "gyrostat", "goryachev"])
 def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) -> None:
     case = CASES[name]
@@ -254,6 +263,7 @@ def test_list_names_everything_once() -> None:
         command("list", "--case", "nothing")
 
 
+@pytest.mark.slow
 def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
     import numpy
 

@@ -47,6 +47,7 @@ def name(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_the_code_of_a_page_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -192,6 +193,7 @@ SHELL = re.compile(r"\|\||&&|;|>|&$|\s#\s")
 NOT_RUN = [command for page in PAGES for block in blocks(page) if block.not_run for command in commands(block.text)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", NOT_RUN)
 def test_the_program_understands_what_is_too_long_to_run(command: str) -> None:
     asked, *arguments = shlex.split(command)[1:]
@@ -238,6 +240,7 @@ def test_every_python_file_that_a_page_names_is_there() -> None:
     assert {each for each in named - known if each[1].split("/")[-1] not in of_users_and_others} == set()
 
 
+@pytest.mark.slow
 def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
     environment = folder_like_a_checkout(tmp_path)
     assert run_shell("false # exit code 1: as said\ntrue\n", tmp_path, environment).returncode == 0
@@ -268,7 +271,7 @@ def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
 
 def test_every_public_name_is_in_the_reference_once() -> None:
     told = re.findall(r"^\.\. (?:auto|py:)\w+:: (\w+)$", (DOCS / "api.md").read_text("utf-8"), re.M)
-    of_plug_ins = {"double_peer", "check_integrator", "Given", "Solved"}
+    of_plug_ins = {"double_peer", "check_integrator", "Request", "Solution"}
     assert sorted(told) == sorted([*ht.__all__, *of_plug_ins, *ht.plot.__all__])
 
 
@@ -286,6 +289,7 @@ def test_the_page_of_gates_shows_the_example_as_it_is() -> None:
         assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
 
 
+@pytest.mark.slow
 def test_what_several_pages_say_of_the_peers_is_what_the_report_says() -> None:
     report = ht.read_report(ROOT / "results" / "peers")
     said = " ".join(brief(report, report.rows, KINDS).split())

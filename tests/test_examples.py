@@ -223,6 +223,7 @@ def comments(folder: Path) -> list[tuple[int, str]]:
     return [(each["id"], each["body"]) for each in json.loads((folder.parent / "comments.json").read_text())]
 
 
+@pytest.mark.slow
 def test_one_comment_is_written_and_then_kept_up_to_date(folder: Path) -> None:
     others = comments(folder)
     end = f"[The run, with pages and reports]({RUN})\n"
@@ -234,6 +235,7 @@ def test_one_comment_is_written_and_then_kept_up_to_date(folder: Path) -> None:
     assert (folder.parent / "summary.md").read_text() == f"### heavytop: same\n{end}### heavytop: worse\n{end}"
 
 
+@pytest.mark.slow
 def test_the_comment_is_there_whatever_became_of_the_job(folder: Path) -> None:
     # a row that failed is for the comparison to say
     assert on_github(folder, "### heavytop: incomparable", 3, 3) == [0, 3, 0, 0, 0]
@@ -317,6 +319,7 @@ def project(folder: Path) -> str:
     return str(place)
 
 
+@pytest.mark.slow
 def test_a_baseline_is_proposed_and_a_mistake_found_in_a_fresh_environment(folder: Path) -> None:
     """Every step of shell as it stands, with heavytop installed from its repository, offline."""
     pytest.importorskip("hatchling")

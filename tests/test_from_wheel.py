@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 INTEGRATOR = '''
 """A program of somebody else: Runge-Kutta of order 4 for the top of the case lagrange; it knows nothing of heavytop."""

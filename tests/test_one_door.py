@@ -124,6 +124,7 @@ def outcome(call: Callable[[], Any]) -> Any:
         return type(error), error.cause, error.remedy
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GOOD)
 def test_good_input_propagates_to_the_same_numbers(name: str) -> None:
     given = DATA | GOOD[name]
@@ -138,6 +139,7 @@ def test_good_input_propagates_to_the_same_numbers(name: str) -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_of_a_propagation_is_the_same_error(name: str) -> None:
     given = DATA | BAD[name]
@@ -146,6 +148,7 @@ def test_bad_input_of_a_propagation_is_the_same_error(name: str) -> None:
     assert said == outcome(lambda: of_python(ht.propagate, given))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFERENCES)
 def test_a_reference_is_the_same_or_the_same_error(name: str) -> None:
     given = DATA | REFERENCES[name]
@@ -158,6 +161,7 @@ def test_a_reference_is_the_same_or_the_same_error(name: str) -> None:
         assert {key: printed[key] for key in document} == document
 
 
+@pytest.mark.slow
 def test_angles_are_of_both() -> None:
     given = DATA | {"times": "1,2", "attitude": ""}
     printed, run = of_command("propagate", given), of_python(ht.propagate, given, angles=True)
@@ -175,6 +179,7 @@ EVENTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", EVENTS)
 def test_events_are_the_same_or_the_same_error(function: str) -> None:
     given = DATA | EVENTS[function]
@@ -245,6 +250,7 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
         ["new", "new", "--language", "latin"],
         lambda: new_integrator(Path("new"), "latin"),
     ),
+    "body of no file": (["body", "nowhere.urdf"], lambda: ht.Body.from_file("nowhere.urdf")),
     "list of no case": (["list", "--case", "nobody"], lambda: case("nobody")),
     "docs of nothing": (["docs", "nothing"], lambda: page("nothing")),
     "score to no digits": (
@@ -256,6 +262,7 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_bad_input_of_every_other_command_is_the_same_error(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

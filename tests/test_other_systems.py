@@ -6,7 +6,11 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from support import in_process
+
+pytestmark = pytest.mark.slow
 
 PROGRAM = """
 import asyncio, importlib, os, pkgutil, select, signal, sys

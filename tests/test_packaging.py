@@ -44,6 +44,7 @@ def versions(file: str) -> set[str]:
     return set(re.findall(r"^[\w.-]+==\S+", (ROOT / "constraints" / file).read_text("utf-8"), re.M))
 
 
+@pytest.mark.slow
 def test_all_files_pin_the_same_versions() -> None:
     assert versions("run.txt") <= versions("test.txt")
     assert versions("run.txt") <= versions("docs.txt")
@@ -82,6 +83,7 @@ def recorded(wheel: Path) -> str | None:
         return content.read(names[0]).decode().strip() if names else None
 
 
+@pytest.mark.slow
 def test_a_wheel_records_its_commit_also_by_way_of_an_sdist(tmp_path: Path) -> None:
     project = tmp_path / "project"
     (project / "src" / "heavytop").mkdir(parents=True)

@@ -168,6 +168,7 @@ def test_decimal_text_rounds_to_nearest() -> None:
     assert decimal_text(Fraction(0), 9) == "0"
 
 
+@pytest.mark.slow
 @given(st.fractions(), st.integers(24, 300))
 def test_rounding_is_to_nearest_and_idempotent(value: Fraction, bits: int) -> None:
     near = round_to(value, bits)

@@ -27,6 +27,7 @@ from support import in_process
 COMPILERS = {"python": "python3", "c": "cc", "cpp": "g++", "rust": "rustc", "julia": "julia", "fortran": "gfortran"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(language: str, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
@@ -92,6 +93,7 @@ def test_a_folder_that_holds_anything_and_an_unknown_language_are_refused(tmp_pa
     assert new_integrator(tmp_path / "empty", "c")
 
 
+@pytest.mark.slow
 def test_from_nothing_to_a_gate_on_the_command_line(tmp_path: Path) -> None:
     def heavytop(*words: str) -> int:
         return in_process.heavytop(*words, cwd=tmp_path).returncode

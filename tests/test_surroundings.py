@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PYTHON = [sys.executable, "-m", "heavytop"]
 DATA = [
     "--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10",

@@ -114,11 +114,13 @@ def in_threads(wanted: list[Callable[[], Any]], threads: int = 8) -> list[Any]:
         return [future.result() for future in [pool.submit(each) for each in wanted]]
 
 
+@pytest.mark.slow
 def test_calls_from_eight_threads_give_the_bits_of_the_same_calls_in_order() -> None:
     wanted = calls()
     assert in_threads(wanted) == [each() for each in wanted]
 
 
+@pytest.mark.slow
 def test_eight_threads_that_ask_one_enclosure_get_the_balls_of_one() -> None:
     top, start = some_top(3)
     shared = Validated(top, start)
@@ -129,6 +131,7 @@ def test_eight_threads_that_ask_one_enclosure_get_the_balls_of_one() -> None:
         assert [(midpoint(x), radius(x)) for x in one] == [(midpoint(x), radius(x)) for x in other]
 
 
+@pytest.mark.slow
 def test_series_from_many_threads_are_whole() -> None:
     motions = [Euler(*some_top(i, free=True)) for i in range(4)]
 
@@ -139,6 +142,7 @@ def test_series_from_many_threads_are_whole() -> None:
     assert in_threads([partial(series, i) for i in range(24)]) == [series(i) for i in range(24)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "nested",
     [
@@ -176,6 +180,7 @@ def test_an_observer_may_wait_for_a_thread_that_evaluates() -> None:
     propagate_ensemble([Problem.of(*some_top(1), DOUBLE)] * 2, TIMES[:1], observer=lambda _, *rest: observer(*rest))
 
 
+@pytest.mark.slow
 def test_an_ensemble_beside_references_and_drifts_changes_none_of_them() -> None:
     problems = [Problem.of(*some_top(i), DOUBLE) for i in range(20)]
 
@@ -201,6 +206,7 @@ def test_a_run_that_raises_gives_its_engine_back(error: type[BaseException]) -> 
     assert propagated(1, DOUBLE) == before
 
 
+@pytest.mark.slow
 def test_peers_with_settings_of_the_whole_process_are_right_in_threads() -> None:
     pytest.importorskip("mpmath")
     wanted = [
@@ -312,6 +318,7 @@ def test_wrong_precisions_are_refused_and_nothing_stays_locked() -> None:
     assert in_threads([partial(referred, 1, 30)]) == [referred(1, 30)]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="signals are sent to threads on POSIX alone")
 def test_ctrl_c_works_while_another_thread_evaluates() -> None:
     main, inside, done = threading.get_ident(), threading.Event(), threading.Event()
@@ -338,6 +345,7 @@ def test_ctrl_c_works_while_another_thread_evaluates() -> None:
     assert in_threads([partial(referred, 1, 30)]) == [referred(1, 30)]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no such timer on this platform")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("what", ["closed form", "drift", "blocks"])

@@ -29,6 +29,7 @@ def refused(text: str) -> list[str]:
     return [found[0] for found in REFUSED.finditer(text)]
 
 
+@pytest.mark.slow
 def test_no_refused_phrase_stands_in_code_docs_or_messages() -> None:
     found = {}
     for path in TEXTS:

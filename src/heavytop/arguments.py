@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ImpossibleBody, InputError, quoted
 from heavytop.precision import (
     DOUBLE,
     Given,
     Precision,
+    as_integer,
+    cache_last_call,
     dot,
     exact,
-    last_call,
     ordered,
     parse,
     physical,
@@ -23,7 +25,6 @@ from heavytop.precision import (
     shown,
     usable_tolerance,
     vector,
-    whole,
 )
 from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
@@ -61,10 +62,12 @@ def motion(
     return _checked(top, start, precision, of_any_size)
 
 
-@last_call
+@cache_last_call
 def _checked(top: object, start: object, precision: Precision, of_any_size: bool) -> tuple[HeavyTop | Body, State]:
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
+    for text in body.warnings():
+        warnings.warn(text, ImpossibleBody, stacklevel=4)
     if not of_any_size:
         require_physical(body.top if isinstance(body, Body) else body, state)
     return body, state.require_unit_gamma(slack_of(precision))
@@ -127,7 +130,7 @@ def count(value: int | None, what: str) -> int | None:
     """A positive integer, or None."""
     if value is None:
         return None
-    found = whole(value, what)
+    found = as_integer(value, what)
     if found < 1:
         raise InputError(f"{what} = {quoted(found)} allows nothing.", "Give 1 or more, or None for no limit.")
     return min(found, _MOST)
@@ -135,7 +138,7 @@ def count(value: int | None, what: str) -> int | None:
 
 def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
-    found = None if value is None else whole(value, "step_limit")
+    found = None if value is None else as_integer(value, "step_limit")
     if found is not None and found < 1:
         raise InputError(f"step_limit = {quoted(found)} allows no step.", "Give 1 or more.")
     return None if found is None else min(found, _MOST)

@@ -15,6 +15,11 @@ _MOST = 12
 _ENDS = 5
 
 
+def plural(number: int, one: str, many: str = "") -> str:
+    """``1 row``, ``2 rows``."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
 class Tabular:
     """What shows itself as a table: ``repr`` as text, in a notebook as HTML."""
 

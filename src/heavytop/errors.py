@@ -51,6 +51,10 @@ class HeavyTopError(Exception):
         self.remedy = remedy
 
 
+class ImpossibleBody(UserWarning):
+    """A body whose moments of inertia no rigid body has, though the equations have solutions."""
+
+
 class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 
@@ -96,3 +100,7 @@ class OutOfTime(HeavyTopError):
     """A third-party integrator that was stopped at the time limit of its row."""
 
     exit_code = 3
+
+
+class NotAsked(OutOfTime):
+    """A row of a third-party integrator that ran out of time in others."""

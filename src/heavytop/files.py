@@ -40,9 +40,9 @@ def line(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest().encode() + b" " + content + b"\n"
 
 
-def verified(whole: bytes) -> bytes | None:
+def verified(signed: bytes) -> bytes | None:
     """The content of a line without its line break; None where it was damaged."""
-    digest, _, content = whole.partition(b" ")
+    digest, _, content = signed.partition(b" ")
     return content if hashlib.sha256(content).hexdigest().encode() == digest else None
 
 
@@ -52,7 +52,7 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
     Raises InputError where it cannot be written; then nothing is left behind.
     """
     digest = hashlib.sha256()
-    with whole(path) as file:
+    with atomic_write(path) as file:
         for piece in [content] if isinstance(content, bytes) else content:
             file.write(piece)
             digest.update(piece)
@@ -66,7 +66,7 @@ def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
     """
     with ExitStack() as stack:
         for path, content in contents:
-            file = stack.enter_context(whole(path))
+            file = stack.enter_context(atomic_write(path))
             file.write(content)
             # what a full disk refuses is known before the first file takes its name
             file.flush()
@@ -74,7 +74,7 @@ def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[BinaryIO]:
+def atomic_write(path: Path) -> Iterator[BinaryIO]:
     """A file that takes the name ``path`` when all of it is written, and leaves nothing behind where that fails.
 
     Raises InputError where it cannot be written.

@@ -74,7 +74,7 @@ FORMATS = DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD
 
 def real(bits: int) -> Precision:
     """The arbitrary-precision format with ``bits`` (24 to 20000) significant bits; raises InputError outside."""
-    count = whole(bits, "the bits of real:BITS")
+    count = as_integer(bits, "the bits of real:BITS")
     if count not in REAL_BITS:
         raise InputError(f"real:{quoted(count)} is not a format.", "The bits of real:BITS go from 24 to 20000.")
     return Precision(f"real:{count}", count)
@@ -93,7 +93,7 @@ def parse(name: str) -> Precision:
     )
 
 
-def whole(value: Any, what: str) -> int:
+def as_integer(value: Any, what: str) -> int:
     """``value`` as an integer; raises InputError for a bool, for a float even if it is whole, and for anything else."""
     try:
         if type(value).__name__ != "bool":  # Python's or numpy's
@@ -224,6 +224,11 @@ def shown(value: Fraction) -> str:
     return str(value) if short else decimal_text(round_to(value, 64), 6)
 
 
+def six_digits(value: Fraction) -> str:
+    """A number for a sentence, to six digits without trailing zeros."""
+    return f"{float(decimal_text(value, 6)):.6g}"
+
+
 def time_text(time: Fraction) -> str:
     """A time in reports: exact where 20 digits suffice, else 20 digits."""
     text = decimal_text(time, 20)
@@ -296,8 +301,8 @@ def _significand(value: Fraction, bits: int) -> tuple[int, int]:
 def _nearest(value: Fraction, exponent: int) -> int:
     """value/2^exponent rounded to the nearest integer, ties to even."""
     above, below = value.numerator << max(0, -exponent), value.denominator << max(0, exponent)
-    whole, rest = divmod(above, below)
-    return whole + (2 * rest > below or (2 * rest == below and whole % 2))
+    quotient, rest = divmod(above, below)
+    return quotient + (2 * rest > below or (2 * rest == below and quotient % 2))
 
 
 def number(value: Fraction, precision: Precision) -> Any:
@@ -460,7 +465,7 @@ def native_text(value: Any, precision: Precision) -> str:
 Found = TypeVar("Found")
 
 
-def last_call(function: Callable[..., Found]) -> Callable[..., Found]:
+def cache_last_call(function: Callable[..., Found]) -> Callable[..., Found]:
     """``function`` of positional arguments that do not change, called again only where one is another object.
 
     An exception is not kept.  Threads may call it: at worst each computes for itself.

@@ -21,12 +21,13 @@ from heavytop.precision import log10 as log10_of
 SCHEMA = "heavytop-report/2"
 
 OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
-UNSUPPORTED, OUT_OF_TIME = "unsupported", "out_of_time"
-UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME
+UNSUPPORTED, OUT_OF_TIME, NOT_ASKED = "unsupported", "out_of_time", "not_asked"
+UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME, NOT_ASKED
 """Outcomes of a row that was aborted: it has no metrics, and says why in the place of a reference.
 
 failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
-cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row."""
+cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row.
+not_asked: it had run out of time in two other rows of that run."""
 
 FINEST = "eps"
 """In the place of a tolerance: the finest that an integrator offers."""
@@ -37,6 +38,8 @@ Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0)]
+UNRESOLVED_SECONDS = "unresolved"
+"""Of the seconds of a row: how many are resolved at least, where its own are fewer."""
 MetricKind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
@@ -376,8 +379,9 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
     data: of the top and its start, before any rounding; null where no motion is measured.
-    amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
-    an estimate; null where no single motion is integrated.
+    request: what the table of the plan asks that no other field says, such as the sweep of a survey.
+    amplification: the largest factor by which the motion itself has amplified a change of its state, whenever that was
+    made, up to the horizon, an estimate; null where no single motion is integrated.
     explained: what explains the states of a third-party integrator that are far off, where something does.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     worst: of a survey, first the worst; spread: its distributions.  chunk: Parquet bytes of a part of one; no report
@@ -410,6 +414,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     seconds: dict[str, Seconds] = {}
     evaluations: Count | None = None
     data: Data | None = None
+    request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
     amplification: Annotated[float, msgspec.Meta(ge=1)] | None = None
     worst: tuple[Worst, ...] | msgspec.UnsetType = msgspec.UNSET
     spread: Spread | msgspec.UnsetType = msgspec.UNSET

@@ -26,6 +26,7 @@ def known():
     return ht.reference(TOP, START, TIMES, 25, derivatives="all")
 
 
+@pytest.mark.slow
 def test_arrays_have_the_shapes_that_were_asked_for(known):
     found = known.derivatives_numpy()
     assert {name: part.shape for name, part in found.items()} == {"start": (2, 6, 6), "data": (2, 6, 6)}
@@ -38,6 +39,7 @@ def test_arrays_have_the_shapes_that_were_asked_for(known):
         data.lyapunov()
 
 
+@pytest.mark.slow
 def test_the_lyapunov_exponent_is_that_of_the_matrix(known):
     for time, exponent, matrix in zip((1, 1.5), known.lyapunov(), known.derivatives_numpy()["start"], strict=True):
         assert abs(float(exponent.value) - np.log(np.linalg.svd(matrix)[1][0]) / time) < 1e-14
@@ -69,6 +71,7 @@ def test_digits_of_a_jacobian_are_counted_where_it_is_wrong(known):
     assert "∂Ω3/∂γ2(0)" in repr(score)
 
 
+@pytest.mark.slow
 def test_text_of_many_digits_is_scored_to_its_last(known):
     texts = [[[ball.value for ball in row] for row in rows] for rows in known.derivatives.start]
     score = ht.score_derivatives(TIMES, texts, top=TOP, start=START)
@@ -130,6 +133,7 @@ def test_what_nobody_waits_for_is_out_of_reach():
         ht.reference(ht.HeavyTop((2, 2, 1), 1, (0, 0, 1)), START, ["1e9"], 20, derivatives="start")
 
 
+@pytest.mark.slow
 def test_the_command_line_prints_every_entry_at_80_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     shown = CliRunner().invoke(app, [*COMMAND, "--derivatives", "all"])
@@ -163,6 +167,7 @@ def _tilted(centre=("1/2", "1/3", "1/5"), omega=("1/10", "2/5", "9/10")):
     return body, ht.State(omega=omega, gamma=("3/5", 0, "4/5"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0, 2])
 def test_derivatives_of_a_body_are_in_the_axes_given(place):
     step = Fraction(1, 10**15)
@@ -192,6 +197,7 @@ def test_irrational_axes_are_refused_with_the_remedy():
         ht.reference(body, START, [1], 20, derivatives="start")
 
 
+@pytest.mark.slow
 def test_threads_that_ask_at_once_get_what_each_gets_alone():
     starts = [ht.State(("1/10", Fraction(k, 5), "9/10"), ("3/5", 0, "4/5")) for k in range(3)]
 

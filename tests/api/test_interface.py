@@ -26,6 +26,7 @@ runs = [{ precision = "double", horizon = "5", samples = 5 }]
 """
 
 
+@pytest.mark.slow
 def test_importing_loads_nothing_heavy_and_every_name_is_there() -> None:
     script = (
         "import sys, heavytop\n"
@@ -39,6 +40,7 @@ def test_importing_loads_nothing_heavy_and_every_name_is_there() -> None:
     assert done.stdout == "module 'heavytop' has no attribute 'nonsense'\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [ht.DOUBLE, ht.EXTENDED, ht.QUAD, ht.real(100)], ids=lambda p: p.name)
 def test_a_run_is_an_array_of_the_formats_numbers(precision: ht.Precision) -> None:
     run = ht.propagate(TOP, START, TIMES, precision)
@@ -68,6 +70,7 @@ def test_times_and_vectors_come_as_arrays_of_any_format() -> None:
     assert ht.propagate(top, off, times=[1]).outcome is ht.Outcome.SUCCESS
 
 
+@pytest.mark.slow
 def test_an_ensemble_is_its_motions_and_every_integrator_has_the_same_call() -> None:
     tops = [TOP, ht.HeavyTop((3, 2, 1), 1, (0, 1, 0))]
     runs = ht.ensemble(tops, START, TIMES, threads=2)
@@ -94,6 +97,7 @@ def test_a_reference_is_balls_as_text_and_as_arrays() -> None:
             assert radius or ball.radius == "0", "too small for a double, and still a bound"
 
 
+@pytest.mark.slow
 def test_arrays_are_scored_as_the_command_line_scores_them(tmp_path: Path) -> None:
     run = ht.propagate(TOP, START, TIMES, ht.EXTENDED)
     score = ht.score(TIMES, run.states, top=TOP, start=START)
@@ -133,6 +137,7 @@ def test_states_that_are_not_finite_are_an_outcome() -> None:
         assert ht.score(TIMES, states, top=TOP, start=START).outcome == "non_finite"
 
 
+@pytest.mark.slow
 def test_everything_prints_as_a_small_table() -> None:
     run = ht.propagate(TOP, START, np.linspace(0, 1, 500))
     shown = [
@@ -164,6 +169,7 @@ print(found[0].verdict, ht.compare("out", found[0]).verdict)
 """
 
 
+@pytest.mark.slow
 def test_a_plain_script_needs_no_main_guard(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(PLAN)
     (tmp_path / "script.py").write_text(SCRIPT)
@@ -172,6 +178,7 @@ def test_a_plain_script_needs_no_main_guard(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("began\ncomplete same\n", "")
 
 
+@pytest.mark.slow
 def test_children_of_others_still_know_the_script(tmp_path: Path) -> None:
     """What keeps our children from importing the script is undone for everyone else."""
     (tmp_path / "script.py").write_text(
@@ -190,6 +197,7 @@ def test_children_of_others_still_know_the_script(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("\n__mp_main__\n", "")
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_read_again_and_a_plan_of_odd_moments_warns(tmp_path: Path) -> None:
     plan = tmp_path / "odd.toml"
     plan.write_text(
@@ -208,6 +216,7 @@ def test_a_finished_run_is_read_again_and_a_plan_of_odd_moments_warns(tmp_path: 
     assert done.stderr.startswith(f"heavytop: warning: {warned}")
 
 
+@pytest.mark.slow
 def test_an_error_below_what_a_float_holds_is_not_printed_as_0() -> None:
     form = ht.real(1400)
     top = ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4"))

@@ -253,6 +253,7 @@ def test_the_table_names_every_argument_of_every_public_function() -> None:
         assert all(each.kind is not each.VAR_KEYWORD for each in parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     ("name", "argument"), [(name, argument) for name, (_, arguments) in GOOD.items() for argument in arguments]
@@ -274,6 +275,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
         answered(function, arguments | {argument: odd})
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HeavyTop", "State", "propagate", "ensemble", "reference", "score", "compare"])
 def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
@@ -291,6 +293,7 @@ def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
 NUMBERS = [value for value in ODD if not isinstance(value, list | tuple | dict | set)]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_one_odd_component_is_answered_or_refused_in_words() -> None:
     for odd in NUMBERS:

@@ -46,6 +46,7 @@ def rendered(axes) -> None:
     axes.figure.canvas.draw()
 
 
+@pytest.mark.slow
 def test_the_axis_in_space_is_that_of_the_reference(run, known) -> None:
     mine, theirs = drawn(ht.plot.sphere(run)), drawn(ht.plot.sphere(known, of="axis3"))
     assert abs(mine - theirs).max() < 1e-11
@@ -61,6 +62,7 @@ def test_the_axis_in_space_is_that_of_the_reference(run, known) -> None:
     assert (vertical == run.to_numpy()[:, 3:]).all()
 
 
+@pytest.mark.slow
 def test_the_polhode_lies_on_the_ellipsoid_and_the_herpolhode_in_its_plane() -> None:
     free = ht.propagate(FREE, ht.State(("1/5", 1, "1/10"), (0, 0, 1)), TIMES)
     omega = drawn(ht.plot.polhode(free))
@@ -90,6 +92,7 @@ def test_phase_planes_and_sections(run) -> None:
     assert len(lines(ht.plot.poincare(one))[0]) == len(one)
 
 
+@pytest.mark.slow
 def test_drift_digits_and_error_are_those_of_the_score(run, known) -> None:
     score = ht.score(TIMES, run.states, top=LAGRANGE, start=START, precision=ht.DOUBLE)
     digits = drawn(ht.plot.digits(run, known))[:, 1]
@@ -109,6 +112,7 @@ def test_drift_digits_and_error_are_those_of_the_score(run, known) -> None:
     assert drawn(ht.plot.digits(quad, ht.reference(LAGRANGE, START, TIMES, 45)))[:, 1].min() > 31
 
 
+@pytest.mark.slow
 def test_axes_go_in_and_come_out_and_nothing_else_is_touched(run, known) -> None:
     before = dict(matplotlib.rcParams)
     figure = Figure()
@@ -130,6 +134,7 @@ def test_axes_go_in_and_come_out_and_nothing_else_is_touched(run, known) -> None
     assert plt.get_fignums() == []
 
 
+@pytest.mark.slow
 def test_a_film_is_saved_as_gif(run, tmp_path) -> None:
     file = tmp_path / "top.gif"
     ht.plot.animate(run, file, frames=3)

@@ -42,6 +42,7 @@ def test_bits_are_those_of_propagate(top: ht.HeavyTop, times: list[Any]) -> None
     assert same(ht.Integrator(top).propagate(START, times), ht.propagate(top, START, times))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "start"),
     [

@@ -54,6 +54,7 @@ def test_a_bad_one_fails(heavytop_gate):
 """
 
 
+@pytest.mark.slow
 def test_a_session_passes_and_fails_and_says_what_went_wrong(tmp_path: Path) -> None:
     (tmp_path / "test_gate.py").write_text(TESTS)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", str(tmp_path)]

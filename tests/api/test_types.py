@@ -42,6 +42,7 @@ ht.nonsense  # error: Module has no attribute "nonsense"
 """
 
 
+@pytest.mark.slow
 def test_a_type_checker_sees_the_types_of_every_public_function(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     (tmp_path / "user.py").write_text(USER)

@@ -46,6 +46,7 @@ def test_the_root_of_a_square_takes_the_sign_of_the_domain():
     assert not field(wrong, 0).is_zero(wrong)
 
 
+@pytest.mark.slow
 def test_what_is_proven_is_never_refuted_by_a_ball():
     draw = random.Random(7)
     for _ in range(60):
@@ -56,6 +57,7 @@ def test_what_is_proven_is_never_refuted_by_a_ball():
         assert field(expression).is_zero(expression) == value.contains(0)
 
 
+@pytest.mark.slow
 def test_expressions_are_in_the_factors_that_sympy_finds():
     rng = random.Random(12)
     symbols = sympy.symbols("p q r s", real=True)
@@ -75,6 +77,7 @@ def test_expressions_are_in_the_factors_that_sympy_finds():
         assert len(found.args) == len(known.args)
 
 
+@pytest.mark.slow
 def test_an_expression_of_many_terms_needs_no_factors_of_sympy(monkeypatch):
     """SymPy finds them by lucky draws: of 74 terms in a tenth of a second, and now and then in minutes."""
     monkeypatch.setattr(sympy, "factor", None)

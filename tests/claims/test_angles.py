@@ -24,6 +24,7 @@ def verdict(zero: str, assume: tuple[str, ...]) -> str:
 TO_4, TO_1 = ("a > 0", "a < 4"), ("a > 0", "a < 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("zero", "assume"),
     [
@@ -47,6 +48,7 @@ def test_in_its_range_it_holds(zero, assume):
     assert verdict(zero, assume) == "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("zero", "assume"),
     [

@@ -32,6 +32,7 @@ def verdicts(found: Audit, equation: str, branch: str = "smooth", domain: str = 
     return [row.holds for _, row in sorted(rows(found, equation, branch, domain).items())]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [("smooth", "all"), ("printed", "t<=0")])
 def test_partial_case_fails_in_1_2_alone_where_the_roots_follow_the_flow(place):
     found = report("ershkov-partial")
@@ -44,6 +45,7 @@ def test_partial_case_fails_in_1_2_alone_where_the_roots_follow_the_flow(place):
     assert rows(found, "3.1", *place)[2].residual == "-k/2"
 
 
+@pytest.mark.slow
 def test_partial_case_fails_everywhere_on_the_printed_roots_after_0():
     found = report("ershkov-partial")
     assert verdicts(found, "1.1", "printed", "t>0") == [False, False, False]
@@ -51,6 +53,7 @@ def test_partial_case_fails_everywhere_on_the_printed_roots_after_0():
     assert verdicts(found, "1.3", "printed", "t>0") == [True, True, True]
 
 
+@pytest.mark.slow
 def test_psi_is_a_line_with_u_of_4_2_and_breaks_at_0_with_u_the_root_of_omega2():
     found = report("ershkov-partial")
     assert verdicts(found, "4.6") == [True, True]
@@ -58,12 +61,14 @@ def test_psi_is_a_line_with_u_of_4_2_and_breaks_at_0_with_u_the_root_of_omega2()
     assert verdicts(found, "4.6", "printed", "t>0")[0] is False
 
 
+@pytest.mark.slow
 def test_arctan_of_4_5_loses_the_quadrant_after_0():
     found = report("ershkov-partial")
     assert verdicts(found, "4.5", "printed", "t<=0") == [True, True, True]
     assert verdicts(found, "4.5", "printed", "t>0") == [False, True, True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ershkov-partial", "ershkov-general"])
 def test_everything_holds_on_the_smooth_branch_of_the_gyrostat(name):
     smooth = only_branch(report(name, "gyrostat"), "smooth")
@@ -72,6 +77,7 @@ def test_everything_holds_on_the_smooth_branch_of_the_gyrostat(name):
     assert {row.equation for row in smooth.rows} >= {"1.1", "1.2", "1.3", "3.1"}
 
 
+@pytest.mark.slow
 def test_general_case_holds_in_1_1_and_1_3_and_is_refuted_in_1_2():
     found = report("ershkov-general")
     assert verdicts(found, "1.1") == verdicts(found, "1.3") == [True, True, True]
@@ -81,6 +87,7 @@ def test_general_case_holds_in_1_1_and_1_3_and_is_refuted_in_1_2():
     assert verdicts(found, "2.2") == verdicts(found, "2.3") == verdicts(found, "2.4") == [True]
 
 
+@pytest.mark.slow
 def test_general_case_with_positive_roots_holds_only_where_omega2_falls():
     found = report("ershkov-general")
     assert verdicts(found, "1.1", "printed", "t<=0") == [True, True, True]
@@ -88,6 +95,7 @@ def test_general_case_with_positive_roots_holds_only_where_omega2_falls():
     assert "Omega2' > 0" in rows(found, "1.1", "printed", "t>0")[1].note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ershkov-partial", "ershkov-general"])
 def test_the_reason_is_proven_and_the_system_that_is_solved_is_named(name):
     found = report(name)
@@ -143,6 +151,7 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     return ershkov.psi(i1, i3, alpha, u, t, lib) + sympy.Rational(1, 10**12) * t
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("claim", "equation"),
     [
@@ -169,6 +178,7 @@ def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(c
         assert all(row.holds is False for row in found if row.equation == equation)
 
 
+@pytest.mark.slow
 def test_samples_of_the_general_case_lie_where_both_roots_are_real():
     claim = GeneralClaim()
     for statement in claim.statements(HEAVY_TOP):

@@ -80,6 +80,7 @@ def test_a_rotor_that_the_gyrostat_changes_is_refused(rotor):
         judged(integral("1", top={"rotor": rotor}), "gyrostat")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotor", ["2", f"1/{AREA}", MOMENTUM, f"2*{AREA} - 1/3"])
 def test_a_rotor_that_is_a_first_integral_of_the_gyrostat_is_one(rotor):
     assert judged(integral(f"{MOMENTUM} + {AREA}", top={"rotor": rotor}), "gyrostat").verdict == "holds"
@@ -117,6 +118,7 @@ def test_a_state_off_the_unit_sphere_is_refused_by_name(gamma, size):
         judged(integral("Omega1", said={"states": [good, ["1", "2", "3", *gamma]]}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "named"),
     [
@@ -135,6 +137,7 @@ def test_what_is_defined_off_the_unit_sphere_alone_is_undecided_and_said(value, 
     assert named in reasons(report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "value", [f"{G} - 4", f"sqrt({G}) - 2", f"{G} + {AREA}^2", f"gamma1^2 + {G} + 1", "gamma1 - 2"]
 )
@@ -142,6 +145,7 @@ def test_a_relation_that_no_body_meets_is_undecided(value):
     assert judged(integral(value, "relation")).verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_a_relation_that_contradicts_the_unit_sphere_is_said_to():
     assert "exclude each other within |gamma| = 1" in reasons(judged(integral(f"{G} - 4", "relation")))
     where = {"where": [f"{G} - 4"]}
@@ -162,6 +166,7 @@ def test_what_is_constant_on_the_unit_sphere_holds(value):
     assert judged(integral(value)).verdict == "holds"
 
 
+@pytest.mark.slow
 def test_what_is_constant_off_the_unit_sphere_alone_is_refuted_on_it():
     for value in (f"{ENERGY} + Omega1*({G} - 4)", f"{AREA}*(1 + Omega3*({G} - 1/2))"):
         (row,) = judged(integral(value)).rows
@@ -176,6 +181,7 @@ def of_moments(**samples) -> dict:
     return integral("Omega1", top={"inertia": ["a", "b", "c"]}, parameters={"a": "1", "b": "1", **samples})
 
 
+@pytest.mark.slow
 def test_a_witness_has_the_moments_of_a_body():
     assert judged(of_moments(c="2")).verdict == "refuted"  # flat, and a body
     report = judged(of_moments(c="2 + 1e-30".replace(" + 1e-30", ".000000000000000000000000000001")))
@@ -220,6 +226,7 @@ PLANE = ("Omega2", "Omega3", "gamma1")
 ON_AXIS_3 = {"centre": ["0", "0", "1"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("u", ["Omega1", "gamma2", "gamma3", "(Omega1*gamma3)"])
 @pytest.mark.parametrize(
     "half", ["sqrt({0}^2) - {0}", "sqrt({0}^2 + Omega3^2) - {0}", "sqrt({0}^2 + 3*gamma1^2)*2 + 2*{0}"]
@@ -240,6 +247,7 @@ def test_half_a_plane_that_the_flow_keeps_is_one():
     assert "is divided by" not in reasons(report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "value",
     [
@@ -254,6 +262,7 @@ def test_a_quotient_keeps_its_sign_only_where_its_divisor_does(value):
     assert "not shown" in reasons(report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "value",
     [

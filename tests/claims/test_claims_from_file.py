@@ -52,6 +52,7 @@ def refuted(report: Audit) -> set[tuple[str, int]]:
     return {(row.equation, row.component) for row in report.rows if row.holds is False}
 
 
+@pytest.mark.slow
 def test_the_delone_motion_holds_in_every_equation():
     report = verdict(table("delone-homoclinic"))
     assert report.verdict == "holds"
@@ -59,6 +60,7 @@ def test_the_delone_motion_holds_in_every_equation():
     assert {row.equation for row in report.rows} == {"1.1", "1.2", "1.3"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "index", "wrong", "expected"),
     [
@@ -82,6 +84,7 @@ def test_the_lagrange_example_is_refuted_in_1_1_and_holds_with_the_sign_put_righ
     assert verdict(content).verdict == "holds"
 
 
+@pytest.mark.slow
 def test_kovalevskayas_integral_holds_and_fails_with_other_moments():
     content = table("kovalevskaya-integral")
     assert verdict(content).verdict == "holds"
@@ -89,6 +92,7 @@ def test_kovalevskayas_integral_holds_and_fails_with_other_moments():
     assert verdict(content).verdict == "refuted"
 
 
+@pytest.mark.slow
 def test_the_momentum_is_constant_for_the_gyrostat_and_not_for_the_heavy_top():
     content = table("momentum-squared")
     assert verdict(content).verdict == "refuted"
@@ -114,6 +118,7 @@ def test_a_conditional_integral_holds_on_its_condition_alone():
     assert verdict(content).verdict == "refuted"
 
 
+@pytest.mark.slow
 def test_hess_relation_is_invariant_under_its_relation_between_the_parameters():
     content = {
         "name": "hess",
@@ -130,6 +135,7 @@ def test_hess_relation_is_invariant_under_its_relation_between_the_parameters():
     assert verdict(content).verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_what_the_algebra_cannot_carry_is_undecided_and_never_holds():
     content = table("delone-homoclinic")
     # 0 for t > 0, but no algebra of this kind knows it
@@ -141,6 +147,7 @@ def test_what_the_algebra_cannot_carry_is_undecided_and_never_holds():
     assert all(row.residual.startswith("|residual| < ") for row in report.rows if row.holds is None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", HOSTILE)
 def test_a_hostile_formula_is_refused_at_once(formula):
     content = table("delone-homoclinic")
@@ -151,6 +158,7 @@ def test_a_hostile_formula_is_refused_at_once(formula):
     assert time.monotonic() - before < 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["(" * 500_000 + ")" * 500_000, "a = " + "[" * 50_000, "\x00", "name = 1"])
 def test_a_hostile_file_is_exit_2(tmp_path, text):
     from heavytop.cli import app
@@ -177,11 +185,13 @@ def test_a_sample_that_breaks_an_assumption_is_refused():
         verdict(content)
 
 
+@pytest.mark.slow
 def test_a_file_is_audited_by_its_path():
     report = audit(str(EXAMPLES / "momentum-squared.toml"))
     assert (report.claim, report.exit_code) == ("momentum-squared", 1)
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_json_that_scripts_read():
     import json
 

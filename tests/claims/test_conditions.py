@@ -46,6 +46,7 @@ def open_conditions(report: Audit) -> str:
     return "; ".join(f"{c.text} {c.reason}" for row in report.rows for c in row.conditions if not c.discharged)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spin", "domain", "named"),
     [
@@ -183,6 +184,7 @@ def test_what_is_0_at_the_samples_is_not_said_to_be_smaller():
     assert row.residual == "0 at the sample points"
 
 
+@pytest.mark.slow
 def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion(tmp_path):
     from heavytop.cli import app
 
@@ -201,6 +203,7 @@ def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_mot
     assert "t" not in document["equations"][0]["witness"]
 
 
+@pytest.mark.slow
 def test_conditions_stand_in_the_text_and_in_the_json(tmp_path):
     from heavytop.cli import app
 
@@ -218,6 +221,7 @@ def test_conditions_stand_in_the_text_and_in_the_json(tmp_path):
     assert {"text": "t ≠ 0", "discharged": False, "reason": "not shown"} in conditions
 
 
+@pytest.mark.slow
 def test_the_papers_angles_list_their_pole_as_removable():
     for system in ("heavy_top", "gyrostat"):
         rows = [row for row in audit("ershkov-partial", system).rows if row.equation in ("3.1", "4.5", "4.6", "6.1")]
@@ -236,6 +240,7 @@ LOOSE = {
 }
 
 
+@pytest.mark.slow
 def test_an_undecided_claim_says_which_assumption_would_decide_it_and_that_one_does(unhurried) -> None:
     report = audit_claim(claim_from_table(LOOSE, "claim"))
     assert report.verdict == "undecided"
@@ -281,6 +286,7 @@ def _spinning(value: str) -> dict:
     return UPRIGHT | {"motion": UPRIGHT["motion"] | {"omega": ["0", "0", value]}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "missing"),
     [
@@ -317,6 +323,7 @@ def test_a_divisor_that_no_parameters_make_0_all_over_is_removable(value: str) -
     assert _verdict(_spinning(value), [])[0] == "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("domain", ["all", "t<=0", "t>0"])
 def test_a_zero_of_a_divisor_is_removable_on_each_half_of_the_time(domain: str) -> None:
     table = _spinning("sin(-g*t)/sin(-g*t)") | {"domain": domain}
@@ -350,6 +357,7 @@ def test_what_is_assumed_to_be_unequal_is_of_no_sign() -> None:
             _verdict(table, [text])
 
 
+@pytest.mark.slow
 def test_components_of_gamma_lie_between_minus_1_and_1() -> None:
     for value, verdict in (("sin(asin(gamma1)) - gamma1", "holds"), ("sin(asin(2*gamma1)) - 2*gamma1", "undecided")):
         assert _verdict(SPIN | {"integral": {"value": value}}, [])[0] == verdict

@@ -18,7 +18,7 @@ from heavytop.features.claims.algebra.structure import Defined, at_values, rate_
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP
 
-_PATH = Path(__file__).parents[2] / "benchmarks" / "disguised_claims.py"
+_PATH = Path(__file__).parents[2] / "validation" / "disguised_claims.py"
 T = sympy.Symbol("t", real=True)
 A, B, C = sympy.symbols("a b c", real=True)
 P, Q = sympy.symbols("p q", positive=True)
@@ -33,8 +33,9 @@ def disguised():
     return module
 
 
+@pytest.mark.slow
 def test_a_part_of_the_family_is_decided_and_nothing_false_holds(disguised):
-    """The whole of it is in benchmarks/disguised_claims.py; one of some twenty takes seconds."""
+    """The whole of it is in validation/disguised_claims.py; one of some twenty takes seconds."""
     chosen = [claim for claim in disguised.claims() if claim.family != "definitions"][4::23]
     found = [(claim, disguised.verdict(claim)[0]) for claim in chosen]
     assert [claim.table for claim, verdict in found if disguised.is_fault(claim.expected, verdict)] == []
@@ -58,6 +59,7 @@ def said(x: str, **changes: object) -> str:
 # --- orders ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("x", "assume", "holds"),
     [
@@ -138,6 +140,7 @@ def test_a_relation_is_solved_where_it_has_one_solution(relation, symbol, value)
         assert sympy.simplify((symbol - value).subs(difference)) == 0
 
 
+@pytest.mark.slow
 def test_a_solution_keeps_what_was_known_of_its_symbol():
     """b = √(1 − a²) where b > 1/2, and not where b > −1."""
     given = {"parameters": {"a": "3/5", "b": "4/5"}, "relations": ["a^2 + b^2 - 1"]}
@@ -150,6 +153,7 @@ def test_a_solution_keeps_what_was_known_of_its_symbol():
         assert (said(x, assume=assume, **given) == "holds") is holds
 
 
+@pytest.mark.slow
 def test_two_relations_are_solved_one_after_the_other():
     given = {"parameters": {"a": "8", "b": "2", "c": "2"}, "assume": ["b > 0"]}
     assert said("a/c^3", relations=["a - b^3", "b^3 - c^3"], **given) == "holds"
@@ -195,6 +199,7 @@ def test_a_denested_root_is_the_root_at_random_values(sign, order):
             assert abs(sympy.N(found.subs(values) - nested.subs(values))) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("x", "given", "holds"),
     [
@@ -231,6 +236,7 @@ def test_a_sum_that_jumps_inside_the_domain_proves_nothing():
 # --- saturation -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("relation", "assume", "holds"),
     [
@@ -250,6 +256,7 @@ def test_a_factor_that_is_never_0_is_divided_out_and_no_other(relation, assume, 
     assert (said("a", **given) == "holds") is holds
 
 
+@pytest.mark.slow
 def test_what_is_only_kept_from_0_along_a_motion_is_not_divided_out():
     """sqrt(E) needs E ≥ 0; on E Ω1 = 0 the motions with E = 0 have any Ω1."""
     energy = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
@@ -262,6 +269,7 @@ def test_what_is_only_kept_from_0_along_a_motion_is_not_divided_out():
     assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict != "holds"
 
 
+@pytest.mark.slow
 def test_a_relation_of_hess_needs_no_sign_of_its_centre():
     table = {
         "name": "Hess",
@@ -278,6 +286,7 @@ def test_a_relation_of_hess_needs_no_sign_of_its_centre():
     assert audit_claim(claim_from_table(wrong, "x"), HEAVY_TOP).verdict != "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("divisor", "holds"), [("a - b", True), ("a - 2*b", False), ("2 - a", False)])
 def test_a_constant_of_parameters_is_no_gap_that_can_be_removed(divisor, holds):
     """What is 0 at some parameters is 0 there all along every motion."""
@@ -307,6 +316,7 @@ def test_a_definition_has_the_rate_and_the_values_of_its_formula():
     assert Defined("d", T) != Defined("d", T)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("link", "end", "holds"),
     [
@@ -325,6 +335,7 @@ def test_a_formula_through_25_definitions_is_carried(link, end, holds):
     assert (audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds") is holds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("extra", "steps", "verdict"), [("", 25, "holds"), (" + Omega1", 4, "refuted")])
 def test_a_function_of_first_integrals_through_definitions_is_constant(extra, steps, verdict):
     definitions = {"d0": "3*Omega1^2 + 2*Omega2^2 + Omega3^2" + extra}
@@ -394,6 +405,7 @@ def test_halves_that_a_divisor_parts_have_sums_of_arcs_of_their_own(value, expec
     assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == expected
 
 
+@pytest.mark.slow
 def test_arcs_at_samples_tell_nothing_of_another_part_of_the_domain():
     value = "2/pi*(atan(a) + atan(1/a))"
     samples = {"a": ["2", "3", "5"]}

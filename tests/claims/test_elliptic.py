@@ -84,10 +84,12 @@ def test_what_is_no_identity_is_not_proven(other: sympy.Expr) -> None:
     assert not evaluate(other, values, 100).contains(0)
 
 
+@pytest.mark.slow
 def test_eulers_motion_holds_for_every_body() -> None:
     assert verdict(EULER) == "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "definitions",
     [
@@ -102,6 +104,7 @@ def test_a_planted_fault_is_refuted(definitions: dict[str, str]) -> None:
     assert verdict(changed(**definitions)) == "refuted"
 
 
+@pytest.mark.slow
 def test_without_the_range_of_the_parameter_it_is_undecided_and_says_so() -> None:
     loose = EULER | {"assume": [each for each in EULER["assume"] if each != "H > E*B"]}
     report = audit_claim(claim_from_table(loose, "claim"))
@@ -110,6 +113,7 @@ def test_without_the_range_of_the_parameter_it_is_undecided_and_says_so() -> Non
     assert any("≤ 1" in text for text in open_ones)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("m", ["t", "1 + t^2", "sin(t)^2"])
 def test_a_parameter_that_moves_proves_nothing(m: str) -> None:
     assert verdict(changed(m=m)) != "holds"

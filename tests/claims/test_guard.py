@@ -21,6 +21,7 @@ from heavytop.features.claims.audit.audit import audit
 EXAMPLE = str(files("heavytop.features.claims") / "examples" / "momentum-squared.toml")
 
 
+@pytest.mark.slow
 def test_a_plain_script_without_a_main_guard_can_audit(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(f"from heavytop.features.claims.audit.audit import audit\nprint(audit({EXAMPLE!r}).verdict)\n")
@@ -29,6 +30,7 @@ def test_a_plain_script_without_a_main_guard_can_audit(tmp_path):
     assert done.stdout.split() == ["refuted"]
 
 
+@pytest.mark.slow
 def test_audits_of_a_file_run_in_threads():
     with ThreadPoolExecutor(2) as pool:
         assert [report.verdict for report in pool.map(audit, [EXAMPLE, EXAMPLE])] == ["refuted", "refuted"]
@@ -76,6 +78,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
 def test_whatever_a_file_holds_its_audit_ends_in_time_with_a_verdict_or_a_reason(tmp_path, text):
     """Reading and parsing included: nothing of the file is looked at in the caller's process."""
@@ -86,6 +89,7 @@ def test_whatever_a_file_holds_its_audit_ends_in_time_with_a_verdict_or_a_reason
     assert time.monotonic() - begin < 6
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
 def test_a_file_that_never_comes_to_an_end_is_given_up_and_no_process_is_left(tmp_path, monkeypatch):
     path = tmp_path / "pipe.toml"
@@ -97,6 +101,7 @@ def test_a_file_that_never_comes_to_an_end_is_given_up_and_no_process_is_left(tm
     assert subprocess.run(command, capture_output=True, timeout=20, check=False).returncode == -signal.SIGALRM
 
 
+@pytest.mark.slow
 def test_a_hard_limit_of_memory_below_its_own_is_kept(tmp_path):
     resource = pytest.importorskip("resource")
     code = (
@@ -122,6 +127,7 @@ def test_nested_beyond_the_stack_says_so(monkeypatch):
         guard.in_time(EXAMPLE, "heavy_top")
 
 
+@pytest.mark.slow
 def test_a_path_that_is_none_is_refused():
     for path in ("a\0b.toml", "missing\udcff.toml"):
         with pytest.raises(InputError, match="cannot be read"):

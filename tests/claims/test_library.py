@@ -68,6 +68,7 @@ def put(library: Path, table: dict[str, Any]) -> None:
     entries.library.cache_clear()
 
 
+@pytest.mark.slow
 def test_the_list_has_every_key_and_says_the_verdict(folder: Path) -> None:
     found = json.loads(in_process.heavytop("claims", "--json").stdout)["claims"]
     assert {each["id"]: each["verdict"] for each in found} == {HEAD["id"]: "holds", MISPRINT["id"]: "refuted"}
@@ -80,6 +81,7 @@ def test_the_list_has_every_key_and_says_the_verdict(folder: Path) -> None:
         assert each["seconds"] > 0
 
 
+@pytest.mark.slow
 def test_an_entry_is_audited_by_its_id_and_its_other_names(folder: Path) -> None:
     for name in (HEAD["id"], "Lagrange's spin"):
         found = ht.audit(name)
@@ -92,6 +94,7 @@ def test_an_entry_is_audited_by_its_id_and_its_other_names(folder: Path) -> None
     assert "heavytop claims" in unknown.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "code", "said"),
     [
@@ -110,6 +113,7 @@ def test_the_exit_code_tells_whether_verdicts_are_the_expected_ones(
     assert said in " ".join(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = ht.claim_library().verdicts
     calls: list[str] = []
@@ -165,6 +169,7 @@ def test_names_and_twins_are_checked(folder: Path) -> None:
         entries.library()
 
 
+@pytest.mark.slow
 def test_an_unknown_tag_is_refused_and_a_known_one_selects(folder: Path) -> None:
     assert in_process.heavytop("claims", "--tag", "lagrange").returncode == 0
     refused = in_process.heavytop("claims", "--tag", "euler")
@@ -174,6 +179,7 @@ def test_an_unknown_tag_is_refused_and_a_known_one_selects(folder: Path) -> None
     assert in_process.heavytop("audit").returncode == 2
 
 
+@pytest.mark.slow
 def test_the_document_for_others_fits_its_schema_and_is_the_audit(folder: Path, tmp_path: Path) -> None:
     files = claim_library.write(tmp_path / "out")
     document, schema = (json.loads(file.read_text("utf-8")) for file in files)
@@ -189,6 +195,7 @@ def test_the_document_for_others_fits_its_schema_and_is_the_audit(folder: Path, 
         msgspec.convert(document | {"claims": [wrong | {"verdict": "perhaps"}]}, claim_library.Library)
 
 
+@pytest.mark.slow
 def test_the_plan_measures_every_entry_and_an_unexpected_verdict_is_worse(folder: Path, tmp_path: Path) -> None:
     before = ht.run("claims", out=tmp_path / "before", workers=1)
     assert [(row.case, row.metrics["as_expected"].value) for row in before.rows] == [

@@ -64,6 +64,7 @@ def test_what_could_not_be_read_is_listed_and_has_no_entry() -> None:
             assert entry.read != "the text", entry.id
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_the_verdict_is_the_expected_one(name: str) -> None:
     entry, table = split(tomllib.loads((FOLDER / f"{name}.toml").read_text("utf-8")), name)

@@ -45,6 +45,7 @@ def holds(x: str, divisor: str = "1", **given: object) -> bool:
 # --- what an assumption needs -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("x", "divisor", "assumed", "relations", "expected"),
     [

@@ -376,6 +376,7 @@ def test_an_identity_that_the_algebra_does_not_know_may_be_0_all_over() -> None:
         assert where.is_zero_nowhere_dense(p) is expected
 
 
+@pytest.mark.slow
 def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> None:
     setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
     gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))

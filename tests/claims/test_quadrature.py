@@ -48,6 +48,7 @@ def test_the_pendulum_holds_between_its_turning_points() -> None:
     assert report.solves == ("heavy_top",)
 
 
+@pytest.mark.slow
 def test_the_example_is_the_pendulum_of_an_integration_of_its_own() -> None:
     """u(t) = sn(a t, k²), put into the formulas of the file, moves as θ'' = -a² sin θ does: by mpmath alone."""
     table = pendulum()
@@ -66,6 +67,7 @@ def test_the_example_is_the_pendulum_of_an_integration_of_its_own() -> None:
         assert abs(at(table["motion"]["gamma"][1]) - mpmath.sin(angle)) < 1e-30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "verdict", "why"),
     [
@@ -89,6 +91,7 @@ def test_neighbours_of_the_pendulum(change: dict[str, Any], verdict: str, why: s
         assert "t" not in witness
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "time", "where", "verdict"),
     [

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-_PATH = Path(__file__).parents[2] / "benchmarks" / "random_claims.py"
+_PATH = Path(__file__).parents[2] / "validation" / "random_claims.py"
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,7 @@ def _judged(module, make, count, seed, monkeypatch):
     return list(module.outcomes(count, 4, seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "count"), [("integral_claim", 40), ("motion_claim", 12), ("elliptic_claim", 6), ("gyrostat_claim", 20)]
 )
@@ -38,6 +39,7 @@ def test_no_verdict_is_false_and_what_is_true_by_construction_holds(random_claim
     assert len(missed) <= max(1, len(true) / 20), missed
 
 
+@pytest.mark.slow
 def test_no_family_of_traps_gets_a_false_verdict(random_claims, monkeypatch):
     monkeypatch.syspath_prepend(str(_PATH.parent))
     found = list(random_claims.trap_outcomes(28, 4))
@@ -47,6 +49,7 @@ def test_no_family_of_traps_gets_a_false_verdict(random_claims, monkeypatch):
     assert [o.claim.table for o in refused if not o.verdict.startswith(("refused", "undecided"))] == []
 
 
+@pytest.mark.slow
 def test_numbers_contradict_what_the_flow_leaves_or_changes(random_claims, monkeypatch):
     """The check that the verdicts are held to, on claims that are false and on their true neighbours."""
     import random

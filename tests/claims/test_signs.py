@@ -65,6 +65,7 @@ def test_a_sum_of_numbers_of_unknown_sign_may_be_0_though_none_of_them_is():
     assert sum_of([Sign(-1, False), Sign(-1, True)]) == Sign(-1, True)
 
 
+@pytest.mark.slow
 def test_no_sign_that_is_told_is_false():
     draw = random.Random(11)
     atoms = [T, A, X, sympy.sin(T), sympy.cos(T), sympy.exp(T), sympy.sqrt(1 + T**2), sympy.Integer(1), sympy.sqrt(2)]

@@ -1,4 +1,4 @@
-"""Some of the claims of benchmarks/subtle_claims.jsonl: what is not true never holds, what is true is never refuted."""
+"""Some of the claims of validation/subtle_claims.jsonl: what is not true never holds, what is true is never refuted."""
 
 import json
 from pathlib import Path
@@ -8,11 +8,12 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
-LINES = (Path(__file__).parents[2] / "benchmarks" / "subtle_claims.jsonl").read_text("utf-8").splitlines()
+LINES = (Path(__file__).parents[2] / "validation" / "subtle_claims.jsonl").read_text("utf-8").splitlines()
 CLAIMS = [json.loads(line) for line in LINES]
 QUICK = CLAIMS[::23]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", QUICK, ids=[claim["label"] for claim in QUICK])
 def test_what_is_not_true_never_holds_and_what_is_true_is_never_refuted(claim):
     try:

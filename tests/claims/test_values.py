@@ -190,6 +190,7 @@ def with_another_digit(text: str) -> str:
     return text[:-8] + str((int(text[-8]) + 1) % 10) + text[-7:]
 
 
+@pytest.mark.slow
 def test_a_full_tensor_with_a_rotor_from_euler_angles_agrees_with_mpmath() -> None:
     """22 digits of mpmath's integration of other equations, every quantity, and each again with a digit changed."""
     known = integrated("0.5")
@@ -275,6 +276,7 @@ def test_a_height_follows_from_gamma_alone_and_nothing_else_of_the_attitude_does
             judged([one(name, component, "0.5")])
 
 
+@pytest.mark.slow
 def test_out_of_reach_is_undecided_with_the_reason_and_no_guess() -> None:
     report = judged([one("omega", 1, "0.5", "100000"), one("energy", 1, "1.04", "100000")])
     assert [row.holds for row in report.rows] == [None, True]
@@ -375,6 +377,7 @@ number = "1.0400"
 """
 
 
+@pytest.mark.slow
 def test_the_command_line_shows_printed_and_proven(tmp_path: Path) -> None:
     path = tmp_path / "table.toml"
     path.write_text(FILE.format("0.9"), "utf-8")
@@ -415,6 +418,7 @@ def test_a_claim_of_numbers_is_no_claim_of_formulas() -> None:
         claim_from_table({"name": "x", "kind": "motion", "top": TOP, "start": START}, "x")
 
 
+@pytest.mark.slow
 def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     head = 'id = "three"\ntitle = "Three"\nlanguage = "en"\nread = "the text"\nstatus = "as published"\n'
     head += 'expects = "refuted"\nnote = "A slip."\nsource = {authors = ["A"], year = 2000, title = "T"}\n'
@@ -436,4 +440,5 @@ def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: 
         "as_expected": "1",
     }
     headline, *_ = KINDS["audit"].document([row])
-    assert headline.text == "Library of 1 claims: 1 refuted; every verdict as expected."
+    assert headline.text == "Library of 1 claim: 1 refuted; every verdict as expected."
+    assert headline.word is None  # no green "holds" over what is refuted

@@ -24,6 +24,7 @@ def sign(e: sympy.Expr, facts: tuple[sympy.Expr, ...] = (), weak: tuple[sympy.Ex
     return field.tower.sign(field.enter(e))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("e", "facts", "weak", "expected"),
     [

@@ -100,6 +100,7 @@ def _integral(value: str, inertia: list[Any], **parts: Any) -> str:
 _FULL = "(3*Omega1 + Omega3/2)*gamma1 + 5*Omega2*gamma2 + (6*Omega3 + Omega1/2)*gamma3"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "inertia",
     [
@@ -113,6 +114,7 @@ def test_integrals_with_products_of_inertia(inertia: list[Any]) -> None:
     assert _integral("3*Omega1*gamma1 + 5*Omega2*gamma2 + 6*Omega3*gamma3", inertia) == "refuted"
 
 
+@pytest.mark.slow
 def test_the_area_integral_of_any_tensor_with_any_rotor() -> None:
     parameters = {"A": "3", "B": "4", "C": "5", "F": "1/2", "E": "1/4", "D": "1/3"}
     value = (

@@ -103,21 +103,25 @@ FALSE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("top", "value", "where", "kind"), TRUE)
 def test_what_is_true_on_its_conditions_holds(top, value, where, kind):
     assert verdict(top, value, where, kind) == "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("top", "value", "where", "kind"), FALSE)
 def test_its_false_neighbours_do_not(top, value, where, kind):
     assert verdict(top, value, where, kind) != "holds"
 
 
+@pytest.mark.slow
 def test_a_false_integral_on_a_condition_is_refuted_without_a_state():
     assert verdict("chaplygin", CHAPLYGIN.replace("- Omega1*", "+ Omega1*"), (AREA,)) == "refuted"
     assert verdict("free", "Omega3^2*gamma1", (FREE_AREA,)) == "refuted"
 
 
+@pytest.mark.slow
 def test_a_sum_of_squares_of_parameters_is_0_only_where_each_is():
     parts = {"parameters": {"a": "0", "b": "0"}}
     for value in ("a*Omega1 + b*gamma2", "Omega1*sin(a)", "Omega1*(exp(a - b) - 1)"):
@@ -161,6 +165,7 @@ def test_conditions_in_other_words(condition, simpler):
     assert set(conditions_for_zero(condition)) == simpler
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "texts",
     [
@@ -194,6 +199,7 @@ def test_conditions_too_large_to_expand_end_at_once():
     assert verdict("free", f"sin({large})*Omega3", ("Omega1",)) != "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "where"),
     [

@@ -68,6 +68,7 @@ def independent() -> dict[str, list[tuple[mpmath.mpf, list[mpmath.mpf], int]]]:
         return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_proven_events_are_those_of_mpmath(name, independent) -> None:
     known = ht.events(TOP, START, 6, name, digits=30)
@@ -82,6 +83,7 @@ def test_proven_events_are_those_of_mpmath(name, independent) -> None:
                 assert abs(mpmath.mpf(mine.value) - theirs) <= mpmath.mpf(mine.radius) + mpmath.mpf(10) ** -33
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 @pytest.mark.parametrize("precision", ["double", "extended", "quad", "real:150"])
 def test_computed_events_are_right_to_the_format(integrator, precision) -> None:
@@ -105,6 +107,7 @@ def test_the_state_lies_on_the_section_to_rounding() -> None:
     assert (np.diff(found.directions) != 0).all()  # they alternate: none is missed and none is twice
 
 
+@pytest.mark.slow
 def test_the_pendulum_has_the_events_of_its_elliptic_functions() -> None:
     # from rest at sin(θ/2) = k it passes the bottom at K, 3K, 5K, ... (unit frequency)
     start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
@@ -153,6 +156,7 @@ def two_close(distance: Fraction) -> tuple[str, float]:
     return f"gamma3 = {level}", float(Fraction(time.value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_two_roots_a_millionth_apart_inside_a_step_are_both_found(integrator) -> None:
     function, near = two_close(Fraction(1, 10**6))
@@ -169,6 +173,7 @@ def test_two_roots_a_millionth_apart_inside_a_step_are_both_found(integrator) ->
     assert (run[:, 5] < level).all()
 
 
+@pytest.mark.slow
 def test_two_roots_in_balls_at_a_distance_of_1e_minus_20() -> None:
     function, near = two_close(Fraction(1, 10**20))
     found = ht.events(TOP, START, Fraction(near).limit_denominator(1000) + 1, function, digits=25)
@@ -177,6 +182,7 @@ def test_two_roots_in_balls_at_a_distance_of_1e_minus_20() -> None:
     assert Fraction(9, 10**21) < close[1] - close[0] < Fraction(11, 10**21)
 
 
+@pytest.mark.slow
 def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
     start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
     with pytest.raises(OutOfReach, match=r"Near t = 3\.31.* whether the function changes sign or only touches"):
@@ -187,6 +193,7 @@ def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
         ht.events(PENDULUM, start, at_end, "gamma2", digits=15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [None, 20])
 def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
     free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
@@ -199,12 +206,14 @@ def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
             assert np.allclose(times, expected, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_zero_of_third_order_that_is_no_power_is_undecided() -> None:
     free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))
     with pytest.raises(OutOfReach, match=r"Near t = 3\.14159265359 .* changes sign or only touches"):
         ht.events(free, start, 4, "(1 + gamma1)*gamma2", digits=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [None, 20])
 def test_a_function_that_is_zero_along_the_motion_is_refused(digits) -> None:
     start = ht.State((0, 0, 1), ("-3/5", "4/5", 0))
@@ -218,6 +227,7 @@ def test_a_function_that_is_zero_along_the_motion_is_refused(digits) -> None:
         ht.events(PENDULUM, start, 10, lambda omega, gamma: abs(omega[1]))
 
 
+@pytest.mark.slow
 def test_directions_split_the_events() -> None:
     both = ht.events(TOP, START, 60, "gamma2")
     rising, falling = (ht.events(TOP, START, 60, "gamma2", direction) for direction in (1, -1))
@@ -233,6 +243,7 @@ def test_directions_split_the_events() -> None:
     assert list(ht.events(TOP, START, -20, "gamma2").directions) == back.directions
 
 
+@pytest.mark.slow
 def test_text_and_callables_are_the_same_function() -> None:
     text = ht.events(TOP, START, 20, "Ω1*γ2 - 2*γ1/3 = -1/4")
     ring = ht.events(TOP, START, 20, lambda omega, gamma: omega[0] * gamma[1] - 2 * gamma[0] / 3 + 0.25)
@@ -246,6 +257,7 @@ def test_text_and_callables_are_the_same_function() -> None:
     assert str(cancelled.numerator) == "omega1"
 
 
+@pytest.mark.slow
 def test_a_sampled_callable_finds_two_close_roots_at_its_minimum() -> None:
     function, near = two_close(Fraction(1, 1000))
     level = float(Fraction(function.split("=")[1]))
@@ -253,6 +265,7 @@ def test_a_sampled_callable_finds_two_close_roots_at_its_minimum() -> None:
     assert len([t for t in found.times if abs(t - near) < 1e-2]) == 2
 
 
+@pytest.mark.slow
 def test_a_pole_is_no_event() -> None:
     poles = ht.events(TOP, START, 60, "1/gamma2")
     assert len(poles) == 0
@@ -293,6 +306,7 @@ def test_a_change_at_the_common_end_of_two_steps_counts_once(first, second, coun
     assert all(abs(float(t) - 1) < 1e-12 for t in found.times)
 
 
+@pytest.mark.slow
 def test_odd_scales_and_names_of_axes() -> None:
     # lengths, masses and times scaled by powers of two scale the times of events exactly
     scale = Fraction(2) ** 200
@@ -312,6 +326,7 @@ def test_odd_scales_and_names_of_axes() -> None:
     assert [b.value[:18] for b in renamed.times] == [b.value[:18] for b in plain.times]
 
 
+@pytest.mark.slow
 def test_an_equilibrium_has_no_events() -> None:
     still = ht.State((0, 0, 0), (1, 0, 0))
     for options in ({}, {"integrator": "multiword"}, {"digits": 20}):
@@ -369,6 +384,7 @@ def test_what_is_out_of_reach_says_so() -> None:
         ht.events(TOP, START, 10**7, digits=20)
 
 
+@pytest.mark.slow
 def test_threads_and_their_callables_do_not_disturb_each_other() -> None:
     alone = [ht.events(TOP, START, 20, f, digits=20).time_texts() for f in FUNCTIONS[:2]]
     found: dict[int, list[str]] = {}

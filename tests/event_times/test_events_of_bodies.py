@@ -25,6 +25,7 @@ def body() -> ht.Body:
     return ht.Body(1, 1, rotated(TOP.centre), tensor, about="pivot")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"integrator": "multiword"}, {"digits": 25}], ids=str)
 def test_turned_axes_have_the_same_events(options) -> None:
     start = ht.State(rotated(START.omega), rotated(START.gamma))
@@ -40,6 +41,7 @@ def test_turned_axes_have_the_same_events(options) -> None:
     assert abs(turned.to_numpy() - expected).max() < 1e-13
 
 
+@pytest.mark.slow
 def test_irrational_axes_and_attitudes_are_proven_and_agree_with_the_reference() -> None:
     known = ht.events(SKEW, TILTED, 10, "gamma3 = 1/4", digits=30)
     assert known.method == "validated: Taylor enclosure of irrational data"
@@ -57,6 +59,7 @@ def test_irrational_axes_and_attitudes_are_proven_and_agree_with_the_reference()
     assert abs(sampled.times - found.times).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_section_and_pictures_of_a_body() -> None:
     assert ht.poincare(SKEW, TILTED, 5, "gamma3 = 1/4", 0).on_one_level
     times = np.arange(1, 21) / 4
@@ -70,6 +73,7 @@ def test_a_section_and_pictures_of_a_body() -> None:
     assert abs(np.where(np.isnan(drawn[0]), drawn[1], drawn[0]) - along).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["gyrostat", "heavy_gyrostat"])
 def test_rotors_are_followed(system) -> None:
     if system == "gyrostat":

@@ -20,6 +20,7 @@ def call(*arguments: str):
     return CliRunner().invoke(app, [*arguments, *OPTIONS])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_propagate_gives_the_events_of_python(integrator: str) -> None:
     asked = "--events", "gamma3=1/2", "--events", "omega1 = 1/5", "--event-direction", "1"
@@ -37,6 +38,7 @@ def test_propagate_gives_the_events_of_python(integrator: str) -> None:
     assert "events" not in json.loads(call("propagate", "--json").stdout)
 
 
+@pytest.mark.slow
 def test_reference_gives_balls() -> None:
     done = call("reference", "--events", "gamma3=1/2", "--digits", "20", "--json")
     document = json.loads(done.stdout)
@@ -51,6 +53,7 @@ def test_reference_gives_balls() -> None:
     assert "Events gamma2: " in call("propagate", "--events", "gamma2").stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "cause"),
     [

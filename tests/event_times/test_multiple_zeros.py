@@ -16,6 +16,7 @@ TOP, START = ht.HeavyTop((2, 3, 1), 1, (0, 0, 1)), ht.State((1, 0, 0), (0, "3/5"
 """A pendulum, which passes its lowest point, γ = (0, 0, −1), at t = 1.8143…"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factors", [2, 4])
 def test_factors_that_vanish_at_one_time_are_undecided_there(factors: int) -> None:
     """They have no common factor as polynomials; of one, the zero is found."""

@@ -97,6 +97,7 @@ def test_one_gap_has_the_period_of_the_elliptic_integral():
         assert gap.integrals(phase)[0].overlaps(arb(1) / 7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", [acb(1.25), acb(-3), acb(0.5, 0.25), acb(0, 2)])
 def test_the_fourier_error_is_bounded_and_the_bound_is_not_idle(other):
     # few terms beside many: the difference is below the bound, and not far below it

@@ -42,6 +42,7 @@ def random_motion(name, seed):
     return build(second, other, place, (rng.choice((1, -1)), rng.choice((1, -1))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("seed", range(5))
 def test_every_random_motion_solves_all_six_equations(name, seed):
@@ -52,6 +53,7 @@ def test_every_random_motion_solves_all_six_equations(name, seed):
     assert all(x.rad() < arb("1e-50") for x in motion.attitude(F(10**6), 180))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 def test_the_enclosure_of_rational_data_departs_by_their_rounding(name):
     motion = random_motion(name, 7)
@@ -64,6 +66,7 @@ def test_the_enclosure_of_rational_data_departs_by_their_rounding(name):
     assert isinstance(find(top, start), Validated)
 
 
+@pytest.mark.slow
 def test_rougher_data_depart_and_the_departure_is_enclosed():
     motion = goryachev_motion(F(61, 100), F(-1))
     top, start = motion.rounded(30)

@@ -35,6 +35,7 @@ def _holds(value: Fraction, ball: Ball) -> bool:
     return abs(value - Fraction(ball.value)) <= Fraction(ball.radius)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_attitude_starts_across_gamma_and_is_that_of_the_enclosure(name: str) -> None:
     case = CASES[name]
@@ -49,6 +50,7 @@ def test_the_attitude_starts_across_gamma_and_is_that_of_the_enclosure(name: str
         assert Fraction(ball.radius) < Fraction(1, 10**30)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", list(permutations(range(3))))
 def test_the_attitude_under_every_naming_of_the_axes(axes: tuple[int, int, int]) -> None:
     case = CASES["lagrange"]

@@ -72,6 +72,7 @@ def test_turning_points_are_starts_like_any_other():
         assert_solves(motion_from(Fraction(2, 3), x, Fraction(4, 5), Fraction(0)), Fraction(5, 2))
 
 
+@pytest.mark.slow
 def test_the_independent_integration_agrees_to_fifty_digits():
     motion = bobylev_steklov_motion(
         (Fraction(3, 2), Fraction(1)), Fraction(1), Fraction(1, 2), Fraction(1, 3), Fraction(2)
@@ -104,6 +105,7 @@ def test_the_attitude_turns_with_the_body(seed):
         assert a.overlaps(b)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_attitude_is_that_of_the_enclosure(seed):
     rng = random.Random(seed)

@@ -64,6 +64,7 @@ def kind(solution):
     return type(solution.solution if isinstance(solution, Renamed) else solution)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
 @pytest.mark.parametrize("axes", ALL)
 def test_every_class_is_found_under_every_naming_of_the_axes(case, axes):
@@ -88,6 +89,7 @@ def test_the_gyrostat_is_found(axes):
     assert kind(steady) is Staude
 
 
+@pytest.mark.slow
 def test_several_forms_of_one_motion_agree():
     for top, start in (
         (HeavyTop((2, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), UNIT)),
@@ -102,6 +104,7 @@ def test_several_forms_of_one_motion_agree():
             assert all(a.overlaps(b) for a, b in zip(states[0], other, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
 def test_the_validated_enclosure_agrees_to_fifty_digits_at_ten(case):
     sample = SAMPLES[case]
@@ -140,6 +143,7 @@ NOT_DONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [(0, 1, 2), (2, 1, 0)])
 @pytest.mark.parametrize("name", NOT_DONE)
 def test_a_level_that_is_not_done_is_named_by_its_enclosure_and_beyond_its_reach(name, axes):
@@ -171,6 +175,7 @@ def test_data_of_any_length_are_refused_in_words():
     assert list(matches(top, State((third, 1, third), (third, third, third)))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
 def test_a_rotor_without_momentum_leaves_the_closed_forms_of_the_heavy_top(case):
     motion = SAMPLES[case]

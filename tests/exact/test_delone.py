@@ -77,6 +77,7 @@ def test_the_reference_state_lies_in_the_balls():
                 assert abs(value - arb(text)).abs_upper() < arb("1e-59")
 
 
+@pytest.mark.slow
 def test_the_independent_integration_agrees_to_fifty_digits():
     motion = delone((Fraction(1, 2), Fraction(1, 3), Fraction(1)), Fraction(2, 3), (1, Fraction(1, 2)))
     assert_agrees(motion, Fraction(3))
@@ -108,6 +109,7 @@ def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, o
 UNIT = delone((Fraction(3, 5), Fraction(0), Fraction(1)), Fraction(4, 5), (Fraction(3, 5), 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_the_attitude_turns_with_the_body(seed):
     rng = random.Random(seed)
@@ -127,6 +129,7 @@ def test_the_attitude_at_turning_points_poles_and_without_area(omega, gamma3):
         assert_attitude(motion, time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ALL)
 def test_the_attitude_meets_the_enclosure_and_reaches_a_million_in_every_naming(axes):
     named = find(renamed_top(UNIT.top, axes), renamed_state(UNIT.start, axes))

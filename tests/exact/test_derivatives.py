@@ -41,6 +41,7 @@ def motion_of(name):
     return known(*MOTIONS[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("time", [Fraction(7, 3), Fraction(-1)])
 def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
@@ -49,6 +50,7 @@ def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
         assert holds(values), law
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["generic", "lagrange", "gyrostat", "heavy gyrostat"])
 def test_central_differences_of_references_are_inside(name):
     motion, time = motion_of(name), Fraction(7, 3)
@@ -127,6 +129,7 @@ def _extrapolated(field, y, length, levels=12):
     return rows[-1][-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "column", "datum"), [("generic", 3, False), ("heavy gyrostat", 1, True)])
 def test_a_complex_perturbation_integrated_by_extrapolation_agrees(name, column, datum):
     motion, time = motion_of(name), Fraction(1, 4)
@@ -139,6 +142,7 @@ def test_a_complex_perturbation_integrated_by_extrapolation_agrees(name, column,
             assert abs(mpmath.mpf(middle.numerator) / middle.denominator - value) < mpmath.mpf(10) ** -28
 
 
+@pytest.mark.slow
 def test_derivatives_over_two_parts_of_a_motion_make_those_over_the_whole():
     assert holds(chain(motion_of("generic"), Fraction(3, 2), Fraction(4)))
 
@@ -176,6 +180,7 @@ def test_a_sign_in_every_step_is_seen_by_the_laws(monkeypatch):
     assert sum("gradient" in law for law in failed) >= 2
 
 
+@pytest.mark.slow
 def test_balls_of_few_digits_hold_those_of_many():
     rng = random.Random(28)
     for name in ("generic", "heavy gyrostat"):
@@ -188,6 +193,7 @@ def test_balls_of_few_digits_hold_those_of_many():
                 assert radius(b) * 2**90 < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "precision", "of_motion"),
     [
@@ -248,6 +254,7 @@ def test_what_a_motion_loses_does_not_raise_the_bits_of_its_derivatives(monkeypa
     assert taken[0] == taken[1]
 
 
+@pytest.mark.slow
 def test_units_of_any_size_change_no_digit():
     """Ω = s ω, t = τ/s, n = s² ν: the derivatives are those of ω with powers of s, exactly."""
     scale, time = Fraction(2) ** 300, Fraction(3, 2)
@@ -275,6 +282,7 @@ def test_many_times_in_any_order_with_both_signs_and_zero():
     assert all(found[1].start[i][j] == int(i == j) for i in SIX for j in SIX)
 
 
+@pytest.mark.slow
 def test_regular_motions_have_20_digits_far_out():
     """Lagrange's top at t = 100: the enclosure with derivatives reaches what regular motions ask for."""
     motion = motion_of("lagrange")

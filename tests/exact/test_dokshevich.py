@@ -79,6 +79,7 @@ def motion(place, slope=None, x=F(1), beta=F(1), moment=F(1), side=1):
     return HeavyTop(inertia, 1, (moment * cosine, 0, moment * sine)), State(omega, up)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_every_random_motion_solves_all_six_equations(seed):
     rng = random.Random(seed)
@@ -145,6 +146,7 @@ def by_mpmath(top, start, time, steps):
     return state
 
 
+@pytest.mark.slow
 def test_mpmath_has_the_same_states_and_the_same_period():
     _, (a, b, first, size, _, sigma), w, _ = shape(2)
     top, start = motion(2)
@@ -169,6 +171,7 @@ def test_mpmath_has_the_same_states_and_the_same_period():
         assert max(abs(midpoint(x) - y) for x, y in pairs) < F(1, 10**40)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(100, -100, 100), (-100, 100, 100), (100, 100, -100), (0, 100, 0), (0, 0, -100)])
 @pytest.mark.parametrize("axes", [ALL[0], ALL[3]])
 def test_momentum_moments_and_weight_may_be_of_any_size(sizes, axes):

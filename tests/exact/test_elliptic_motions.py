@@ -116,6 +116,7 @@ EDGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [random_gyrostat, paper_gyrostat, random_lagrange])
 def test_the_residual_of_all_six_equations_is_a_narrow_ball_around_zero(family):
     rng = random.Random(77)
@@ -168,6 +169,7 @@ def test_a_state_is_the_first_coefficient_of_its_series(family):
                 assert value.overlaps(series[0]), (motion, time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("family", [random_gyrostat, random_lagrange])
 def test_the_attitude_stands_on_a_gamma_of_any_length(family, seed):
@@ -218,6 +220,7 @@ def test_reference_states_of_another_integrator_are_met_to_sixty_digits(name, ma
             assert abs(midpoint(value) - F(expected)) < F(1, 10**59)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [random_gyrostat(3), paper_gyrostat(4), random_lagrange(5), EDGES["loop"]])
 def test_a_taylor_integration_in_multiple_precision_agrees(motion):
     with mpmath.workdps(30):
@@ -265,6 +268,7 @@ def test_a_thousand_digits_come_out():
             assert radius(value) < F(1, 10**990)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [random_gyrostat, paper_gyrostat, random_lagrange])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_validated_integration_agrees_to_fifty_digits(make, seed):

@@ -130,6 +130,7 @@ def test_each_coefficient_is_rounded_to_nearest(precision):
             assert abs(component[n + 1] - exactly) <= fmpq(1, 2)
 
 
+@pytest.mark.slow
 def test_the_defect_is_what_the_coefficients_leave(made, field):
     defect, _, _ = theorem(made, field)
     h = float(made.length)
@@ -138,6 +139,7 @@ def test_the_defect_is_what_the_coefficients_leave(made, field):
     assert defect <= Fraction(bound) * ulp(made) <= 16 * defect
 
 
+@pytest.mark.slow
 def test_local_and_widest_errors_are_those_of_the_theorem(made, field):
     defect, widest, local = theorem(made, field)
     scale = Fraction(2) ** made.node.errors.exponent * ulp(made)
@@ -193,6 +195,7 @@ def exact_variation(found, top):
     return [[[Fraction(int(m[i, j].p), int(m[i, j].q)) for j in SIX] for i in SIX] for m in rows]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [64, 128])
 def test_the_variation_is_known_within_its_error(precision):
     found = step(FIELD, node_with(precision, 0.5), precision)
@@ -210,6 +213,7 @@ def test_the_variation_is_known_within_its_error(precision):
         assert norm(exact(matrix)) <= Fraction(found.powers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("h", [0.25, 2.0, 16.0])
 def test_the_error_of_the_variation_holds_its_defect(h, field):
     """At a state that stays, J is constant: V̂' − J V̂ is what the rounding of V̂ and its last power leave, exactly."""
@@ -241,6 +245,7 @@ def minus(a, b):
     return [[x - y for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("uncertain", "size", "skew"), [(0.0, 1, 0.0), (1e-14, 1, 0.0), (1e-6, 1, 0.0), (0.0, 1e-4, 1e-9), (0.0, 1, 1e-9)]
 )
@@ -312,6 +317,7 @@ def true_motion(displaced, time, bits=300):
     return Validated(TOP, State(displaced[:3], displaced[3:])).state(time, bits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [2.0**-18, 2.0**-24, 2.0**-40])
 def test_motions_from_the_edge_of_the_set_stay_inside(size):
     """Displaced as far as the set goes, and so that one component moves most: the linear part alone is too small."""

@@ -88,6 +88,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_balls_hold_the_motion_however_early_the_precision_falls(name, early):
     """Errors that grow, shrink and grow again, in both directions of time; many times of one run."""
@@ -114,6 +115,7 @@ def test_a_homoclinic_motion_is_held_by_its_closed_form(early):
     assert falls_of(falling)
 
 
+@pytest.mark.slow
 def test_attitude_and_uncertain_data_fall_too(early):
     off = (Fraction(1, 2**200),) * 9
     exact = Validated(TOP, START).with_attitude(Fraction(25), 240)
@@ -124,6 +126,7 @@ def test_attitude_and_uncertain_data_fall_too(early):
     assert falls_of(falling)
 
 
+@pytest.mark.slow
 def test_no_bit_is_lost_by_the_falls(monkeypatch):
     """In words, beside an enclosure that keeps all its bits: the same radius, but for a tenth of a bit."""
 
@@ -145,6 +148,7 @@ def test_no_bit_is_lost_by_the_falls(monkeypatch):
     assert max(b - a for a, b in zip(kept, fallen, strict=True)) < 0.03
 
 
+@pytest.mark.slow
 def test_the_model_of_the_cost_counts_the_falls(monkeypatch):
     solution = Validated(TOP, START)
     falling = solution.cost(Fraction(5000), 104)
@@ -152,6 +156,7 @@ def test_the_model_of_the_cost_counts_the_falls(monkeypatch):
     assert 0.5 < falling / solution.cost(Fraction(5000), 104) < 0.8
 
 
+@pytest.mark.slow
 def test_steps_and_falls_depend_on_the_node_alone(early):
     early(4)
     used = Validated(TOP, START)

@@ -45,6 +45,7 @@ def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, momen
     return Validated(top, start, system, rotor=Fraction(2, 3) * unit if system is GYROSTAT else None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("unit", [0, 100, -100, 7])
 def test_balls_hold_what_exact_integers_find(system, unit, monkeypatch):
@@ -72,6 +73,7 @@ DEGENERATE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_motions_are_held_too(name, monkeypatch):
     one, other = (solved(HEAVY_TOP, **DEGENERATE[name]) for _ in range(2))
@@ -81,6 +83,7 @@ def test_degenerate_motions_are_held_too(name, monkeypatch):
     require_inside(balls, in_integers(monkeypatch, other, time, 110))
 
 
+@pytest.mark.slow
 def test_random_motions_with_their_attitude_are_held(monkeypatch):
     random = Random(15)
     for _ in range(3):
@@ -96,6 +99,7 @@ def test_random_motions_with_their_attitude_are_held(monkeypatch):
         assert not used_words(other)
 
 
+@pytest.mark.slow
 def test_threads_find_the_same_balls():
     times = [Fraction(n, 3) for n in range(20, 32)]
 
@@ -156,6 +160,7 @@ def test_a_step_that_words_cannot_hold_is_shortened():
     assert isinstance(certified, CertifiedSeries)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [20, 40, 70])
 def test_balls_near_an_equilibrium_hold_what_exact_integers_find(digits, monkeypatch):
     """Coefficients are smaller than the state by several words at once."""

@@ -94,6 +94,7 @@ def test_fifty_digits_come_out_at_any_time(inertia, time):
     assert_solves(motion, Fraction(time))
 
 
+@pytest.mark.slow
 def test_the_independent_integration_agrees_to_fifty_digits():
     assert_agrees(
         euler((3, Fraction(5, 2), 1), (Fraction(-1, 2), Fraction(1, 3), 1), (Fraction(1, 2), 2, -1)), Fraction(3)

@@ -67,6 +67,7 @@ def admits(case, top, start):
     return hold(case.body, top, start) and hold(case.starts, top, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "top", "start", "system", "axes"), NAMED, indirect=["settings"])
 def test_a_reference_gives_the_digits_it_promises(settings, top, start, system, axes):
     record = reference(renamed_top(top, axes), renamed_state(start, axes), [TIME, -TIME], DIGITS, system)
@@ -75,6 +76,7 @@ def test_a_reference_gives_the_digits_it_promises(settings, top, start, system, 
             assert Fraction(ball.radius) <= Fraction(1, 10**DIGITS) * max(1, abs(Fraction(ball.value)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "top", "start", "system", "axes"), NAMED, indirect=["settings"])
 def test_state_series_and_attitude_do_not_see_the_settings(settings, top, start, system, axes):
     solution = find(renamed_top(top, axes), renamed_state(start, axes), system)

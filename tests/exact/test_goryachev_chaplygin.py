@@ -96,6 +96,7 @@ def test_a_variable_may_rest_at_a_double_root(sign):
         assert isinstance(form.line.variables[0 if sign > 0 else 1], Rest)
 
 
+@pytest.mark.slow
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
 
@@ -131,6 +132,7 @@ def test_levels_that_are_not_done_are_named():
         motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1, 2, 3])
 def test_near_a_degenerate_level_every_digit_comes_out(exponent):
     spin = F(1, 10**exponent)

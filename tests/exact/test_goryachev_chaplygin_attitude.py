@@ -42,6 +42,7 @@ def test_the_azimuth_of_the_angular_momentum_is_proven_by_polynomials():
     assert dot(momentum, momentum) == r**2 - 4 * (-4 * (p**2 + q**2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [TILTED, DOUBLE, RESTING], ids=["tilted", "double root", "resting"])
 def test_the_enclosure_holds_the_attitude(motion):
     assert "validated" not in attitude_of(motion, F(2), 170)[0]
@@ -49,6 +50,7 @@ def test_the_enclosure_holds_the_attitude(motion):
     assert_attitude(motion, F(-(10**6)))
 
 
+@pytest.mark.slow
 def test_the_size_of_gamma_and_the_unit_of_time_do_not_matter():
     # γ twice as long and rates a hundred decades faster: the same motion
     scale, times = F(10) ** 100, (F(3), F(10**6))
@@ -63,12 +65,14 @@ def test_the_size_of_gamma_and_the_unit_of_time_do_not_matter():
         assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ALL)
 def test_every_naming_of_the_axes_has_the_closed_form(axes):
     found = find(renamed_top(TILTED.top, axes), renamed_state(TILTED.start, axes))
     assert "validated" not in attitude_of(found, F(2), 60)[0]
 
 
+@pytest.mark.slow
 def test_where_it_is_not_done_the_attitude_is_the_enclosures():
     with pytest.raises(OutOfReach, match="asymptotic"):
         ASYMPTOTIC.attitude(F(1), 100)
@@ -88,6 +92,7 @@ def upwards(a, h, side):
     return field
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2])
 def test_the_strips_are_analytic_as_far_as_they_say(seed):
     """The motion goes on upwards in s from real places, as far as |Im s| may be, within the bounds."""
@@ -111,6 +116,7 @@ def test_the_strips_are_analytic_as_far_as_they_say(seed):
                     assert abs(second) <= one.largest[1]
 
 
+@pytest.mark.slow
 def test_at_a_resonance_the_azimuth_grows_as_no_sum_of_integrals_of_one_variable_does():
     """With ω2 = 3 ω1 the mean of dΛ/ds over a closed motion depends on 3φ1 − φ2: on which closed motion it is.
 

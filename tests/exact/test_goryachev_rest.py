@@ -51,6 +51,7 @@ def moving(seed):
 TENDING = [State((3, 4, 0), (200, -150, 0)), State((-3, 4, 0), (F(-200, 9), F(-50, 3), 0))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("make", [from_rest, moving])
 def test_every_random_motion_solves_all_six_equations(make, seed):
@@ -86,6 +87,7 @@ def test_the_enclosure_holds_the_closed_form(motion):
         assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.slow
 def test_the_enclosure_holds_the_attitude_over_several_rests():
     """The body rests again every 4 K(m)/√a, some 7 units of time."""
     motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), UNIT))
@@ -108,6 +110,7 @@ def test_a_motion_goes_back_the_way_that_it_came(make):
                 assert all(a.overlaps(b) for a, b in zip(here[3:], other[3:], strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ALL)
 def test_any_naming_of_the_axes_and_any_units(axes):
     for power in (-100, 0, 100):

@@ -30,6 +30,7 @@ def test_every_grioli_precession_solves_all_six_equations(seed):
     assert_solves(motion, rational(rng, size=30))
 
 
+@pytest.mark.slow
 def test_a_grioli_top_is_asymmetric_and_its_attitude_turns_with_it():
     motion = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
     assert len(set(motion.top.inertia)) == 3

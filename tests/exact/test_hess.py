@@ -49,6 +49,7 @@ def random_pendulum(seed):
     return HessPendulum(top, State(omega, gamma))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_hess(seed)
@@ -66,6 +67,7 @@ def test_every_random_pendulum_solves_all_six_equations(seed):
     assert_attitude(motion, time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [random_hess(1), random_hess(2), random_pendulum(3)], ids=["1", "2", "pendulum"])
 def test_the_enclosure_holds_the_closed_form(motion):
     enclosure = Validated(motion.top, motion.start)
@@ -74,6 +76,7 @@ def test_the_enclosure_holds_the_closed_form(motion):
         assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spin", [F(1, 10), F(1, 1000), F(1, 10**6)])
 def test_small_area_integrals_do_no_harm(spin):
     # at spin 0 the pendulum swings to and fro, and M vanishes at its turning points
@@ -119,6 +122,7 @@ def test_the_first_terms_left_out_lie_within_the_tail():
                     assert short[order].overlaps(coefficient)
 
 
+@pytest.mark.slow
 def test_polynomials_of_bits_that_count_hold_those_of_all_bits():
     """Both ends of a segment, in 200 bits against 900; where κr is large too."""
     for system in (SYSTEM, (F(1, 3), F(1, 10**4), F(1, 2), F(1, 100), F(-1, 4)), (F(1), F(1), F(1), F(1), F(9))):
@@ -152,6 +156,7 @@ def test_the_matrix_over_a_period_keeps_areas_and_undoes_itself():
             assert all(abs(x) < arb("1e-50") for x in back.entries())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "mass", "size"), [(100, 0, 0), (-100, 0, 50), (0, -100, -100), (0, 100, 0)])
 @pytest.mark.parametrize("spin", ["1/2", 0])
 def test_units_do_not_matter(unit, mass, size, spin):
@@ -220,6 +225,7 @@ def assert_answered(top, start, digits=40):
     assert process_time() - begun < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [3, 300])
 def test_area_integrals_next_to_nothing_are_proven_or_named(power):
     start = State(("1/4", F(1, 10**power), "-1/3"), (0, 1, 0))
@@ -233,6 +239,7 @@ def test_area_integrals_next_to_nothing_are_proven_or_named(power):
     assert process_time() - begun < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 6, 2))
 def test_moments_of_any_ratio_are_proven_or_refused_in_words(seed):
     rng = random.Random(seed)
@@ -244,6 +251,7 @@ def test_moments_of_any_ratio_are_proven_or_refused_in_words(seed):
     assert_answered(top, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("power", "side"), [(10, 1), (60, -1)])
 def test_centres_all_but_at_rest_have_an_attitude_or_a_refusal_in_words(power, side):
     """M small, n·γ within ``small`` of its least or largest value; the pole of the azimuth all but meets the gap."""
@@ -257,6 +265,7 @@ def test_centres_all_but_at_rest_have_an_attitude_or_a_refusal_in_words(power, s
         assert_answered(top, start)
 
 
+@pytest.mark.slow
 def test_what_the_plan_of_the_linear_system_counts():
     with working_precision(300):
         few, many = (System2(arb(1), arb(2) ** -k, arb(1), arb(2) ** (-k // 2) / 3, arb(1) / 5) for k in (4, 20))

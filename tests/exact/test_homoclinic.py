@@ -50,6 +50,7 @@ def test_the_partial_case_as_a_heavy_top_misses_1_2_by_half_k_gamma() -> None:
     assert all(vanishes(a - b) for a, b in zip(off, expected, strict=True))
 
 
+@pytest.mark.slow
 def test_the_delone_motion_solves_the_heavy_top_identically() -> None:
     alpha = sympy.Symbol("alpha", positive=True)
     d = 1 + S**2

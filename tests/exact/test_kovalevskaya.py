@@ -42,6 +42,7 @@ def random_motion(seed):
     return motion_from(moment, triple(rng), triple(rng), positive(rng))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)
@@ -49,6 +50,7 @@ def test_every_random_motion_solves_all_six_equations(seed):
     assert_narrow(motion, F(10**6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 4])
 def test_the_enclosure_holds_the_closed_form(seed):
     motion = random_motion(seed)
@@ -58,6 +60,7 @@ def test_the_enclosure_holds_the_closed_form(seed):
         assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("omega", "gamma"),
     [
@@ -87,6 +90,7 @@ def test_a_double_root_outside_the_gaps_does_no_harm(omega, gamma):
     assert_narrow(motion, F(10**9))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(24))
 def test_starts_of_few_small_numbers_are_solved_or_named(seed):
     # zeros and equal numbers make special levels and turning points of all kinds
@@ -113,6 +117,7 @@ def tilted(exponent):
 NEAR = {"outside": (2, F(1, 3), F(1, 2)), "asymptotic": (-1, F(1, 4), F(1, 4)), "both": (F(1, 2), F(1, 3), 1)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", NEAR)
 @pytest.mark.parametrize("exponent", [1, 3])
 def test_near_a_degenerate_level_every_digit_comes_out(level, exponent):
@@ -121,6 +126,7 @@ def test_near_a_degenerate_level_every_digit_comes_out(level, exponent):
     assert_narrow(motion, F(10**6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("level", "exponent"), [("asymptotic", 8), ("both", 4), ("both", 7)])
 def test_nearer_theta_functions_take_over(level, exponent):
     motion = motion_from((F(1), F(0)), NEAR[level], tilted(exponent))
@@ -143,6 +149,7 @@ def test_a_double_root_outside_the_gaps_does_no_harm_however_near():
     assert_solves(motion, F(7, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(9))
 def test_theta_functions_and_abel_inversion_meet(seed):
     motion = random_motion(seed)
@@ -155,6 +162,7 @@ def test_theta_functions_and_abel_inversion_meet(seed):
             assert max(abs(a - b).upper() for a, b in zip(one, two, strict=True)) < arb("1e-45")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [(0, 0, 0), (F(1, 2), 0, 1)])
 def test_theta_functions_and_abel_inversion_meet_where_q_vanishes(omega):
     motion = motion_from((F(1), F(0)), omega, TILTED)
@@ -198,6 +206,7 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
         random_motion(1).exponent(60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("omega", "gamma", "resting"),
     [
@@ -218,6 +227,7 @@ def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
     assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.slow
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(3, 5), F(1, 3)), (F(1, 3), F(4, 5), F(-7, 10)), TILTED), F(10**6), 1000)
 

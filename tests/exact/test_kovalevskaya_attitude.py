@@ -58,11 +58,13 @@ def test_the_vector_is_level_and_its_azimuth_turns_as_the_integrals_say(seed):
         assert abs(dot(moved, across) / square - wanted).upper() < arb("1e-60")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS)
 def test_the_enclosure_holds_the_attitude(name):
     assert_meets(motion_from(*STARTS[name]), (F(0), F(3, 2), F(-6)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_tops_with_the_centre_anywhere(seed):
     rng = random.Random(seed)
@@ -71,16 +73,19 @@ def test_random_tops_with_the_centre_anywhere(seed):
     assert_meets(motion_from(triple(rng), gamma, moment, positive(rng)), (F(2),))
 
 
+@pytest.mark.slow
 def test_many_turns_are_counted():
     assert_meets(motion_from(*STARTS["generic"]), (F(30),), 140)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS)
 @pytest.mark.parametrize("time", [F(10**6), F(-(10**12))])
 def test_at_any_time_the_attitude_turns_with_the_body(name, time):
     assert_attitude(motion_from(*STARTS[name]), time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ALL)
 def test_every_naming_of_the_axes_has_the_attitude_of_its_enclosure(axes):
     top = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
@@ -90,6 +95,7 @@ def test_every_naming_of_the_axes_has_the_attitude_of_its_enclosure(axes):
     assert_meets(found, (F(3, 2),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [F(10) ** 100, F(10) ** -100])
 def test_every_scale_has_the_attitude(scale):
     # rates a hundred decades faster or slower: the same motion in another unit of time

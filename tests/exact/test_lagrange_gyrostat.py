@@ -31,6 +31,7 @@ def random_motion(seed, weight=1):
     return LagrangeGyrostat(top, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "weight"), [*((seed, 1) for seed in range(8)), (8, 0), (9, 0), (10, -2)])
 def test_every_random_motion_solves_all_six_equations(seed, weight):
     motion = random_motion(seed, weight)

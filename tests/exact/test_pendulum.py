@@ -76,6 +76,7 @@ def test_fifty_digits_come_out_at_any_time(rate, time):
     assert_solves(motion, Fraction(time))
 
 
+@pytest.mark.slow
 def test_the_independent_integration_agrees_to_fifty_digits():
     assert_agrees(pendulum(1, Fraction(1, 2), (Fraction(3, 5), Fraction(-4, 5)), (1, Fraction(1, 3))), Fraction(3))
 

@@ -53,6 +53,7 @@ def test_a_fault_in_the_thirty_fifth_digit_breaks_the_residual(component):
         assert_solves(Disturbed(EULER, component), Fraction(7, 3))
 
 
+@pytest.mark.slow
 def test_a_fault_in_the_thirty_fifth_digit_breaks_the_agreement():
     with pytest.raises(AssertionError):
         assert_agrees(Disturbed(EULER, 3), Fraction(1, 2))

@@ -33,6 +33,7 @@ def in_other_units(top, start, rate, size):
     return other, State([rate * w for w in start.omega], start.gamma)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "top", "start", "system"), MOTIONS, ids=[m[0] for m in MOTIONS])
 def test_other_units_give_the_same_motion(name, top, start, system):
     known = find(top, start, system).state(TIME, BITS + 16)
@@ -51,6 +52,7 @@ def test_other_units_give_the_same_motion(name, top, start, system):
                 assert radius(value) <= Fraction(1, 2**BITS) * max(Fraction(1), abs(midpoint(value)) * 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "top", "start", "system"), MOTIONS, ids=[m[0] for m in MOTIONS])
 def test_any_time_is_answered_or_refused_in_words(name, top, start, system):
     for decades in (-100, -30, 30, 100):
@@ -108,6 +110,7 @@ def times(a, b):
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_numbers_of_very_different_size_are_answered(seed):
     for top, start, system in mixed(random.Random(seed)):

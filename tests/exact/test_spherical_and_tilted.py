@@ -58,6 +58,7 @@ def test_every_random_tilted_pendulum_solves_all_six_equations(seed, spherical):
     assert isinstance(find(motion.top, motion.start), Pendulum)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [random_spherical(1), random_spherical(4), random_tilted(2, False)])
 def test_the_enclosure_holds_states_and_attitude(motion):
     top, omega = motion.top, motion.start.omega

@@ -56,6 +56,7 @@ def test_the_separation_is_proven_by_polynomials():
     assert -c * g2 * u + 4 * rate_of_s == y
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)
@@ -65,6 +66,7 @@ def test_every_random_motion_solves_all_six_equations(seed):
     assert all(a.overlaps(b) for a, b in zip(motion.state(F(-2), 180), enclosed, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_the_attitude_turns_with_the_body_at_any_time(seed):
     assert_attitude(random_motion(seed), F(-(10**4)))
@@ -101,6 +103,7 @@ def test_turning_points_are_starts_like_any_other(rotor, omega, gamma):
     assert_solves(motion, F(-1000))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [F(1), F(-2, 3)])
 def test_a_variable_may_rest_at_a_double_root(place):
     """u = e at rest: Ω1 = e (1 + γ1)/(2γ3), ρ = e − 4Ω1²/e, and λ from X'(e) = a."""

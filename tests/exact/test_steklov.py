@@ -40,6 +40,7 @@ def turning(second, ratio, rate):
     return HeavyTop((1, second, third), 1, (1, 0, 0)), State((p, 0, r), (up, 0, side))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)

@@ -39,6 +39,7 @@ def integral_of(pair, rates, began):
     return LineIntegral.of([(factors[0], factors[1])], values, rates, began, bound(), error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rates", [(1, 2), (3, "1.7"), (1, "1.00000000001")], ids=["resonant", "plain", "nearly"])
 @pytest.mark.parametrize("pair", list(product(SYMMETRIES, repeat=2)))
 def test_the_integral_is_that_of_the_function(pair, rates):

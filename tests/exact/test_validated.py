@@ -50,6 +50,7 @@ def holds(balls, vector):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda v: v["name"])
 def test_every_reference_state_is_inside_its_ball_to_60_digits(vector):
     balls = motion(vector).state(Fraction(vector["time"]), BITS_OF_60_DIGITS)
@@ -57,6 +58,7 @@ def test_every_reference_state_is_inside_its_ball_to_60_digits(vector):
     assert holds(balls, vector)
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_in_the_field_is_caught_by_the_reference_states():
     def reversed_gamma(p, y):
         return (*HEAVY_TOP.field(p, y)[:3], *(-rate for rate in HEAVY_TOP.field(p, y)[3:]))
@@ -66,6 +68,7 @@ def test_a_wrong_sign_in_the_field_is_caught_by_the_reference_states():
     assert not holds(balls, VECTORS[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [Fraction(-31, 7), Fraction(1, 3), Fraction(6)])
 @pytest.mark.parametrize(
     "known",
@@ -78,6 +81,7 @@ def test_balls_agree_with_hyperbolic_closed_forms_of_both_systems(known, time):
         assert relative_bits(ball) >= 330
 
 
+@pytest.mark.slow
 def test_random_motions_agree_with_mpmath_to_40_digits():
     rng = random.Random(20)
     for _ in range(3):
@@ -116,6 +120,7 @@ def test_first_integrals_of_the_enclosure_hold_the_exact_value():
                 assert drift.rad() < 1e-35
 
 
+@pytest.mark.slow
 def test_forward_and_back_returns_to_the_start():
     solution = random_motion(random.Random(22))
     time = Fraction(9, 2)
@@ -217,6 +222,7 @@ def test_increasing_times_continue_from_what_is_known():
     assert process_time() - before < 0.1
 
 
+@pytest.mark.slow
 def test_equilibria_cost_nothing_and_are_exact():
     hanging = Validated(HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 2), (0, 0, 1)))
     for ball, value in zip(hanging.state(Fraction(1000), 200), (0, 0, 2, 0, 0, 1), strict=True):
@@ -238,6 +244,7 @@ def test_attitude_of_a_gamma_off_the_sphere_asks_for_xi():
         off.attitude(Fraction(1), 60)
 
 
+@pytest.mark.slow
 def test_a_rounded_gyrostat_takes_its_rotor_as_data():
     known = ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))
     exact = Validated(known.top, known.start, GYROSTAT).state(Fraction(1), 150)
@@ -250,6 +257,7 @@ def test_a_rounded_gyrostat_takes_its_rotor_as_data():
         assert abs(midpoint(one) - midpoint(two)) < Fraction(1, 2**140)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [Fraction(10**6), Fraction(-(10**9)), Fraction(10**30)])
 def test_a_horizon_out_of_reach_is_refused_at_once(time):
     vector = VECTORS[0]

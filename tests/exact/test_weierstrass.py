@@ -102,6 +102,7 @@ def test_p_satisfies_its_differential_equation_and_addition_theorems(g2, g3):
     is_zero(left + (first - second) * (sigma(lattice, u) * sigma(lattice, v)) ** 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("g2", "g3"), [pair for pair in lattices() if pair[0] ** 3 != 27 * pair[1] ** 2])
 def test_periods_quasi_periods_and_the_relation_of_legendre(g2, g3):
     lattice, rng = from_invariants(g2, g3), random.Random(4)

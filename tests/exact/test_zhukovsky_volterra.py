@@ -35,6 +35,7 @@ def random_motion(seed):
     return ZhukovskyVolterra(top, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)
@@ -46,6 +47,7 @@ def test_every_random_motion_solves_all_six_equations(seed):
         assert all(a.overlaps(b) for a, b in zip(motion.state(time, 180), enclosed, strict=True))
 
 
+@pytest.mark.slow
 def test_an_integration_that_knows_nothing_of_it_agrees():
     def cross(a, b):
         return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

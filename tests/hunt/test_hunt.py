@@ -25,6 +25,7 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
     return [exact(text) for key in NUMBERS for text in found[key]] + [exact(found["weight"])]  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
@@ -46,6 +47,7 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
     assert "What is special" in str(hunt)
 
 
+@pytest.mark.slow
 def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     planted = Integrator("planted:rotor", "support.hunted_integrators:rotor")
     monkeypatch.setitem(INTEGRATORS, planted.name, planted)
@@ -62,6 +64,7 @@ def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest
     assert not ht.hunt(budget=8, horizon=1, family="heavy_gyrostat").found
 
 
+@pytest.mark.slow
 def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:
     hunt = ht.hunt(budget=96, horizon=4, seed=3)
     assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
@@ -69,6 +72,7 @@ def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> Non
     assert "--budget 96 --seed 3" in str(hunt)
 
 
+@pytest.mark.slow
 def test_the_command_line_prints_the_document_and_ends_with_1_where_anything_is_found() -> None:
     done = heavytop("hunt", "--limit", "1e-6", "--budget", 2, "--horizon", 1, "--family", "euler", "--json")
     document = json.loads(done.stdout)
@@ -78,6 +82,7 @@ def test_the_command_line_prints_the_document_and_ends_with_1_where_anything_is_
     assert list(document["found"][0]) == keys.split()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -112,6 +117,7 @@ def test_draws_are_bodies_of_their_family_and_depend_on_seed_and_index_alone() -
             assert turns(motion, Fraction(100)) <= MOST_TURNS
 
 
+@pytest.mark.slow
 def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equation() -> None:
     from heavytop.top.amplification import amplification
     from heavytop.top.equations import HEAVY_TOP
@@ -129,6 +135,7 @@ def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equ
         assert whole / 10 < found.amplification < whole * 3
 
 
+@pytest.mark.slow
 def test_what_a_plan_finds_is_kept_and_measured_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     plan = """name = "hunted"
@@ -151,6 +158,7 @@ found = "found.toml"
     assert Path("found.toml").read_text().startswith(first)
 
 
+@pytest.mark.slow
 def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the_start() -> None:
     # a hunt of heyoka once found this motion, near the separatrix of a pendulum, and blamed heyoka
     top = ht.HeavyTop(("199/1000000000", "239/1000000000", "134337/1000000000000"), 56, ("7/10000000", 0, 0))
@@ -161,6 +169,7 @@ def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the
     assert found.error < 100 * meter.sharper(found).explained(2.0**-52)
 
 
+@pytest.mark.slow
 def test_the_same_seed_searches_the_same() -> None:
     one, two = (ht.hunt(budget=24, horizon=2, seed=9).hunted.worst for _ in range(2))
     assert [m.motion for m in one] == [m.motion for m in two]

@@ -279,6 +279,7 @@ def single_steps(name: str) -> str:
     return f'{head}integrator = "mine:{name}"\n'
 
 
+@pytest.mark.slow
 def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on(package: Path) -> None:
     *cheats, honest = rows(package, *CHEATS, "honest")
     assert honest.outcome == "success"
@@ -293,6 +294,7 @@ def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on
         assert len(cheat.reference.reason) < 400
 
 
+@pytest.mark.slow
 def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
     began = perf_counter()
     found = dict(zip(TIMED, rows(package, *TIMED), strict=True))
@@ -313,11 +315,13 @@ def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_
         assert row.measured.startswith("computed: mine:")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["lagrange", "generic", "gyrostat", "hess"])
 def test_an_honest_one_is_measured_on_every_kind_of_motion(package: Path, case: str) -> None:
     assert [row.outcome for row in rows(package, "honest", "fixed", case=case)] == ["success"] * 2
 
 
+@pytest.mark.slow
 def test_a_count_of_steps_that_makes_steps_short_contradicts_the_run_as_a_whole(package: Path) -> None:
     (honest,), (many,) = (rows(package, kind=single_steps(name)) for name in ("fixed", "fixed_many"))
     assert honest.outcome == "success"

@@ -129,6 +129,7 @@ def _nothing_is_left() -> Iterator[None]:
     assert gone("")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAILURES)
 def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str) -> None:
     given = program(fault, timeout=SLOW if fault in SILENT else "60")
@@ -145,6 +146,7 @@ def test_a_faulty_program_fails_with_its_reason_and_leaves_no_process(fault: str
     assert fault not in SILENT or monotonic() - began < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", DIAGNOSED)
 def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.harness.integrator_check._FAREWELL", 0.2)
@@ -154,6 +156,7 @@ def test_what_no_row_can_see_the_check_of_the_contract_names(fault: str, monkeyp
     assert fault in ("six digits", "single precision", "swapped", "other each time", "begins badly") or not found
 
 
+@pytest.mark.slow
 def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
     found = check(program())
     assert {each.verdict for each in found} == {"kept", "note"}
@@ -161,6 +164,7 @@ def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
     assert len(found) == 17
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["", "forks", "becomes a daemon", "chatty errors", "counts none"])
 def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
     run = registry.ready(program(fault), ("step", Fraction(1, 50)))(CASE.top, CASE.start, TIMES, DOUBLE)
@@ -174,6 +178,7 @@ def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
     assert gone(fault or "faulty_program.py")
 
 
+@pytest.mark.slow
 def test_one_process_serves_many_requests_and_the_next_row_begins_with_an_empty_one() -> None:
     given, texts = program(), []
     integrate = registry.ready(given)
@@ -262,6 +267,7 @@ def test_states_come_back_as_decimal_hexadecimal_fortran_or_fraction() -> None:
         assert list(reply.states[0]) == [0.5, 0.25, 1.5, -2, 3, 0], line
 
 
+@pytest.mark.slow
 def test_the_seconds_of_a_request_are_of_this_clock_and_not_what_the_program_says() -> None:
     run = registry.ready(program(), ("step", Fraction(1, 200)))(CASE.top, CASE.start, [Fraction(10)], DOUBLE)
     assert run.seconds["program"] == 0.001
@@ -342,6 +348,7 @@ def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, li
         registry.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("end", "fault"), [(signal.SIGINT, "silent"), (signal.SIGKILL, "silent"), (signal.SIGKILL, "leaves its group")]
 )
@@ -360,6 +367,7 @@ def test_the_program_ends_with_this_process_however_that_ends(tmp_path: Path, en
     assert gone(fault)
 
 
+@pytest.mark.slow
 def test_a_session_is_one_thread_s_alone() -> None:
     given = program()
     with commands.session(given) as one, commands.session(given) as other:

@@ -52,6 +52,7 @@ def alone(problem: Problem, times=TIMES, **options):
     return propagate_ensemble([problem], times, **options)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [TIMES, [-time for time in TIMES]], ids=["forwards", "backwards"])
 @pytest.mark.parametrize(
     "options",
@@ -199,6 +200,7 @@ def test_a_step_that_does_not_move_the_time_ends_the_run(monkeypatch: pytest.Mon
     assert same(propagate_ensemble(problems(2), [2**52], step_limit=100, threads=1)[0], stuck)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*HEAVY, "gyrostat"])
 def test_the_motion_is_the_true_one_to_rounding(name: str) -> None:
     """Against the closed form or the enclosure: within 500 eps for t up to 5 either way, like the scalar integrator."""
@@ -214,6 +216,7 @@ def test_the_motion_is_the_true_one_to_rounding(name: str) -> None:
                 assert off < 500 * float(DOUBLE.eps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [EXTENDED, QUAD, real(90)], ids=lambda p: p.name)
 def test_formats_without_lanes_have_the_bits_of_the_scalar_integrator(precision) -> None:
     given = problems(3, precision)
@@ -225,6 +228,7 @@ def test_formats_without_lanes_have_the_bits_of_the_scalar_integrator(precision)
     assert {run.integrator for run in runs} == {"heyoka"}
 
 
+@pytest.mark.slow
 def test_the_attitude_rides_along() -> None:
     given = problems(9, xi=perpendicular(start(0).gamma))
     with_it, without = propagate_ensemble(given, TIMES), propagate_ensemble(problems(9), TIMES)
@@ -253,6 +257,7 @@ def test_the_caller_observes_all_samples_in_order_and_nothing_is_kept(
         assert seen[index] == [(time, list(state)) for time, state in zip(full.times, full.states, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
     def observer(index: int, time: Fraction, state) -> None:
@@ -265,6 +270,7 @@ def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
         assert all(map(same, propagate_ensemble(problems(3, precision), [1, 2], threads=threads), full))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="needs timers that send signals")
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED], ids=lambda p: p.name)
@@ -283,6 +289,7 @@ def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision, threads:
         signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.slow
 def test_what_changes_bits_is_in_the_flags() -> None:
     one, two = (alone(problems(1)[0], [1], lanes=n, high_accuracy=h) for n, h in ((8, True), (2, False)))
     assert (one.flags["batch_size"], one.flags["high_accuracy"], one.integrator) == ("8", "true", "heyoka:batch")

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from heavytop.api.faulty_integrators import FAULTS, Fault
 from heavytop.cases import CASES, Case
 from heavytop.errors import InputError, PeerFailed
 from heavytop.exact.enclosure.run import Validated
 from heavytop.integrate import registry
-from heavytop.integrate.broken import FAULTS, Fault
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.double import count, fill, rates
-from heavytop.integrate.registry import INTEGRATORS, load
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
 from heavytop.top.attitude import perpendicular
@@ -41,16 +41,14 @@ ERROR = {"splitting:2": 1e-3, "splitting:4": 1e-7, "scipy:Radau": 1e-6}
 
 def call(name: str, top: HeavyTop, start: State, times: Sequence[Fraction], system: System = HEAVY_TOP) -> Trajectory:
     """One run in double, through the very call that everything else takes."""
-    if name == "planted fault":
-        seen: list[Any] = []
-        run = Fault("none").propagate(top, start, times, system=system, observer=lambda _, y: seen.append(y.copy()))
-        return Trajectory(**{f: getattr(run, f) for f in run.__dataclass_fields__} | {"states": np.array(seen)})
     options: dict[str, Any] = {"step": F(1, 64)} if name.startswith("splitting") else {}
     if name.startswith("scipy:Radau"):
         options = {"tolerance": F(1, 10**8)}
-    return registry.propagator(name, options)(top, start, times, DOUBLE, system=system)
+    which = Fault("none").integrator if name == "planted fault" else name
+    return registry.propagator(which, options)(top, start, times, DOUBLE, system=system)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_capabilities_are_those_of_the_functions(name: str) -> None:
     """Options, the formats it takes, and what sets its error."""
@@ -91,7 +89,7 @@ def test_the_deliberately_faulty_ones_are_instances() -> None:
     for fault in FAULTS.values():
         assert fault.integrator.systems == ("heavy_top",)
         assert not fault.integrator.ensemble
-        assert callable(load(fault.integrator.propagate))
+        assert registry.peer(fault.integrator) == fault.propagate
 
 
 def bits(run: Trajectory) -> list[list[str]]:
@@ -286,6 +284,7 @@ def everything_in_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_integrator_keeps_the_contract(name: str, clause: Callable[[str], None]) -> None:
@@ -306,6 +305,7 @@ def setting_of(name: str) -> tuple[str, Fraction]:
     return "tolerance", F(1, 10**8) if name == "scipy:Radau" else F(1, 10**12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "case"),
     [(name, "generic") for name in PEERS]
@@ -327,6 +327,7 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     assert alone.seconds["compile"] >= 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda s: s.name)
 def test_the_compiled_field_is_the_field(system) -> None:
     generator = np.random.default_rng(7)
@@ -338,6 +339,7 @@ def test_the_compiled_field_is_the_field(system) -> None:
         np.testing.assert_allclose(rates(system)(0.0, y, numbers), expected, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_compiled_field_of_nine_numbers_turns_xi_as_the_body_turns() -> None:
     """Of the gyrostat: with Ω and the rotor."""
     numbers, y, found = np.arange(1.0, 8.0), np.arange(2.0, 11.0), np.empty(9)
@@ -348,6 +350,7 @@ def test_the_compiled_field_of_nine_numbers_turns_xi_as_the_body_turns() -> None
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "step"), [(2, 64), (4, 8), (8, 2)])
 @pytest.mark.parametrize("name", ["lagrange", "gyrostat", "heavy-gyrostat"])
 def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name: str) -> None:
@@ -370,6 +373,7 @@ def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name:
     assert 0.8 * 2**order < errors[0] / errors[1] < 1.6 * 2**order
 
 
+@pytest.mark.slow
 def test_a_splitting_keeps_the_casimirs_and_bounds_the_energy() -> None:
     case = CASES["generic"]
     times = [F(i) for i in range(1, 301)]

@@ -25,7 +25,7 @@ from heavytop.exact.closed_form import orientation, permuted, renamed_state, ren
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.peers.command import Request
+from heavytop.integrate.peers.command import ProgramRequest
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, cross, exact, parse
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
@@ -108,11 +108,12 @@ def integrated(time: Fraction):
     return independent(CASE.top, CASE.start, time, XI)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", list(permutations(range(3))))
 def test_the_enclosure_holds_an_independent_integration_on_any_axes(axes) -> None:
     """The motion is integrated as it is; the enclosure takes it on renamed axes, both ways in time.
 
-    ``benchmarks/heavy_gyrostat.py`` has random motions, to 50 digits.
+    ``validation/heavy_gyrostat.py`` has random motions, to 50 digits.
     """
     top, start, d = CASE.top, CASE.start, orientation(axes)
     for time in (F(3, 4), F(-1, 2)):
@@ -123,6 +124,7 @@ def test_the_enclosure_holds_an_independent_integration_on_any_axes(axes) -> Non
         assert max(_fraction(ball.rad()) for ball in enclosed) < F(1, 10**30)
 
 
+@pytest.mark.slow
 def test_the_enclosed_attitude_is_that_of_an_independent_integration() -> None:
     time = F(3, 4)
     enclosed = Validated(CASE.top, CASE.start, HEAVY_GYROSTAT, xi=XI).attitude(time, 160)
@@ -151,6 +153,7 @@ FORMATS = {
 EVERY = [(name, form) for name, forms in FORMATS.items() for form in forms]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "form"), EVERY, ids=lambda part: str(part))
 def test_every_format_is_right_to_its_rounding_with_the_attitude_and_without(name, form) -> None:
     precision = parse(form)
@@ -169,6 +172,7 @@ def test_every_format_is_right_to_its_rounding_with_the_attitude_and_without(nam
             assert max(abs(a - b) for a, b in zip(found, truth, strict=False)) <= 4 * precision.eps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["heyoka", "words"])
 def test_a_motion_of_an_ensemble_is_right_whatever_runs_beside_it(name) -> None:
     """Also beside one without a rotor, whose k is 0 there."""
@@ -185,6 +189,7 @@ def test_a_motion_of_an_ensemble_is_right_whatever_runs_beside_it(name) -> None:
     np.testing.assert_allclose(runs[-1].to_numpy(), plain.to_numpy(), rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_the_papers_gyrostat_is_the_case_without_weight_in_balls_and_in_every_format() -> None:
     """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), n = 0; γ is the same."""
     case = CASES["gyrostat"]
@@ -212,6 +217,7 @@ def test_the_papers_gyrostat_is_the_case_without_weight_in_balls_and_in_every_fo
                 assert abs(exact(a) - exact(b) - shift) <= 16 * precision.eps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [-100, 100])
 def test_a_rotor_of_any_size_is_enclosed_and_integrated(power) -> None:
     """Tiny beside the body it changes nothing that shows; huge it turns M fast, over a time that is as short.
@@ -233,6 +239,7 @@ def test_a_rotor_of_any_size_is_enclosed_and_integrated(power) -> None:
         assert max(abs(a - b) / unit for a, b, unit in zip(found, truth, units, strict=True)) < F(1, 10**14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [F(10) ** -90, F(10) ** 90])
 def test_moments_weight_and_rotor_times_a_factor_are_the_same_motion(units) -> None:
     inertia, k = ([units * value for value in part] for part in (CASE.top.inertia, CASE.top.rotor or ()))
@@ -244,6 +251,7 @@ def test_moments_weight_and_rotor_times_a_factor_are_the_same_motion(units) -> N
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_leaves_it_at_rest() -> None:
     top = HeavyTop((3, 2, 1), 0, (0, 0, 1), (1, 2, 3))
     still = State((0, 0, 0), (0, 0, -1))
@@ -255,6 +263,7 @@ def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_lea
     assert find(falling, still, HEAVY_GYROSTAT).method.startswith("validated")
 
 
+@pytest.mark.slow
 def test_permanent_rotations_are_found_and_carry_the_attitude() -> None:
     """About γ at the rate ω, M = IΩ + k and γ × (ω² Iγ + ω k − n) = 0: any k with n = ω² Iγ + ω k + κ γ."""
     gamma, rate = (F(2, 3), F(-1, 3), F(2, 3)), F(3, 2)
@@ -316,7 +325,7 @@ def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> Non
 
 def test_a_program_is_given_k_and_one_that_declares_the_heavy_top_alone_is_asked_nothing(tmp_path) -> None:
     problem = Problem.of(CASE.top, CASE.start, DOUBLE, HEAVY_GYROSTAT)
-    lines = Request(problem, [F(1)], None, False).text(1).decode().splitlines()
+    lines = ProgramRequest(problem, [F(1)], None, False).text(1).decode().splitlines()
     assert "system heavy_gyrostat" in lines
     assert "rotor 0.5 -0.33333333333333331 0.75" in lines
     file = tmp_path / "mine.toml"
@@ -325,6 +334,7 @@ def test_a_program_is_given_k_and_one_that_declares_the_heavy_top_alone_is_asked
         ht.propagate(CASE.top, CASE.start, [1], integrator=str(file))
 
 
+@pytest.mark.slow
 def test_what_is_computed_is_scored_with_the_rotor_of_the_file(tmp_path) -> None:
     """A file that says k is scored as it is; with the sign of k turned over the diagnosis names it."""
     times = [F(1, 4), F(1, 2), F(1), F(2), F(3)]

@@ -31,6 +31,7 @@ def as_arrays(motions: list[Problem]) -> tuple[numpy.ndarray, numpy.ndarray]:
     return numpy.array([p for p, _ in both]), numpy.array([y for _, y in both])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 8, 21])
 def test_states_on_a_grid_are_those_of_the_ensemble_bit_for_bit(count: int) -> None:
     motions = problems(count)
@@ -41,6 +42,7 @@ def test_states_on_a_grid_are_those_of_the_ensemble_bit_for_bit(count: int) -> N
     assert steps.tolist() == [run.steps for run in runs]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["any", "euler", "lagrange", "kovalevskaya"])
 def test_double_double_is_within_its_rounding_of_what_is_proven(family: str) -> None:
     motions = problems(3, family)

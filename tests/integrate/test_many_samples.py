@@ -18,7 +18,7 @@ from heavytop.errors import InputError
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.multiword import motions as multiword_motions
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.multiword.double_double import double_double_run
 from heavytop.multiword.fixed_point import fixed_point_run, steps
@@ -27,7 +27,7 @@ from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
 CASE = CASES["kovalevskaya"]
-INTEGRATORS = {"heyoka": propagate, "multiword": propagate_words}
+INTEGRATORS = {"heyoka": propagate, "multiword": propagate_multiword}
 
 
 def irregular(count: int, last: int, seed: int) -> list[Fraction]:
@@ -57,6 +57,7 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
     assert all((a == b).all() for a, b in zip(many.states, states, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("times", [regular(800, 60), irregular(800, 60, 1)], ids=["regular", "irregular"])
 @pytest.mark.parametrize(
@@ -81,16 +82,19 @@ def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [QUAD, parse("real:150"), parse("real:200")], ids=lambda each: each.name)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_times_that_are_doubles_take_arrays_on_a_grid_too(precision, sign: int) -> None:
     times = [sign * float(time) / 20 for time in irregular(200, 60, 3)]
-    require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
+    require_same(
+        propagate_multiword(CASE.top, CASE.start, times, precision), one_by_one(propagate_multiword, times, precision)
+    )
 
 
 def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: pytest.MonkeyPatch) -> None:
     times = [float(time) / 20 for time in irregular(100, 60, 5)]
-    usual = propagate_words(CASE.top, CASE.start, times, QUAD)
+    usual = propagate_multiword(CASE.top, CASE.start, times, QUAD)
     for module in (steps, fixed_point_run):
         monkeypatch.setattr(module, "most_of", lambda _: 1.0)  # what sums of this motion now and then exceed
     monkeypatch.setattr(fixed_point_run, "machine", lru_cache(steps.build))
@@ -99,14 +103,15 @@ def test_samples_whose_sums_leave_their_range_are_taken_by_series(monkeypatch: p
     monkeypatch.setattr(
         Fixed, "_moved", lambda run, words, span, left: moved.append(span) or move(run, words, span, left)
     )
-    found = propagate_words(CASE.top, CASE.start, times, QUAD)
+    found = propagate_multiword(CASE.top, CASE.start, times, QUAD)
     assert 0 < len(moved) < len(times)
-    require_same(found, one_by_one(propagate_words, times, QUAD))
+    require_same(found, one_by_one(propagate_multiword, times, QUAD))
     assert all(
         abs(exact(a) - exact(b)) <= 4 * QUAD.eps for a, b in zip(found.states.flat, usual.states.flat, strict=True)
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("case", ["lagrange", "ershkov-partial-6", "hess-pendulum"])
 def test_other_tops_and_systems_too(name: str, case: str) -> None:
@@ -115,6 +120,7 @@ def test_other_tops_and_systems_too(name: str, case: str) -> None:
     require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, given))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_dense_times_within_the_first_steps(name: str) -> None:
     times = [Fraction(k, 3000) for k in range(1, 3001)]
@@ -128,6 +134,7 @@ def test_a_time_where_a_step_ends_belongs_to_that_step() -> None:
     require_same(propagate(CASE.top, CASE.start, times, DOUBLE), one_by_one(propagate, times, DOUBLE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("limit", [1, 5, 90])
 def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> None:
@@ -137,6 +144,7 @@ def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> 
     require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, step_limit=limit))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
     times = regular(500, 20)
@@ -240,6 +248,7 @@ def test_many_samples_by_heyoka_have_the_bits_of_an_observed_run(last: int) -> N
     assert (found.steps, found.outcome) == (one_by_one.steps, one_by_one.outcome)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["extended", "double-double", "real:70"])
 def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     precision, times = parse(name), [-time for time in irregular(60, 9, 4)]
@@ -248,10 +257,10 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
 
     def observed() -> list:
         seen: list = []
-        propagate_words(CASE.top, start, times, precision, observer=lambda _, state: seen.append(state), **asked)
+        propagate_multiword(CASE.top, start, times, precision, observer=lambda _, state: seen.append(state), **asked)
         return seen
 
-    found = [propagate_words(CASE.top, start, times, precision, **asked).states, observed()]
+    found = [propagate_multiword(CASE.top, start, times, precision, **asked).states, observed()]
     monkeypatch.setattr(multiword_motions, "sums_of_two", lambda *_: None)
     found.append(observed())
     columns, quick, exactly = ([[exact(value) for value in state] for state in states] for states in found)
@@ -263,13 +272,15 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
 def test_samples_of_one_call_end_anywhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(double_double_run, "_SAMPLES_AT_ONCE", 7)
     precision, times = parse(name), irregular(50, 2, 7)
-    require_same(propagate_words(CASE.top, CASE.start, times, precision), one_by_one(propagate_words, times, precision))
+    require_same(
+        propagate_multiword(CASE.top, CASE.start, times, precision), one_by_one(propagate_multiword, times, precision)
+    )
 
 
 @pytest.mark.parametrize("name", ["double", "extended", "double-double", "quad", "real:70", "real:150"])
 def test_states_are_made_once_whoever_asks_for_them_first(name: str) -> None:
     def run() -> Trajectory:
-        return propagate_words(CASE.top, CASE.start, regular(80, 2), parse(name))
+        return propagate_multiword(CASE.top, CASE.start, regular(80, 2), parse(name))
 
     first, copied, replaced = run(), copy.copy(run()), replace(run(), integrator="another")
     assert first.states is first.states

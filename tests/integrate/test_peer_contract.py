@@ -208,7 +208,7 @@ FAILURES = {
     "double_flat": "of the shape (12,)",
     "double_ragged": "raised ValueError",
     "double_many": "of the shape (3, 6) for 2 times",
-    "double_dict": "returned a dict instead of Solved",
+    "double_dict": "returned a dict instead of Solution",
 }
 HARMLESS = ("honest", "chatty", "rude_to_the_process", "vandal", "double_vandal")
 
@@ -238,6 +238,7 @@ def plan(folder: Path, *names: str) -> Path:
     return folder / "plan.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAILURES)
 def test_a_peer_that_fails_says_what_it_did(package: Path, name: str, capfd) -> None:
     peer = registry.ready(f"mine:{name}")
@@ -253,6 +254,7 @@ def test_a_peer_that_fails_says_what_it_did(package: Path, name: str, capfd) -> 
 NOISY = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 
 
+@pytest.mark.slow
 @NOISY
 @pytest.mark.parametrize("name", HARMLESS)
 def test_a_peer_that_is_only_rude_is_measured_like_a_polite_one(package: Path, name: str, capfd) -> None:
@@ -269,6 +271,7 @@ def test_a_peer_that_is_only_rude_is_measured_like_a_polite_one(package: Path, n
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_the_rows_of_others_go_on_and_every_surface_has_the_reason(package: Path) -> None:
     file = plan(package, "heyoka", "mine:zero", "mine:exits", "mine:absent", "mine:lacks", "mine:double_nan")
     rows = [measure(task) for task in expand(load(str(file))[0])]
@@ -288,6 +291,7 @@ def test_the_rows_of_others_go_on_and_every_surface_has_the_reason(package: Path
     assert "aborted" not in html.report_page(report).split("</section>")[0]
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_exit_3_no_traceback_and_all_rows(package: Path) -> None:
     file = plan(package, "heyoka", "mine:zero", "mine:chatty", "mine:leaves")
     line = [sys.executable, "-m", "heavytop", "run", "--plan", file, "--out", package / "out", "--workers", "1"]
@@ -303,6 +307,7 @@ def test_the_command_ends_with_exit_3_no_traceback_and_all_rows(package: Path) -
     assert [row["outcome"] for row in document["rows"]] == ["success", "failed", "success", "failed"]
 
 
+@pytest.mark.slow
 def test_a_peer_that_ends_its_process_fails_its_own_row_alone(package: Path) -> None:
     file = plan(package, "mine:dies", "heyoka")
     line = [sys.executable, "-m", "heavytop", "run", "--plan", file, "--out", package / "out", "--workers", "2"]
@@ -331,9 +336,10 @@ def test_an_interrupt_passes(package: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        contract.Contained("mine", interrupted, own=False)(CASE.top, CASE.start, TIMES, DOUBLE)
+        contract.CheckedPlugin("mine", interrupted, own=False)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 
+@pytest.mark.slow
 @NOISY
 def test_peers_in_many_threads_leave_standard_output_as_it_was(package: Path) -> None:
     before, found = (sys.stdout, sys.stderr), []

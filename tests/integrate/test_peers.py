@@ -24,6 +24,7 @@ TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["kovalevskaya", "gyrostat"])
 @pytest.mark.parametrize("precision", [QUAD, real(160)], ids=lambda p: p.name)
 def test_odefun_and_heyoka_agree_to_the_format(name: str, precision) -> None:
@@ -35,6 +36,7 @@ def test_odefun_and_heyoka_agree_to_the_format(name: str, precision) -> None:
     assert peer.evaluations
 
 
+@pytest.mark.slow
 def test_a_run_that_gives_up_says_where(capfd) -> None:
     pytest.importorskip("sksundae")
     case = CASES["lagrange"]
@@ -134,6 +136,7 @@ def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
     assert cause in str(registry.available()[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "names"),
     [
@@ -158,6 +161,7 @@ def test_a_peer_that_is_not_installed_says_how_to_get_it(
         assert "pip install 'heavytop[peers]'" in str(registry.available()[name])
 
 
+@pytest.mark.slow
 def test_without_numba_the_field_is_evaluated_in_python() -> None:
     code = """
 import sys
@@ -179,6 +183,7 @@ for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4
         np.testing.assert_allclose([float(text) for text in line[1:]], ours.states[-1], rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_nothing_is_imported_before_it_is_used() -> None:
     code = (
         "import sys, heavytop.features.kinds, heavytop.integrate.registry as p; p.known();"

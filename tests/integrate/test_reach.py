@@ -53,6 +53,7 @@ def test_what_counts_is_time_by_rate_in_any_unit(name: str, decades: int) -> Non
             require_reach(problem, direction * far * 4)
 
 
+@pytest.mark.slow
 def test_the_bound_is_the_time_by_the_rate_or_over_the_step_exactly() -> None:
     problem = given(*FAST["spin"])
     require_reach(problem, Fraction(MOST_STEPS))
@@ -151,6 +152,7 @@ def test_a_reference_of_any_size_is_answered_from_python_as_from_the_command_lin
 THIN = ht.State(("1/2", "1/3", "1/4"), (0, "3/5", "4/5"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("precision", "system"), [("quad", "heavy_top"), ("quad", "heavy_gyrostat")])
 def test_a_grid_that_follows_a_rod_in_far_too_short_steps_is_refused(precision: str, system: str) -> None:
     """Just inside and just beyond: a thousand times the steps that the motion asks for, and 1e9."""

@@ -28,6 +28,7 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
             assert (component[n] * factorial).contains(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "_compiled", {})
@@ -89,6 +90,7 @@ def test_a_part_in_a_million_million_is_found(what: str, message: str) -> None:
     check(engine, HEAVY_TOP, DOUBLE)
 
 
+@pytest.mark.slow
 def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
     healthy = engines.expressions
 
@@ -103,6 +105,7 @@ def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.Monke
     assert not engines._compiled
 
 
+@pytest.mark.slow
 def test_code_with_the_numbers_of_a_top_is_checked_with_these_and_computes_the_same_motion() -> None:
     case = CASES["kovalevskaya"]
     given = Problem.of(case.top, case.start, DOUBLE).parameters

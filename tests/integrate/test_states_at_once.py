@@ -8,7 +8,7 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
-from heavytop.integrate.peers.command import Reply, Request, _times_written
+from heavytop.integrate.peers.command import ProgramRequest, Reply, _times_written
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, QUAD
 
@@ -17,7 +17,7 @@ TIMES = [Fraction(k, 8) for k in range(1, 10)]
 
 
 def reply(precision=DOUBLE) -> Reply:
-    return Reply("mine", Request(Problem.of(CASE.top, CASE.start, precision), TIMES, None, False))
+    return Reply("mine", ProgramRequest(Problem.of(CASE.top, CASE.start, precision), TIMES, None, False))
 
 
 def lines(random: Random, form: str = "{:.17g}") -> list[bytes]:

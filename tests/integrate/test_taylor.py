@@ -9,7 +9,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
-from heavytop.integrate.trajectory import Outcome, Place, Problem
+from heavytop.integrate.trajectory import Outcome, Problem, ResumePoint
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
@@ -20,6 +20,7 @@ TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("precision", "limit"),
     [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (QUAD, "1e-31"), (real(237), "1e-58")],
@@ -86,6 +87,7 @@ def test_steps_to_a_far_time_are_taken_once(monkeypatch: pytest.MonkeyPatch, ome
     assert len(taken) < 60
 
 
+@pytest.mark.slow
 def test_a_compiled_integrator_is_used_again_and_gives_the_same_bits_as_a_fresh_one() -> None:
     first = propagate(TOP, START, [5], DOUBLE)
     propagate(HeavyTop((5, 4, 2), 1, (1, 2, 3)), State((1, 2, 3), (0, 0, 1)), [7], DOUBLE)
@@ -102,6 +104,7 @@ def test_there_and_back_again() -> None:
     assert max(abs(exact(v) - s) for v, s in zip(back.states[0], START.flat, strict=True)) < Fraction(1, 10**31)
 
 
+@pytest.mark.slow
 def test_the_error_shrinks_along_the_precision_ladder() -> None:
     truth = [exact(v) for v in propagate(TOP, START, [20], real(400)).states[0]]
     errors = []
@@ -112,6 +115,7 @@ def test_the_error_shrinks_along_the_precision_ladder() -> None:
     assert all(error < 2000 for error in errors)
 
 
+@pytest.mark.slow
 def test_the_attitude_rides_along_and_stays_orthonormal() -> None:
     run = propagate(TOP, START, [3], QUAD, xi=perpendicular(START.gamma))
     values = [exact(v) for v in run.states[0]]
@@ -136,6 +140,7 @@ def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
     assert numpy.isfinite(numpy.array(run.states)).all()
 
 
+@pytest.mark.slow
 def test_everything_that_changes_bits_is_in_the_flags() -> None:
     flags = propagate(TOP, START, [1], DOUBLE, high_accuracy=True).flags
     assert flags["high_accuracy"] == "true"
@@ -174,6 +179,7 @@ def test_times_out_of_order_are_refused(times) -> None:
         check_times(times)
 
 
+@pytest.mark.slow
 def test_the_start_may_be_asked_for() -> None:
     run = propagate(TOP, START, [0, 1], real(100))
     assert bits(run)[0] == [exact(number(v, real(100))) for v in START.flat]
@@ -206,6 +212,7 @@ def test_the_body_of_a_sleeping_top_turns_though_omega_and_gamma_rest() -> None:
     assert float(values[6]) == pytest.approx(float(numpy.cos(3.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(100)], ids=lambda p: p.name)
 @pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
 def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
@@ -219,7 +226,7 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
         top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
     times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
 
-    def run(place: Place | None = None):
+    def run(place: ResumePoint | None = None):
         states, places = [], []
         found = propagate(
             top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
@@ -232,7 +239,7 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
     summary, states, places = run()
     assert len(places) == len(times)
     for index, content in enumerate(places):
-        again, rest, later = run(Place.of(json.loads(json.dumps(content)), precision))
+        again, rest, later = run(ResumePoint.of(json.loads(json.dumps(content)), precision))
         assert again == summary
         assert rest == states[index + 1 :]
         assert later == places[index + 1 :]

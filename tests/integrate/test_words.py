@@ -15,9 +15,9 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.multiword import engines
 from heavytop.integrate.multiword import motions as words_module
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.multiword.motions import propagate_words, sums_of_two
-from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+from heavytop.integrate.multiword.motions import propagate_multiword, sums_of_two
+from heavytop.integrate.trajectory import Outcome, Problem, ResumePoint, Trajectory
 from heavytop.multiword.codegen import recurrence
 from heavytop.multiword.codegen.machine_code import once
 from heavytop.multiword.double_double import double_double_run, steps
@@ -64,6 +64,7 @@ def _middle(ball) -> Fraction:
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("precision", "limit"),
     [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29"), (QUAD, "1e-31"), (real(237), "1e-58")],
@@ -71,12 +72,13 @@ def _middle(ball) -> Fraction:
 )
 @pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
 def test_every_reference_state_is_met_in_every_format(given, precision: Precision, limit: str) -> None:
-    run = propagate_words(top_of(given), start_of(given), [given["time"]], precision)
+    run = propagate_multiword(top_of(given), start_of(given), [given["time"]], precision)
     assert run.outcome is Outcome.SUCCESS
     off = max(abs(a - Fraction(b)) for a, b in zip(bits(run)[0], given["state"], strict=True))
     assert off <= Fraction(limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("precision", "horizon", "limit"),
     [(DOUBLE, 2000, 1), (EXTENDED, 1000, 1), (DOUBLE_DOUBLE, 20, 400), (QUAD, 500, 1), (real(500), 10, 1)],
@@ -95,42 +97,45 @@ def test_every_reference_state_is_met_in_every_format(given, precision: Precisio
 def test_what_is_returned_is_the_true_motion_rounded(precision, horizon, limit, top, start, system) -> None:
     """Within an eps of the proven motion from the same rounded data; double-double has no bits to spare."""
     times = [Fraction(horizon * i, 5) for i in range(1, 6)]
-    run = propagate_words(top, start, times, precision, system=system)
+    run = propagate_multiword(top, start, times, precision, system=system)
     assert worst(run) <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("top", "horizon"), [(TOP, 8), (GENERIC, 8)], ids=["kovalevskaya", "generic"])
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
 def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, horizon: int, sign: int) -> None:
     times = [sign * Fraction(horizon * i, 3) for i in range(1, 4)]
     for precision, limit in ((DOUBLE, 1), (EXTENDED, 1), (DOUBLE_DOUBLE, 40), (QUAD, 1), (real(237), 1)):
-        assert worst(propagate_words(top, START, times, precision)) <= limit
+        assert worst(propagate_multiword(top, START, times, precision)) <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 def test_samples_and_chunks_change_no_bit(precision, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = propagate_words(TOP, START, [10, 20], precision)
-    many = propagate_words(TOP, START, [Fraction(i, 8) for i in range(1, 161)], precision)
+    few = propagate_multiword(TOP, START, [10, 20], precision)
+    many = propagate_multiword(TOP, START, [Fraction(i, 8) for i in range(1, 161)], precision)
     assert bits(many)[79] == bits(few)[0]
     assert bits(many)[-1] == bits(few)[1]
     assert many.steps == few.steps
     monkeypatch.setattr(words_module, "_FIRST_CHUNK", 1)
     monkeypatch.setattr(words_module, "CHUNK_SECONDS", 0.0)
-    assert bits(propagate_words(TOP, START, [10, 20], precision)) == bits(few)
+    assert bits(propagate_multiword(TOP, START, [10, 20], precision)) == bits(few)
 
 
 def test_there_and_back_again() -> None:
-    there = propagate_words(TOP, START, [6], DOUBLE_DOUBLE)
+    there = propagate_multiword(TOP, START, [6], DOUBLE_DOUBLE)
     end = bits(there)[0]
-    back = propagate_words(TOP, State(end[:3], end[3:]), [-6], DOUBLE_DOUBLE)
+    back = propagate_multiword(TOP, State(end[:3], end[3:]), [-6], DOUBLE_DOUBLE)
     assert max(abs(v - s) for v, s in zip(bits(back)[0], START.flat, strict=True)) < Fraction(1, 10**29)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
 def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
     top, start = (TOP, START) if system is HEAVY_TOP else (PAPER, PAPER_START)
     xi = perpendicular(start.gamma)
-    run = propagate_words(top, start, [3], DOUBLE_DOUBLE, xi=xi, system=system)
+    run = propagate_multiword(top, start, [3], DOUBLE_DOUBLE, xi=xi, system=system)
     values = bits(run)[0]
     assert abs(dot(values[6:9], values[6:9]) - 1) < Fraction(1, 10**29)
     assert abs(dot(values[6:9], values[3:6])) < Fraction(1, 10**29)
@@ -138,6 +143,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
     assert max(abs(a - exact(b)) for a, b in zip(values, wide.states[0], strict=True)) < Fraction(1, 10**28)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize("exponent", [-30, 6, 60])
 def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
@@ -145,7 +151,7 @@ def test_units_of_time_and_weight_change_nothing_but_the_units(precision, expone
     unit = Fraction(10) ** exponent
     start = State([w * unit for w in START.omega], START.gamma)
     top = HeavyTop(GENERIC.inertia, unit**2, GENERIC.centre)
-    run = propagate_words(top, start, [5 / unit], precision)
+    run = propagate_multiword(top, start, [5 / unit], precision)
     same = Problem.of(HeavyTop(run.problem.top.inertia, 1, run.problem.top.moment), run.problem.start, real(300))
     wide = propagate(same.top, same.start, run.times, real(300))
     for low, size in ((0, unit), (3, 1)):
@@ -153,6 +159,7 @@ def test_units_of_time_and_weight_change_nothing_but_the_units(precision, expone
         assert off <= 60 * size * precision.eps
 
 
+@pytest.mark.slow
 def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() -> None:
     random = Random(150)
     for _ in range(12):
@@ -164,7 +171,7 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
         top = HeavyTop([moments[a] for a in axes], unit**2, [centre[a] for a in axes])
         start = State([omega[a] for a in axes], unit_vector(random))
         time = random.choice((1, -1)) * Fraction(random.randint(1, 40), 9) / unit
-        run = propagate_words(top, start, [time], DOUBLE_DOUBLE)
+        run = propagate_multiword(top, start, [time], DOUBLE_DOUBLE)
         wide = propagate(run.problem.top, run.problem.start, run.times, real(160))
         assert run.outcome is wide.outcome is Outcome.SUCCESS
         for low in (0, 3):
@@ -173,6 +180,7 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
             assert max(abs(a - b) for a, b in zip(found, known, strict=True)) <= size * Fraction(1, 10**27)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize(
     ("top", "start"),
@@ -184,14 +192,14 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
     ids=["sleeping", "hanging", "permanent rotation"],
 )
 def test_an_equilibrium_stays_where_it_is(precision, top: HeavyTop, start: State) -> None:
-    run = propagate_words(top, start, [1, 2000], precision)
+    run = propagate_multiword(top, start, [1, 2000], precision)
     assert run.outcome is Outcome.SUCCESS
     assert bits(run) == [[exact(number(v, precision)) for v in start.flat]] * 2
     assert run.steps == 0
 
 
 def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
-    run = propagate_words(TOP, START, [1, 2, 100], DOUBLE, step_limit=30)
+    run = propagate_multiword(TOP, START, [1, 2, 100], DOUBLE, step_limit=30)
     assert run.outcome is Outcome.STEP_LIMIT
     assert run.times == (1, 2)
     assert run.steps == 30
@@ -207,11 +215,12 @@ def test_what_is_too_large_for_the_format_is_an_outcome_and_what_is_too_small_is
 def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
     """Moments so far apart that the second derivative overflows in every unit of time."""
     top = HeavyTop((Fraction(1, 10**150), Fraction(10**150), Fraction(2 * 10**150)), 0, (0, 0, 0))
-    run = propagate_words(top, State((1, 1, 1), (0, 0, 1)), [1], DOUBLE, step_limit=100)
+    run = propagate_multiword(top, State((1, 1, 1), (0, 0, 1)), [1], DOUBLE, step_limit=100)
     assert run.outcome in (Outcome.NON_FINITE, Outcome.STEP_TOO_SMALL)
     assert len(run.states) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 @pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
 def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
@@ -224,9 +233,9 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
         top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
     times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
 
-    def run(place: Place | None = None):
+    def run(place: ResumePoint | None = None):
         states, places = [], []
-        found = propagate_words(
+        found = propagate_multiword(
             top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
             observer=lambda time, state: states.append((time, [str(v) for v in state])), **options,
         )  # fmt: skip
@@ -237,34 +246,34 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
     summary, states, places = run()
     assert len(places) == len(times)
     for index, content in enumerate(places):
-        again, rest, later = run(Place.of(json.loads(json.dumps(content)), precision))
+        again, rest, later = run(ResumePoint.of(json.loads(json.dumps(content)), precision))
         assert again == summary
         assert rest == states[index + 1 :]
         assert later == places[index + 1 :]
 
 
 def test_a_run_cannot_go_on_with_other_flags() -> None:
-    places: list[Place] = []
-    propagate_words(TOP, START, [1, 2], DOUBLE, mark=places.append)
+    places: list[ResumePoint] = []
+    propagate_multiword(TOP, START, [1, 2], DOUBLE, mark=places.append)
     with pytest.raises(InputError, match="tolerance"):
-        propagate_words(TOP, START, [1, 2], DOUBLE, tolerance=Fraction(1, 10**9), place=places[0])
+        propagate_multiword(TOP, START, [1, 2], DOUBLE, tolerance=Fraction(1, 10**9), place=places[0])
 
 
 def test_threads_do_not_disturb_each_other() -> None:
     starts = [State((Fraction(i, 7), Fraction(1, 5), Fraction(9, 10)), ("3/5", 0, "4/5")) for i in range(1, 9)]
-    alone = [bits(propagate_words(TOP, start, [50], DOUBLE_DOUBLE)) for start in starts]
+    alone = [bits(propagate_multiword(TOP, start, [50], DOUBLE_DOUBLE)) for start in starts]
     with ThreadPoolExecutor(4) as pool:
-        runs = pool.map(lambda start: propagate_words(TOP, start, [50], DOUBLE_DOUBLE), starts)
+        runs = pool.map(lambda start: propagate_multiword(TOP, start, [50], DOUBLE_DOUBLE), starts)
     assert [bits(run) for run in runs] == alone
 
 
 def test_the_error_falls_with_the_tolerance() -> None:
-    rounded = propagate_words(TOP, START, [20], DOUBLE_DOUBLE).problem
+    rounded = propagate_multiword(TOP, START, [20], DOUBLE_DOUBLE).problem
     known = propagate(rounded.top, rounded.start, [20], real(160)).states[0]
     last = Fraction(1)
     for exponent in range(6, 31, 4):
         tolerance = Fraction(1, 10**exponent)
-        run = propagate_words(TOP, START, [20], DOUBLE_DOUBLE, tolerance=tolerance)
+        run = propagate_multiword(TOP, START, [20], DOUBLE_DOUBLE, tolerance=tolerance)
         error = max(abs(a - exact(b)) for a, b in zip(bits(run)[0], known, strict=True))
         assert error < 200 * tolerance
         # 106 bits end at about 2^-100 here
@@ -275,7 +284,7 @@ def test_the_error_falls_with_the_tolerance() -> None:
 @pytest.mark.parametrize("tolerance", [0, -1, 1, Fraction(1, 10**5), Fraction(1, 10**40)])
 def test_a_tolerance_it_cannot_do_is_refused(tolerance) -> None:
     with pytest.raises(InputError, match="tolerance"):
-        propagate_words(TOP, START, [1], DOUBLE, tolerance=Fraction(tolerance))
+        propagate_multiword(TOP, START, [1], DOUBLE, tolerance=Fraction(tolerance))
 
 
 def test_heyoka_refuses_double_double() -> None:
@@ -283,6 +292,7 @@ def test_heyoka_refuses_double_double() -> None:
         propagate(TOP, START, [1], DOUBLE_DOUBLE)
 
 
+@pytest.mark.slow
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
     monkeypatch.setattr(double_double_run, "machine", once(steps.build))
@@ -291,17 +301,18 @@ def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pyt
     damaged[2][4] = (6, -1)
     monkeypatch.setattr(recurrence, "GATHERED", tuple(map(tuple, damaged)))
     with pytest.raises(Contradiction):
-        propagate_words(TOP, START, [1], DOUBLE)
+        propagate_multiword(TOP, START, [1], DOUBLE)
 
 
 def test_everything_that_changes_bits_is_in_the_flags() -> None:
-    flags = propagate_words(TOP, START, [1], DOUBLE).flags
+    flags = propagate_multiword(TOP, START, [1], DOUBLE).flags
     assert {"arithmetic", "words", "bits", "order", "tolerance", "step_rule"} <= set(flags)
 
 
 _TINY = Fraction(1, 2**90)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)], ids=lambda p: p.name)
 @pytest.mark.parametrize(
     ("weight", "arm", "gamma"),
@@ -321,11 +332,12 @@ def test_what_a_tiny_coefficient_makes_of_nothing_is_computed_as_finely_as_it_ne
     """
     for turned in range(3) if precision in (DOUBLE, real(237)) else [precision.bits % 3]:
         moments, arms, omega, gammas = ((*v[turned:], *v[:turned]) for v in ((3, 2, 1), arm, (0, 1, 0), gamma))
-        run = propagate_words(HeavyTop(moments, weight, arms), State(omega, gammas), [80], precision)
+        run = propagate_multiword(HeavyTop(moments, weight, arms), State(omega, gammas), [80], precision)
         assert run.outcome is Outcome.SUCCESS
         assert worst(run) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize(("about", "horizon"), [("1e-12", 20), ("1e-30", 60), ("1e-60", 110)])
 def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(
@@ -334,14 +346,14 @@ def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(
     """Spin about the middle axis with a weight on it; alone and with others beside it in lanes."""
     top = HeavyTop((3, 2, 1), 1, (0, 1, 0))
     problem = Problem.of(top, State((about, 1, 0), (0, 1, 0)), precision)
-    alone = propagate_words(top, problem.start, [horizon], precision)
-    true = propagate_words(top, problem.start, [horizon], real(400)).states[0]
+    alone = propagate_multiword(top, problem.start, [horizon], precision)
+    true = propagate_multiword(top, problem.start, [horizon], real(400)).states[0]
     allowed = exact(precision.eps) * (40 if precision is DOUBLE_DOUBLE else 1)
     for value, expected in zip(map(exact, alone.states[0]), map(exact, true), strict=True):
         assert abs(value - expected) <= allowed * max(1, abs(expected))
     usual = [Problem.of(TOP, START, precision)] * 3
-    together = propagate_words_ensemble([*usual, problem, *usual], [horizon])
-    first = propagate_words_ensemble([problem, *usual], [horizon])
+    together = propagate_multiword_ensemble([*usual, problem, *usual], [horizon])
+    first = propagate_multiword_ensemble([problem, *usual], [horizon])
     assert [*together[3].states[0]] == [*first[0].states[0]] == [*alone.states[0]]
     assert [*together[0].states[0]] == [*first[1].states[0]]
 

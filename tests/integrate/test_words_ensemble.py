@@ -9,8 +9,8 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate.multiword import lanes
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD, exact
 from heavytop.top.attitude import perpendicular
@@ -39,13 +39,14 @@ def bits(run: Trajectory) -> list[list[Fraction]]:
     return [[exact(value) for value in state] for state in run.states]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
 def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
     times = [sign * Fraction(t) for t in TIMES]
     given = problems(precision)
-    for problem, run in zip(given, propagate_words_ensemble(given, times), strict=True):
-        alone = propagate_words(problem.top, problem.start, times, precision)
+    for problem, run in zip(given, propagate_multiword_ensemble(given, times), strict=True):
+        alone = propagate_multiword(problem.top, problem.start, times, precision)
         assert run.outcome is Outcome.SUCCESS
         assert run.problem == problem
         assert run.times == alone.times
@@ -54,14 +55,15 @@ def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
         assert (run.steps == 0) == (alone.steps == 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", range(6, 14))
 def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
     """Loose ones ask for fewer orders in double-double than there can be."""
     tolerance = Fraction(1, 10**exponent)
     for precision in (DOUBLE, DOUBLE_DOUBLE, QUAD):
         given = problems(precision, 10)
-        runs = propagate_words_ensemble(given, TIMES, tolerance=tolerance)
-        for run, exact_run in zip(runs, propagate_words_ensemble(given, TIMES), strict=True):
+        runs = propagate_multiword_ensemble(given, TIMES, tolerance=tolerance)
+        for run, exact_run in zip(runs, propagate_multiword_ensemble(given, TIMES), strict=True):
             assert run.outcome is Outcome.SUCCESS
             pairs = zip(bits(run), bits(exact_run), strict=True)
             off = max(abs(a - b) for p, q in pairs for a, b in zip(p, q, strict=True))
@@ -71,12 +73,12 @@ def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
 
 def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.MonkeyPatch) -> None:
     given = problems()
-    runs = propagate_words_ensemble(given, TIMES, threads=1)
+    runs = propagate_multiword_ensemble(given, TIMES, threads=1)
     monkeypatch.setattr(lanes, "_FIRST_CHUNK", 3)
     monkeypatch.setattr(lanes, "CHUNK_SECONDS", 0.0)
-    turned = propagate_words_ensemble(given[::-1], TIMES, threads=3)[::-1]
-    alone = [propagate_words_ensemble([problem], TIMES)[0] for problem in given[:7]]
-    few = propagate_words_ensemble(given, TIMES[-1:])
+    turned = propagate_multiword_ensemble(given[::-1], TIMES, threads=3)[::-1]
+    alone = [propagate_multiword_ensemble([problem], TIMES)[0] for problem in given[:7]]
+    few = propagate_multiword_ensemble(given, TIMES[-1:])
     for first, second in [*zip(runs, turned, strict=True), *zip(runs, alone, strict=False)]:
         assert bits(first) == bits(second)
         assert first.steps == second.steps
@@ -86,9 +88,9 @@ def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.M
 
 def test_motions_that_outgrow_n0_go_on_where_they_were_and_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     given = problems()
-    runs = propagate_words_ensemble(given, TIMES)
+    runs = propagate_multiword_ensemble(given, TIMES)
     monkeypatch.setattr(lanes, "first_low_order", lambda arithmetic: 2)
-    raised = propagate_words_ensemble(given, TIMES, threads=2)
+    raised = propagate_multiword_ensemble(given, TIMES, threads=2)
     for a, b in zip(runs, raised, strict=True):
         assert a.times == b.times
         off = max(abs(x - y) for p, q in zip(bits(a), bits(b), strict=True) for x, y in zip(p, q, strict=True))
@@ -97,8 +99,8 @@ def test_motions_that_outgrow_n0_go_on_where_they_were_and_are_right(monkeypatch
 
 def test_each_motion_has_the_outcome_it_has() -> None:
     given = problems()
-    whole = propagate_words_ensemble(given, TIMES)
-    runs = propagate_words_ensemble(given, TIMES, step_limit=38)
+    whole = propagate_multiword_ensemble(given, TIMES)
+    runs = propagate_multiword_ensemble(given, TIMES, step_limit=38)
     assert {run.outcome for run in runs} == {Outcome.SUCCESS, Outcome.STEP_LIMIT}
     for run, long in zip(runs, whole, strict=True):
         assert (run.outcome is Outcome.SUCCESS) == (long.steps <= 38)
@@ -117,7 +119,7 @@ def test_observer_and_finished_are_called_in_order() -> None:
         assert index not in over
         seen.setdefault(index, []).append(time)
 
-    runs = propagate_words_ensemble(
+    runs = propagate_multiword_ensemble(
         given, TIMES, observer=observer, finished=lambda index, run: over.append(index), threads=2
     )
     assert sorted(over) == list(range(9))
@@ -130,34 +132,36 @@ def test_an_observer_that_raises_ends_the_ensemble() -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        propagate_words_ensemble(problems(), TIMES, observer=observer, threads=2)
+        propagate_multiword_ensemble(problems(), TIMES, observer=observer, threads=2)
 
 
+@pytest.mark.slow
 def test_other_formats_and_attitudes_have_the_bits_of_single_runs() -> None:
     start = State((1, "1/2", "1/3"), ("3/5", 0, "4/5"))
     xi = perpendicular(start.gamma)
     for precision, vector in ((QUAD, None), (DOUBLE, xi)):
         given = [Problem.of(TOP, start, precision, xi=vector)] * 3
-        alone = propagate_words(TOP, start, TIMES, precision, xi=vector)
-        for run in propagate_words_ensemble(given, TIMES, threads=2):
+        alone = propagate_multiword(TOP, start, TIMES, precision, xi=vector)
+        for run in propagate_multiword_ensemble(given, TIMES, threads=2):
             assert bits(run) == bits(alone)
 
 
+@pytest.mark.slow
 def test_the_gyrostat_goes_in_lanes_too() -> None:
     top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
     omega = [Fraction(n, 7) * 11 / i for n, i in zip((2, 3, 6), (3, 5, 7), strict=True)]
     start = State(omega, ("2/7", "3/7", "6/7"))
     given = [Problem.of(top, start, DOUBLE_DOUBLE, GYROSTAT)] * 2
-    alone = propagate_words(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
-    for run in propagate_words_ensemble(given, TIMES):
+    alone = propagate_multiword(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
+    for run in propagate_multiword_ensemble(given, TIMES):
         off = max(abs(a - b) for p, q in zip(bits(run), bits(alone), strict=True) for a, b in zip(p, q, strict=True))
         assert off < Fraction(1, 10**29)
 
 
 def test_what_is_no_ensemble_is_refused() -> None:
     with pytest.raises(InputError):
-        propagate_words_ensemble([], TIMES)
+        propagate_multiword_ensemble([], TIMES)
     with pytest.raises(InputError):
-        propagate_words_ensemble(problems(), TIMES, threads=0)
+        propagate_multiword_ensemble(problems(), TIMES, threads=0)
     with pytest.raises(InputError):
-        propagate_words_ensemble([*problems(), Problem.of(TOP, State((1, 0, 0), (0, 0, 1)), QUAD)], TIMES)
+        propagate_multiword_ensemble([*problems(), Problem.of(TOP, State((1, 0, 0), (0, 0, 1)), QUAD)], TIMES)

@@ -20,6 +20,8 @@ from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, read_plan, summary
 
+pytestmark = pytest.mark.slow
+
 PEER = '''
 from dataclasses import replace
 

@@ -58,6 +58,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, An
     return measured
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(
     rows: Callable[..., dict[str, Any]], integrator: str
@@ -71,6 +72,7 @@ def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(
         assert len(row.series["attitude_error"].values) > 3
 
 
+@pytest.mark.slow
 def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callable[..., dict[str, Any]]) -> None:
     with_it, without = (rows("heyoka", flag) for flag in ("true", "false"))
     assert without.keys() == {"tilted", "spinner"}
@@ -79,6 +81,7 @@ def test_the_states_are_those_of_a_run_without_attitude_to_rounding(rows: Callab
         assert set(row.metrics) < set(with_it[key].metrics)
 
 
+@pytest.mark.slow
 def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
     """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
     report = ht.run(
@@ -139,6 +142,7 @@ runs = [
 """
 
 
+@pytest.mark.slow
 def test_the_errors_of_attitude_and_position_have_laws(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(GROWTH, "utf-8")
     plain, biased = ht.run(tmp_path / "plan.toml", out=tmp_path / "out", workers=1).rows

@@ -113,12 +113,14 @@ def test_a_plan_runs_stops_and_goes_on(tmp_path: Path) -> None:
     assert [row.metrics["toy_weight"].value for row in rows] == ["3", "4.5", "4", "6"]
 
 
+@pytest.mark.slow
 def test_spawned_workers_know_it_too(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "two").mkdir()
     assert measured(tmp_path / "one") == measured(tmp_path / "two", workers=2)
 
 
+@pytest.mark.slow
 def test_its_rows_have_their_lines_and_their_section(tmp_path: Path) -> None:
     console = Console(width=100)
     made = report(measured(tmp_path))

@@ -50,6 +50,7 @@ def changed(folder: Path, out: Path, factor: float = 1.0, value: str = "") -> Pa
     return out
 
 
+@pytest.mark.slow
 def test_values_are_the_same_and_there_are_no_bands(made: Path) -> None:
     with_noise, without = (ht.read_report(made / noise).rows for noise in ("true", "false"))
     assert len(without) == 3
@@ -62,6 +63,7 @@ def test_values_are_the_same_and_there_are_no_bands(made: Path) -> None:
         assert other.flags == one.flags | {"noise": "not measured"}
 
 
+@pytest.mark.slow
 def test_what_rounding_explains_is_the_same_and_what_it_does_not_is_worse(made: Path, tmp_path: Path) -> None:
     baseline = made / "false"
     assert ht.compare(baseline, baseline).verdict == "same"
@@ -72,6 +74,7 @@ def test_what_rounding_explains_is_the_same_and_what_it_does_not_is_worse(made: 
     assert verdicts == {8.0: "same", 0.1: "same", 1e6: "worse"}
 
 
+@pytest.mark.slow
 def test_what_is_beyond_rounding_is_worse(made: Path, tmp_path: Path) -> None:
     assert ht.compare(made / "false", changed(made, tmp_path / "x", value="0.25")).verdict == "worse"
 

@@ -92,6 +92,7 @@ def known() -> Reference:
     return ht.reference(TOP, START, [2, "-1/2", 0], DIGITS, attitude=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "time"), [(0, Fraction(2)), (1, Fraction(-1, 2))])
 def test_a_reference_agrees_with_an_independent_integration_of_the_quaternion(
     known: Reference, place: int, time: Fraction
@@ -167,6 +168,7 @@ def test_arrays_have_their_shapes_and_agree_with_texts_and_balls(known: Referenc
     assert abs(run.quaternions()[1] - known.quaternions()[0]).max() < 1e-14
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["extended", "quad", "real:150"])
 def test_texts_of_a_run_are_exact_functions_of_its_native_numbers(precision: str) -> None:
     run = ht.propagate(TOP, START, [1], precision, attitude=True)
@@ -237,6 +239,7 @@ def test_euler_angles_of_every_sequence_rebuild_the_matrix(sequence: str, known:
             assert low <= angles[1] <= high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("up", [1, -1])
 def test_gimbal_lock_is_said_and_the_middle_angle_is_right(up: int) -> None:
     start = ht.State((0, 0, 3), (0, 0, up))

@@ -40,6 +40,7 @@ class Shifted:
             return [values[0], values[1] + (self.error if abs(time) > self.after else 0), *values[2:]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", KNOWN, ids=lambda k: k.system.name)
 @pytest.mark.parametrize("time", [Fraction(-7, 3), Fraction(8)])
 def test_closed_forms_are_certified_by_validated_integration(known, time):
@@ -62,6 +63,7 @@ KOVALEVSKAYA = Kovalevskaya(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [KOVALEVSKAYA, Renamed(KOVALEVSKAYA, (2, 0, 1))], ids=["as it is", "renamed"])
 def test_a_second_closed_form_certifies_far_times_at_the_time_itself(known):
     certificate = certify(known, Fraction(10**6), 50)
@@ -237,6 +239,7 @@ def test_a_radius_beyond_the_digits_promised_is_not_printed(middle, wide, narrow
         asked(wide)
 
 
+@pytest.mark.slow
 def test_more_digits_than_python_reads_at_once_are_printed():
     record = reference(KNOWN[0].top, KNOWN[0].start, [Fraction(1, 10**5000), 1], 5000)
     assert record.times == ["1/1" + 5000 * "0", "1"]

@@ -51,6 +51,7 @@ def computed(motion, times: list[Fraction], **more) -> ComputedReference:
     return found
 
 
+@pytest.mark.slow
 def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
     given = next(v for v in VECTORS if v["name"].startswith("paper data"))
     known = computed(SIX.solves, [Fraction(1)])
@@ -59,6 +60,7 @@ def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
     assert "computed, not proven" in known.against.text
 
 
+@pytest.mark.slow
 def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> None:
     times = [Fraction(1, 2), Fraction(3)]
     delone = DeloneHomoclinic(TWO.alpha, TWO.i1)

@@ -117,6 +117,7 @@ PLANTED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "kind"), list(enumerate(PLANTED, 20)))
 def test_a_planted_mistake_is_named(kind: str, seed: int) -> None:
     top, start, times = problem(seed)
@@ -142,6 +143,7 @@ def test_a_planted_mistake_is_named(kind: str, seed: int) -> None:
     assert len(sentence) < 240
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("signs", "kind"), [((1, -1), "kinematic_sign"), ((-1, 1), "gyroscopic_sign"), ((-1, -1), "both_signs")]
 )
@@ -153,6 +155,7 @@ def test_a_sign_in_the_equations_is_told(signs: tuple[int, int], kind: str) -> N
     assert "sign" in diagnosis_text(told)
 
 
+@pytest.mark.slow
 def test_one_equation_with_the_other_sign_is_named() -> None:
     top, start, times = problem(45)
     times = [time / 4 for time in times]
@@ -161,6 +164,7 @@ def test_one_equation_with_the_other_sign_is_named() -> None:
     assert "equation of γ2 has the other sign" in diagnosis_text(told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("further", "said"), [(1, "one step too long (51 steps"), (-1, "one step too short (49 steps")]
 )
@@ -173,6 +177,7 @@ def test_a_step_too_many_in_each_interval_is_named(further: int, said: str) -> N
     assert said in diagnosis_text(told)
 
 
+@pytest.mark.slow
 def test_columns_in_any_order_are_named() -> None:
     top, start, times = problem(42)
     states = runge_kutta(top, start, times)[:, [0, 3, 1, 4, 2, 5]] * [1, 1, 1, -1, 1, 1]
@@ -181,6 +186,7 @@ def test_columns_in_any_order_are_named() -> None:
     assert "they are Ω1, γ1, Ω2, −γ2, Ω3, γ3;" in diagnosis_text(told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("of", "axis"), [("omega", 2), ("both", 1)])
 def test_vectors_in_axes_of_space_are_told(of: str, axis: int) -> None:
     """Each state turned so that γ is that axis, and about it by any angle."""
@@ -200,6 +206,7 @@ def test_vectors_in_axes_of_space_are_told(of: str, axis: int) -> None:
     assert "axes fixed in space" in diagnosis_text(told)
 
 
+@pytest.mark.slow
 def test_a_motion_that_stands_still_from_some_time_on_is_told() -> None:
     top, start, times = problem(44)
     states = runge_kutta(top, start, times)
@@ -211,6 +218,7 @@ def test_a_motion_that_stands_still_from_some_time_on_is_told() -> None:
     assert found(top, start, times, states, 1e-12) != [told]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "step"), [(3, 0.3), (4, 0.05)])
 def test_an_honest_method_is_not_accused(seed: int, step: float) -> None:
     top, start, times = problem(seed)
@@ -218,6 +226,7 @@ def test_an_honest_method_is_not_accused(seed: int, step: float) -> None:
     assert found(top, start, times, midpoint(top, start, times, step)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["pendulum", "delone", "lagrange", "hess-pendulum"])
 def test_a_lag_and_a_saddle_are_no_mistakes(case: str) -> None:
     given = CASES[case]
@@ -225,12 +234,14 @@ def test_a_lag_and_a_saddle_are_no_mistakes(case: str) -> None:
     assert found(given.top, given.start, times, midpoint(given.top, given.start, times, 0.1)) == []
 
 
+@pytest.mark.slow
 def test_small_oscillations_lag_as_any_clock_would() -> None:
     top, start = HeavyTop((3, 2, 1), 1, (0, 0, -1)), State((Fraction(1, 1000), 0, 0), (0, 0, 1))
     for times in ([Fraction(k, 2) for k in range(1, 31)], [Fraction(5 * k) for k in range(1, 7)]):
         assert found(top, start, times, midpoint(top, start, times, 0.1)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [6, 7])
 def test_near_misses_stay_silent(seed: int) -> None:
     top, start, times = problem(seed)
@@ -253,6 +264,7 @@ def test_one_state_that_is_off_is_pointed_at() -> None:
     assert (told.kind, float(told.numbers["t"])) == ("one_state", float(times[4]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [1, 3, 7])
 def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
     top, start, times = problem(8)
@@ -279,6 +291,7 @@ def test_states_that_differ_by_less_than_double_tells_are_not_the_same(bits: int
     assert not any(told.kind == "constant" for told in diagnose(top, start, HEAVY_TOP, times, rows, QUAD, 1.0))
 
 
+@pytest.mark.slow
 def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at() -> None:
     top, start, _ = problem(8)
     times = [Fraction(k) for k in range(1, 101)]
@@ -295,6 +308,7 @@ def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("digits", "kind"), [(5, "decimals"), (7, "significant"), (24, "single")])
 def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: str) -> None:
     top, start, times = problem(9)
@@ -316,6 +330,7 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
     assert rounding(rows, DOUBLE) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [-60, 60])
 def test_units_of_any_size_do_not_matter(power: int) -> None:
     top, start, times = problem(10)
@@ -329,6 +344,7 @@ def test_units_of_any_size_do_not_matter(power: int) -> None:
     assert (told.kind, told.numbers["axes"]) == ("axes_permuted", "2,3,1")
 
 
+@pytest.mark.slow
 def test_times_and_numbers_that_no_double_holds_are_left_alone() -> None:
     top, start, times = problem(11)
     y = runge_kutta(top, start, times)

@@ -100,6 +100,7 @@ def command(*arguments: object) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_every_surface_says_the_same(tmp_path: Path) -> None:
     motion = given({(1, 2): Fraction(13, 10**10), (3, 4): Fraction(1, 10**11)}, DOUBLE)
     said = digits_text(digits_kept(score(motion)))

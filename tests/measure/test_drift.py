@@ -21,6 +21,7 @@ TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [QUAD, real(237)], ids=lambda p: p.name)
 def test_drift_is_the_difference_of_the_integral_to_many_more_digits_than_the_format(precision) -> None:
     problem = Problem.of(TOP, START, precision)

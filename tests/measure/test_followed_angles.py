@@ -15,6 +15,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 TIMES = [Fraction(1), Fraction(10)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", ["1/2", "1/1000", "100"])
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("unit", "integrator"), [(Fraction(1), "heyoka"), (Fraction(2) ** 300, "multiword")])
@@ -33,6 +34,7 @@ def test_precession_of_a_free_symmetric_top(tilt: str, sign: int, unit: Fraction
     assert theta == pytest.approx(2 * math.atan(m), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_turns_through_a_swing_beside_the_pole_are_told_apart(integrator: str) -> None:
     # a pendulum pushed a little aside passes the poles of θ on one side: half a turn of φ, not three halves or none
@@ -48,6 +50,7 @@ def test_turns_through_a_swing_beside_the_pole_are_told_apart(integrator: str) -
     assert abs(first) > math.pi
 
 
+@pytest.mark.slow
 def test_at_a_pole_there_is_nothing_to_follow() -> None:
     top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 9), (0, 0, 1))
     motion = compute(top, start, [Fraction(50)], DOUBLE, HEAVY_TOP, attitude=True)

@@ -11,6 +11,7 @@ from heavytop.report.store.checks import inconsistent
 from support.synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMES)
 def test_every_power_is_recognised(kind: str) -> None:
     rng = numpy.random.default_rng(5)
@@ -18,6 +19,7 @@ def test_every_power_is_recognised(kind: str) -> None:
     assert found[NAMES[kind]] >= 38, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "starts"), [("walk", 24), ("integrated", 64)])
 def test_the_interval_holds_the_exponent_in_95_of_100_trials(kind: str, starts: int) -> None:
     rng = numpy.random.default_rng(11)
@@ -29,6 +31,7 @@ def test_the_interval_holds_the_exponent_in_95_of_100_trials(kind: str, starts: 
     assert numpy.mean([each.high - each.low for each in laws]) / 2 < 0.06 * (64 / starts) ** 0.5
 
 
+@pytest.mark.slow
 def test_chaos_is_exponential_though_it_saturates_early_and_its_rate_is_covered() -> None:
     rng = numpy.random.default_rng(3)
     laws = [law(Ensemble(TIMES, chaotic(rng, 64), STEP)) for _ in range(100)]
@@ -75,6 +78,7 @@ def test_a_bounded_error_has_no_horizon() -> None:
     assert found.lost_at is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [0.25, 0.75, 1.25, 1.75, 3.0])
 def test_a_power_between_the_classes_is_unresolved(power: float) -> None:
     rng = numpy.random.default_rng(4)
@@ -90,6 +94,7 @@ def test_a_power_between_the_classes_is_unresolved(power: float) -> None:
     assert inconsistent(found) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("second", ["linear", "integrated", "quadratic"])
 def test_two_laws_that_cross_are_not_taken_for_one(second: str) -> None:
     rng = numpy.random.default_rng(6)
@@ -151,6 +156,7 @@ def test_zeros_are_not_growth() -> None:
     assert (never.growth, never.exponent, never.lost_at) == ("bounded", None, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["walk", "integrated"])
 def test_a_fault_above_the_detection_power_is_told_and_one_well_below_is_not(kind: str) -> None:
     rng = numpy.random.default_rng(8)
@@ -192,6 +198,7 @@ def test_the_same_starts_give_the_same_bits() -> None:
     assert law(Ensemble(TIMES, errors, STEP)) == law(Ensemble(TIMES, errors.copy(), STEP))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("starts", [16, 64])
 @pytest.mark.parametrize("spread", [0.05, 0.12])
 def test_the_interval_of_a_rate_holds_the_median_of_rates_that_scatter(starts: int, spread: float) -> None:
@@ -231,6 +238,7 @@ def test_what_all_starts_share_widens_the_interval_of_a_power() -> None:
     assert (plain.high - plain.low) / 2 < expected / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decades", [1, 3, 8])
 @pytest.mark.parametrize("kind", ["bounded", "walk"])
 def test_an_error_that_jumps_has_no_law(kind: str, decades: int) -> None:
@@ -244,6 +252,7 @@ def test_an_error_that_jumps_has_no_law(kind: str, decades: int) -> None:
         assert not inconsistent(found)
 
 
+@pytest.mark.slow
 def test_an_error_that_jumps_late_in_time_is_no_exponential() -> None:
     for part in (0.1, 0.3, 0.5, 0.7, 0.9):
         errors = synthetic("bounded", numpy.random.default_rng(29))

@@ -19,6 +19,7 @@ def processor_seconds(process):
     return sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13])) / TICKS
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks into /proc for the time a process has taken")
 @pytest.mark.parametrize(
     ("motion", "times", "digits"),

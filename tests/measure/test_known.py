@@ -105,6 +105,7 @@ def test_values_that_are_exact_are_said_to_agree_exactly(top: HeavyTop, start: S
     assert later.certificate.agreed_digits < 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ALL)
 def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
     case = CASES["delone"]
@@ -130,6 +131,7 @@ TILTED = ht.Body(1, "9.81", (0, "1/3", 1), ("2", "3", "3", "1/10", "1/20", "1/5"
 MOVED = ht.State((1, 2, 3), attitude=ht.Attitude.euler("ZXZ", "30deg", "1/2", 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "start", "more"),
     [

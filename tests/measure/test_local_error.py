@@ -7,10 +7,10 @@ from itertools import accumulate, pairwise
 import numpy
 import pytest
 
+from heavytop.api.faulty_integrators import FAULTS
 from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
 from heavytop.features.local_error.measurement import LocalError, single_calls
-from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.integrate.trajectory import Outcome
@@ -33,6 +33,7 @@ def stepped(*given, by=first_steps, **options):
     return run, list(zip(run.times, steps, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "precision"), [("kovalevskaya", DOUBLE), ("gyrostat", EXTENDED), ("euler", QUAD)])
 def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, precision) -> None:
     case = CASES[name]
@@ -43,6 +44,7 @@ def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, preci
     assert found["observed_order"].value == str(run.order)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("digits", "order"), [(6, 8), (12, 15)])
 def test_the_order_is_that_of_the_tolerance(digits, order) -> None:
     case = CASES["lagrange"]
@@ -64,6 +66,7 @@ def test_a_step_that_is_off_by_ten_ulps_is_seen_as_that() -> None:
     assert 10 - good <= bad <= 10 + good
 
 
+@pytest.mark.slow
 def test_one_order_less_shows_in_the_order_alone() -> None:
     case = CASES["generic"]
     asked = (first_steps, FAULTS["order"].first_steps)
@@ -88,6 +91,7 @@ def test_an_equilibrium_has_no_steps() -> None:
     assert LocalError(run.problem).metrics()["observed_order"].value == "missing"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "order"), [("splitting:2", 2), ("splitting:8", 8)])
 def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -> None:
     case = CASES["generic"]
@@ -98,6 +102,7 @@ def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -
     assert [time - call.length for time, call in calls] == [Fraction(i, 4) for i in range(16)]
 
 
+@pytest.mark.slow
 def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
     case = CASES["euler"]
     run, calls = single_calls(ChosenIntegrator("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
@@ -111,6 +116,7 @@ def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
     assert float(examined(run, calls)["local_error_ulp_max"].value) == pytest.approx(float(worst), rel=1e-7)
 
 
+@pytest.mark.slow
 def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
     case = CASES["lagrange"]
     run, calls = single_calls(ChosenIntegrator("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
@@ -120,6 +126,7 @@ def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_n
     assert 0 < float(found["local_error_ulp_max"].value) < 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "times"), [("splitting:2", 1000), ("multiword", 1000), ("splitting:2", 2), ("multiword", 0)]
 )
@@ -143,6 +150,7 @@ def test_a_count_of_steps_that_cannot_be_is_refused(name, times, monkeypatch) ->
         single_calls(ChosenIntegrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
 
 
+@pytest.mark.slow
 def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
     """Ω → s Ω, t → t/s, P → s² P is the same motion."""
     case = CASES["generic"]

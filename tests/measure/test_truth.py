@@ -13,7 +13,7 @@ from heavytop.exact.enclosure import run as validated
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth as truths
 from heavytop.measure.truth import ComputedReference, Truth, known_motion, of_rounded, truth
@@ -45,6 +45,7 @@ def found(problem: Problem, instants) -> Truth:
     return answer
 
 
+@pytest.mark.slow
 def test_the_truth_is_proven_up_to_100_and_beyond_where_that_is_cheap() -> None:
     for horizon in (30, 120):
         answer = found(chaotic(), times(horizon))
@@ -53,6 +54,7 @@ def test_the_truth_is_proven_up_to_100_and_beyond_where_that_is_cheap() -> None:
         assert answer.against.text.startswith("known: validated")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("horizon", [99, 100, 101, 160, -101])
 def test_the_boundary_of_the_model_of_the_cost(horizon: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Just below its cost an enclosure is proven and just beyond it is not; up to 100 it is, whatever it costs."""
@@ -71,6 +73,7 @@ def test_a_closed_form_is_proven_at_any_time() -> None:
     assert "Euler" in answer.against.text
 
 
+@pytest.mark.slow
 def test_the_gyrostat_takes_the_rotor_of_the_problem() -> None:
     """Rounded, γ is no longer parallel to M: the rotor is not that of the rounded start."""
     case = ErshkovPartial(Fraction(1, 3), Fraction(2), Fraction(1))
@@ -80,6 +83,7 @@ def test_the_gyrostat_takes_the_rotor_of_the_problem() -> None:
         assert abs(midpoint(value) - midpoint(true)) <= radius(value)
 
 
+@pytest.mark.slow
 def test_what_is_too_dear_to_prove_is_computed_and_right(monkeypatch: pytest.MonkeyPatch) -> None:
     """With no enclosure allowed beyond 100: the computed one is within its radius of what the enclosure would be."""
     monkeypatch.setattr(truths, "CHEAP", 0.0)
@@ -96,6 +100,7 @@ def test_what_is_too_dear_to_prove_is_computed_and_right(monkeypatch: pytest.Mon
             assert radius(value) < Fraction(1, 2**40)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_scale_makes_a_computed_truth_wrong(seed: int) -> None:
     """Tops and starts over ten decades, components down to 1e-30 of others, units of time of 1e±40: within the radius
@@ -125,6 +130,7 @@ def test_no_scale_makes_a_computed_truth_wrong(seed: int) -> None:
                 assert radius(value) < size / 2**100
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_chaotic_row_ends_where_its_format_has_no_digit_left() -> None:
     answer = found(chaotic(), times(1200, 12))
     assert answer.against.how == "computed"
@@ -144,6 +150,7 @@ def test_the_truth_of_a_chaotic_row_ends_where_its_format_has_no_digit_left() ->
     assert errors[-1] > Fraction(1, 1000) > errors[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [Fraction(10) ** -40, Fraction(10) ** 40])
 def test_the_truth_ends_at_the_same_time_in_any_unit_of_time(unit: Fraction) -> None:
     ends = []
@@ -156,6 +163,7 @@ def test_the_truth_ends_at_the_same_time_in_any_unit_of_time(unit: Fraction) -> 
     assert abs(ends[0] - ends[1]) <= 100
 
 
+@pytest.mark.slow
 def test_a_tiny_component_on_an_unstable_axis_takes_no_digit() -> None:
     """Ω1 = 1e-60 about the middle axis: its growth is no loss of digits, in a format that floats."""
     start = State((Fraction(1, 10**60), 1, 0), ("3/5", 0, "4/5"))
@@ -164,6 +172,7 @@ def test_a_tiny_component_on_an_unstable_axis_takes_no_digit() -> None:
         assert computed.ends is None
 
 
+@pytest.mark.slow
 def test_more_digits_last_longer() -> None:
     ends = [of_rounded([chaotic(precision)], times(900, 18))[0].ends for precision in (DOUBLE, QUAD)]
     assert ends[0] is not None
@@ -175,6 +184,7 @@ def test_a_format_without_a_digit_at_the_first_sample_has_no_truth() -> None:
     assert "all significant digits of the format are lost at t = 5000, the first sample" in answer
 
 
+@pytest.mark.slow
 def test_the_choice_and_the_text_are_the_same_however_busy_the_machine_is(monkeypatch: pytest.MonkeyPatch) -> None:
     first = found(chaotic(), times(130, 2))
     known_motion.cache_clear()
@@ -193,6 +203,7 @@ def test_the_words_of_both_runs_differ_though_their_formats_are_served_by_the_sa
     assert 0 < computed.radius(Fraction(2)) < Fraction(1, 2**140)
 
 
+@pytest.mark.slow
 def test_what_takes_longer_than_anyone_waits_has_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validated, "seconds_a_step", lambda *_: 1e9)
     monkeypatch.setattr(truths, "EFFORT", 0.005)
@@ -211,11 +222,11 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
 
     def counted(problem, targets, step_limit):
         nonlocal steps
-        run = follow(problem, targets, step_limit=step_limit)
+        run = integrate_to_samples(problem, targets, step_limit=step_limit)
         steps += run.steps
         return run
 
-    monkeypatch.setattr(truths, "follow", counted)
+    monkeypatch.setattr(truths, "integrate_to_samples", counted)
     answer = truth(chaotic(precision), [Fraction(horizon)])
     assert isinstance(answer, str)
     far = abs(horizon) > 10**20
@@ -231,7 +242,7 @@ def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypa
     monkeypatch.setattr(truths, "seconds_a_step", lambda bits: 1.0)
     monkeypatch.setattr(truths, "EFFORT", 40.0)
 
-    reached = follow(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
+    reached = integrate_to_samples(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
     for beyond, says in ((Fraction(0), "stopped at the step limit"), (Fraction(1, 2**20), "takes too long")):
         at = exact(number(2 * reached * (1 + beyond), real(84)))
         with pytest.raises(OutOfReach, match=says):

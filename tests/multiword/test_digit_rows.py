@@ -59,6 +59,7 @@ def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels:
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wide", [True, False], ids=["8 by 8", "4 by 4"])
 @pytest.mark.parametrize("kind", ["random", "largest", "alternating"])
 def test_sums_of_products_are_exact(wide: bool, kind: str) -> None:
@@ -102,6 +103,7 @@ def test_what_is_left_out_of_a_sum_is_as_small_as_is_said(words: int) -> None:
     assert (left_out + lacking) * unit * 2**spare > said / 2
 
 
+@pytest.mark.slow
 def test_with_more_products_in_a_sum_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """The number of products is what keeps sums exact: with four times as many, large digits are added up wrongly."""
     monkeypatch.setattr(products, "_PRODUCTS", 4 * products._PRODUCTS)
@@ -131,6 +133,7 @@ def conversion(grid: Grid) -> Machine:
     return compiled(module, {name: (None, [DOUBLES, DOUBLES]) for name in ("digits", "words")})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [5, 8, 12, 13, 19, 24])
 def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None:
     grid, random = grid_of(words), Random(words)
@@ -189,6 +192,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "name", "forwards"),
     [(words, name, forwards) for words, forwards in ((8, True), (8, False), (13, True)) for name in MOTIONS]
@@ -207,6 +211,7 @@ def test_steps_are_those_of_whole_numbers(words: int, name: str, forwards: bool)
     assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) * 2**grid.total < 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_digits_that_count_as_zero_are(name: str) -> None:
     given, grid = MOTIONS[name], grid_of(8)
@@ -222,6 +227,7 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
         assert run.places[: run.order + 1].max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     given = problem(1, attitude=True)

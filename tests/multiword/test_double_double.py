@@ -46,6 +46,7 @@ def bits_on(processor: Processor | None, attitude: bool, tolerance: Fraction) ->
     return run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor: Processor) -> None:
     """Without FMA code takes longest to compile: at the other tolerance it is tried where glibc has none either."""
@@ -53,6 +54,7 @@ def test_the_bits_are_those_of_every_processor(processor: Processor) -> None:
         assert bits_on(processor, False, tolerance) == bits_on(None, False, tolerance)
 
 
+@pytest.mark.slow
 def test_simple_fractions_round_without_a_bias() -> None:
     """y_1 of a free body with A = −3/4, 5/6, −2/9, alone and in lanes: its relative errors average out.
 
@@ -83,6 +85,7 @@ def test_simple_fractions_round_without_a_bias() -> None:
     assert (abs(mean) < 0.08).all()
 
 
+@pytest.mark.slow
 def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
     """Not the nearest to the product with the constant's first word: its remainders are not symmetric about 0."""
     module = ir.Module("products")
@@ -110,12 +113,14 @@ def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
                 assert abs(Fraction(high) + Fraction(rest) - whole) <= abs(whole) / 2**105
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS[1:])
 def test_the_bits_of_an_attitude_are_those_of_every_processor(processor: Processor) -> None:
     """Without FMA its code takes longest to compile: the motion's, of the same operations, stands for it."""
     assert bits_on(processor, True, COARSE) == bits_on(None, True, COARSE)
 
 
+@pytest.mark.slow
 def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
     """glibc masks FMA and AVX2, so that its own fma, which code for x86-64 calls, is computed in software."""
     script = (

@@ -36,6 +36,7 @@ def samples(eight: Eight, lanes=range(8)) -> dict[int, tuple[Fraction, ...]]:
     return {lane: exact_state(words) for lane, words in eight.samples(dict.fromkeys(lanes, SPAN)).items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forwards", [True, False], ids=["forwards", "backwards"])
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> None:
@@ -85,6 +86,7 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
     assert [eight.taken(lane, None) for lane in range(8)] == [0] * 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     given, schedule = list(problems(HEAVY_TOP)), OrderSchedule.of(Fraction(1, 10**20), FALL_IN_LANES)

@@ -60,6 +60,7 @@ def used(known: Validated, words: int, extreme: bool, random: Random) -> tuple[f
     return shares[0], shares[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "system"), [(3, HEAVY_TOP), (4, HEAVY_GYROSTAT), (6, HEAVY_TOP), (8, GYROSTAT), (12, HEAVY_TOP)]
 )

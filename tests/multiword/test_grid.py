@@ -82,6 +82,7 @@ def product_code(grid: Grid) -> Machine:
     return compiled(module, {"products": (None, [DOUBLES, DOUBLES, ctypes.c_int64, DOUBLES, DOUBLES])})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "grid", [grid_of(3), grid_of(6), Grid(3, 51), Grid(4, 46, whole=True)], ids=lambda grid: f"{grid.words}x{grid.bits}"
 )
@@ -128,6 +129,7 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
     assert caught < 40 or grid.bits == 51 or kind == "largest"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "count"), [(3, 40), (6, 40), (12, 10)])
 def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: int) -> None:
     random, grid, span = Random(words), grid_of(words), Fraction(HORIZON)
@@ -143,6 +145,7 @@ def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: 
         assert error_in_ulp(run, truth, span) < 1e4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bits", [48, 49, 50, 51, 52])
 def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
     """Each run is right, if need be with shorter steps, or its outcome says that it is not."""
@@ -163,6 +166,7 @@ def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
     assert redone > 0 or bits < 50
 
 
+@pytest.mark.slow
 def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """The check is what makes them right: with the sums unwatched, words of 51 bits give wrong numbers."""
     monkeypatch.setattr(arithmetic.Accumulator, "look", lambda self, k: None)
@@ -179,6 +183,7 @@ def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) 
     assert wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     scaled = problem(1, attitude=True)
@@ -202,6 +207,7 @@ def test_steps_grow_and_shrink_with_the_motion() -> None:
     assert all(length.numerator == 1 or length.denominator == 1 for length in lengths)
 
 
+@pytest.mark.slow
 def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
     """Terms below the last bit of the sum are not lost one by one, which would err in the same way at every step."""
     run = Fixed(problem(), grid_of(3), True)
@@ -213,6 +219,7 @@ def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
             assert abs(value - exact_sum) <= last
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [3, 6])
 def test_a_sample_is_the_sum_of_the_coefficients_and_zeros_that_are_passed_over_change_no_bit(
     words: int, monkeypatch: pytest.MonkeyPatch
@@ -238,6 +245,7 @@ def test_a_sample_is_the_sum_of_the_coefficients_and_zeros_that_are_passed_over_
     assert rows[0].tobytes() == rows[1].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [3, 4, 6])
 def test_products_of_second_words_count_where_a_leading_word_is_small(words: int) -> None:
     """Else coefficients of one word would err alike at every step; two words more tell what is right."""
@@ -255,6 +263,7 @@ def test_products_of_second_words_count_where_a_leading_word_is_small(words: int
     assert max(abs(x - z) for a, b in of_one_word for x, z in zip(a, b, strict=True)) < unit / 2**8
 
 
+@pytest.mark.slow
 def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
     """Rotation about the middle axis with 2^-140 of another: seen with the bits that the spread asks for."""
     p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))

@@ -26,6 +26,7 @@ def test_the_lanes_give_the_derivative_of_the_field_exactly(system) -> None:
         assert rates(system, given, [*y, *z]) == [*system.field(p, y), *system.attitude(p, y, z)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("size", [-100, -3, 0, 40, 150])
 def test_scaling_is_exact_and_brings_numbers_near_one(system, size: int) -> None:

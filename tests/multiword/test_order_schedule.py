@@ -4,13 +4,11 @@ from pathlib import Path
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+import words_ladder
 
 
-def test_the_picture_of_cost_against_bits_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import words_ladder
-
+@pytest.mark.slow
+def test_the_picture_of_cost_against_bits_is_drawn(tmp_path: Path) -> None:
     ours, theirs = words_ladder.measured(106, 1)
     assert theirs is None
     assert 0.1 < ours < 1e4

@@ -71,6 +71,7 @@ def used(motion: ScaledMotion, certified: CertifiedSeries, centre: list[int], ha
     return float(sum(true) / Fraction(series.rounding))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "system", "attitude"),
     [
@@ -102,6 +103,7 @@ def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude
     assert 1e-5 < max(shares) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [3, 12])
 def test_coefficients_that_are_smaller_than_the_state_by_several_words(words: int) -> None:
     """Near an equilibrium, near a permanent rotation, and with moments that hardly differ."""
@@ -122,6 +124,7 @@ def test_coefficients_that_are_smaller_than_the_state_by_several_words(words: in
                 assert share is None or share <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [3, 12])
 def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
     """ε(T) with all words as wide as b bits, and (2) summed over the orders."""
@@ -201,6 +204,7 @@ def test_how_large_words_are_is_measured_on_the_words_themselves(words: int, vec
         assert abs(Fraction(float(added.ravel()[index])) - total) <= total / 2**48
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "system", "attitude"), [(3, HEAVY_TOP, False), (6, HEAVY_GYROSTAT, True)])
 def test_words_over_their_own_units_are_the_same_numbers(words: int, system, attitude: bool) -> None:
     """What many words are kept as, with few: coefficients, bound and sizes are those of words that are doubles."""
@@ -223,6 +227,7 @@ def test_words_over_their_own_units_are_the_same_numbers(words: int, system, att
                 assert a.rounding <= b.rounding <= a.rounding * 1.01
 
 
+@pytest.mark.slow
 def test_more_bits_than_the_exponents_of_doubles_reach_are_within_the_bound() -> None:
     """1,204 bits, a coefficient below 2^-1200: its size is bounded at any power."""
     grid, random = grid_of(28, whole=True), Random(28)
@@ -242,6 +247,7 @@ def test_more_bits_than_the_exponents_of_doubles_reach_are_within_the_bound() ->
     assert largest < 8
 
 
+@pytest.mark.slow
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
     random, refused = Random(3), 0
     for bits in (49, 50, 51):
@@ -256,6 +262,7 @@ def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
     assert refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     motion = some_motion(Random(5), attitude=True)

@@ -51,6 +51,7 @@ def random_problem(random: Random, system, attitude: bool, scale: int) -> Scaled
     return Scaled.of(system, p, (*omega, *rest))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attitude", [False, True], ids=["motion", "attitude"])
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_a_step_in_split_coefficients_differs_by_less_than_its_ladder_allows(system, attitude: bool) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint
-from heavytop.integrate.multiword.motions import propagate_words
+from heavytop.integrate.multiword.motions import propagate_multiword
 from heavytop.integrate.trajectory import Outcome
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.integers.integer_series import IntegerMotion, field_of
@@ -23,6 +23,7 @@ START = State(("1/8", "3/8", "7/8"), ("5/8", 0, "3/4"))
 MANY = real(1040)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("attitude", [False, True])
 @pytest.mark.parametrize("forwards", [True, False])
@@ -47,9 +48,10 @@ def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) 
         assert found == [(1 if forwards else -1) * rate for rate in rates(system, scaled.coefficients, state)]
 
 
+@pytest.mark.slow
 def test_more_bits_than_words_have_are_met_to_the_last() -> None:
     times = [Fraction(1, 3), Fraction(5, 4)]
-    run = propagate_words(TOP, START, times, MANY)
+    run = propagate_multiword(TOP, START, times, MANY)
     assert run.outcome is Outcome.SUCCESS
     assert run.flags["arithmetic"] == "whole numbers"
     proven = Validated(run.problem.top, run.problem.start)
@@ -58,6 +60,7 @@ def test_more_bits_than_words_have_are_met_to_the_last() -> None:
             assert abs(midpoint(ball) - exact(value)) <= MANY.eps
 
 
+@pytest.mark.slow
 def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
     whole = IntegerMotion(problem(1, attitude=True), 200, True)
     assert whole.advance(Fraction(3), 100) is Status.FINE
@@ -77,7 +80,7 @@ def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
 
 
 def test_steps_can_be_limited() -> None:
-    run = propagate_words(TOP, START, [Fraction(50)], MANY, step_limit=1)
+    run = propagate_multiword(TOP, START, [Fraction(50)], MANY, step_limit=1)
     assert (run.outcome, run.steps) == (Outcome.STEP_LIMIT, 1)
 
 
@@ -85,16 +88,17 @@ def test_what_an_unstable_axis_amplifies_is_there_though_no_words_would_hold_it(
     """2^-1100 of another axis needs its own bits beside those of the format."""
     start = State((Fraction(1, 2**1100), 1, 0), ("5/8", "-3/8", "11/16"))
     free = HeavyTop((3, 2, 1), 0, (0, 0, 1))
-    run = propagate_words(free, start, [Fraction(1)], real(237))
+    run = propagate_multiword(free, start, [Fraction(1)], real(237))
     assert int(run.flags["bits"]) > 237 + 1100
     first = exact(run.states[0][0]) * 2**1100
     # ω1' = ω2 ω3/3 and ω3' = ω1 ω2 with ω2 = 1: cosh(t/√3)
     assert abs(float(first) - 1.1714) < 1e-3
 
 
+@pytest.mark.slow
 def test_backwards_is_the_way_back() -> None:
-    there = propagate_words(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
+    there = propagate_multiword(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
     arrived = State([exact(v) for v in there[:3]], [exact(v) for v in there[3:]])
-    back = propagate_words(TOP, arrived, [Fraction(-3, 4)], real(1100)).states[0]
+    back = propagate_multiword(TOP, arrived, [Fraction(-3, 4)], real(1100)).states[0]
     for value, begun in zip(back, START.flat, strict=True):
         assert abs(exact(value) - begun) < Fraction(1, 2**1090)

@@ -101,6 +101,7 @@ def test_a_certificate_less_is_weaker(known) -> None:
         assert not weaker(fewer, both)
 
 
+@pytest.mark.slow
 def test_runs_that_agree_say_their_radius() -> None:
     coarse, fine = (of_rounded([problem("generic")], [ONE / 8], bits)[0].against for bits in (100, 160))
     assert (coarse.how, coarse.certificates) == ("computed", ())
@@ -119,6 +120,7 @@ def test_the_truth_of_a_claim_is_proven_whichever_it_is() -> None:
     assert weaker(closed, enclosed) == weaker(enclosed, closed) == ""
 
 
+@pytest.mark.slow
 def test_references_of_ensembles_say_what_they_are_known_to() -> None:
     times = (ONE, Fraction(12))
     closed = reference((problem("lagrange"),) * 2, times).against
@@ -155,6 +157,7 @@ PLAN = {
 }
 
 
+@pytest.mark.slow
 def test_the_other_rows_say_what_they_are_compared_with() -> None:
     drift, steps, *formulas = (measure(task).reference for task in expand(plan_of(PLAN)))
     assert [each.how for each in (drift, steps, *formulas)] == ["none"] + ["proven"] * (1 + len(formulas))

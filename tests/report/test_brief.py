@@ -65,6 +65,7 @@ def on_disk(folder: Path, document: Any) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @given(st.sampled_from(PLACES), st.sampled_from(["remove", "null", "nan", "missing", "text", "number"]))
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_mutated_report_is_refused_or_not_the_same(tmp_path: Path, path: tuple[Any, ...], how: str) -> None:
@@ -82,6 +83,7 @@ def test_a_mutated_report_is_refused_or_not_the_same(tmp_path: Path, path: tuple
             assert result.verdict != "same" or all(f.verdict.value == "new" for f in result.changed)
 
 
+@pytest.mark.slow
 @given(st.integers(0, len(json.dumps(DOCUMENT)) - 1))
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_truncated_report_is_refused_at_every_length(tmp_path: Path, length: int) -> None:

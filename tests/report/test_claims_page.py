@@ -127,6 +127,7 @@ def test_a_document_is_current_only_of_the_entries_as_they_stand(
     assert not is_current(document)
 
 
+@pytest.mark.slow
 def test_the_results_are_of_the_entries_as_they_stand() -> None:
     """Else: remake them, as results/README.md says."""
     folder = Path(__file__).parents[2] / "results" / "claims"

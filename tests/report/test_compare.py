@@ -389,6 +389,7 @@ def test_rows_that_cannot_be_are_refused_with_row_and_field(tmp_path: Path, chan
             list(store.read_brief(file).rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", sorted(path.parent.name for path in RESULTS.glob("*/report.json")))
 def test_what_the_program_wrote_is_read(folder: str) -> None:
     found = store.read(RESULTS / folder)

@@ -1,4 +1,4 @@
-"""A report that was weakened is never the same, or better: a few edits of `benchmarks/edited_reports.py`, and edges."""
+"""A report that was weakened is never the same, or better: a few edits of `validation/edited_reports.py`, and edges."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -17,6 +17,7 @@ from support.small_reports import error, report, row
 RESULTS = Path(__file__).parents[2] / "results"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "growth", "peers"])
 def test_no_edit_passes(tmp_path: Path, name: str) -> None:
     found = list(trials(RESULTS / name, tmp_path, 5, 50))
@@ -24,6 +25,7 @@ def test_no_edit_passes(tmp_path: Path, name: str) -> None:
     assert len({edit for edit, _ in found}) > len(EDITS) / 3
 
 
+@pytest.mark.slow
 def test_every_edit_has_something_to_edit() -> None:
     """An edit of a field that rows no longer have would never be tried, and never be the same."""
     left, random = dict(EDITS), Random(1)

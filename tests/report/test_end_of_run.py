@@ -8,7 +8,8 @@ import pytest
 
 from heavytop.features.kinds import KINDS
 from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
-from heavytop.report.render.terminal import LINES, MOST_ROWS, WIDTH, brief, fitted
+from heavytop.report.document.document import Card, Note
+from heavytop.report.render.terminal import LINES, MOST_ROWS, WIDTH, _lines, _shown, brief, fitted
 from heavytop.report.store import store
 from support.small_reports import error, row
 
@@ -19,6 +20,7 @@ def said(*rows) -> list[str]:
     return brief(Report(SCHEMA, {"name": "p"}, {}, []), iter(rows), KINDS).splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "growth", "long", "peers"])
 def test_every_plan_ends_in_few_lines_that_are_not_cut(name: str) -> None:
     report = store.read(RESULTS / name, KINDS)
@@ -47,7 +49,7 @@ def test_the_digits_of_each_motion_and_format_stand_in_a_table() -> None:
 def test_what_failed_is_named_and_counted() -> None:
     rows = [row(case=f"top-{i}", outcome="step_limit", time_reached="7.5", metrics={}) for i in range(9)]
     lines = said(*rows)
-    assert lines[0] == "Plan p: 9 measurements, 9 did not reach their horizon:"
+    assert lines[0] == "Plan p: 9 measurements, 9 failed:"
     assert lines[1] == "  top-0 in double: step_limit at t = 7.5 of 100"
     assert lines[3] == "  and 7 more"
 
@@ -64,6 +66,7 @@ def test_of_steps_that_were_not_measured_nothing_is_said() -> None:
     assert not any("a step is off" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_many_rows_are_counted() -> None:
     lines = said(*(row(case=f"top-{i}") for i in range(MOST_ROWS + 1)))
     assert lines[1] == f"drift in double: {MOST_ROWS + 1} success"
@@ -168,3 +171,17 @@ def test_a_law_hides_no_size(end: str, words: str) -> None:
     for each, value in zip(rows, ("1e-12", end), strict=True):
         each.metrics["solution_error_along_final"] = error(value)
     assert " ".join(line.strip() for line in said(*rows)[4:]).endswith(f"like t^1.7.{words}")
+
+
+def test_a_card_has_its_title_alone_on_a_line_and_nothing_is_cut() -> None:
+    """Long lines of a survey are broken, as everywhere; none is joined to the title above it."""
+    line = "a-sweep-of-tops heavyoka double to T = 10: 300 success; error: median 6e-16, q99 5.7e-15, max 8.2e-15"
+    for lines in ([line], [line, line], ["short"]):
+        card = Card("Surveys: a record for each motion in survey.parquet", [Note(each) for each in lines])
+        first, *rest = _lines(_shown([card, card], brief=True))[: 1 + 2 * len(lines)]
+        assert first == card.title
+        assert " ".join(part.strip() for part in rest).startswith(" ".join(lines)[: 80 * len(lines)])
+
+
+def test_one_measurement_is_no_plural() -> None:
+    assert said(row())[0] == "Plan p: 1 measurement, all finished."

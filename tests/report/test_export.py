@@ -19,6 +19,7 @@ from heavytop.records import Report
 from heavytop.report.document.document import row_name
 from heavytop.report.render import FORMATS
 from heavytop.report.render.export import LOST, export
+from heavytop.version import version
 from support import in_process
 from support.reports import store
 
@@ -39,6 +40,7 @@ def report() -> Report:
     return Report(found.schema, found.plan, found.environment, rows)
 
 
+@pytest.mark.slow
 def test_every_format_holds_the_same_numbers(report: Report) -> None:
     bencher = json.loads(export(report, "bencher", KINDS))
     github = json.loads(export(report, "github-action-benchmark", KINDS))
@@ -91,18 +93,24 @@ def test_bencher_and_github_take_their_keys(report: Report) -> None:
         assert {"name", "unit", "value"} <= each.keys() <= {"name", "unit", "value", "range", "extra"}
 
 
-def test_asv_reads_its_results(report: Report, tmp_path: Path) -> None:
-    results = pytest.importorskip("asv.results")
-    file = tmp_path / "machine" / "commit-heavytop.json"
-    file.parent.mkdir()
-    file.write_text(export(report, "asv", KINDS))
-    found = results.Results.load(str(file))
-    assert found.env_name == "heavytop"
-    names = list(found.get_all_result_keys())
-    assert len(names) > 100
-    values = [found.get_result_value(name, []) for name in names]
-    assert sum(value == [None] for value in values) == 3
-    assert found.get_result_value(f"heavytop: {LOST}", []) == [3.0]
+def test_asv_gets_its_results_of_version_2(report: Report) -> None:
+    """The keys of a results file of airspeed velocity, and of each result the columns that it names."""
+    document = json.loads(export(report, "asv", KINDS))
+    texts = {"commit_hash", "env_name", "python"}
+    mappings = {"params", "requirements", "env_vars", "results", "durations"}
+    assert document.keys() == {"version", "date", "result_columns"} | texts | mappings
+    assert (document["version"], document["env_name"]) == (2, "heavytop")
+    assert all(isinstance(document[name], str) for name in texts)
+    assert all(isinstance(document[name], dict) for name in mappings)
+    assert document["params"].keys() == {"machine", "os", "cpu", "python"}
+    assert {type(value) for value in (document["params"] | document["requirements"]).values()} == {str}
+    assert not document["commit_hash"].endswith("-dirty")
+    assert document["result_columns"] == ["result", "params", "version"]
+    results = document["results"]
+    assert len(results) > 100
+    assert {(len(value), tuple(params), code) for value, params, code in results.values()} == {(1, (), version())}
+    assert sum(value == [None] for value, *_ in results.values()) == 3
+    assert results[f"heavytop: {LOST}"][0] == [3.0]
 
 
 def test_junit_has_a_case_a_row(report: Report) -> None:
@@ -119,6 +127,7 @@ def test_csv_has_a_line_a_metric(report: Report) -> None:
     assert {line["outcome"] for line in lines} == {"success", "failed", "out_of_time", "unsupported", "out_of_reach"}
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_file_or_standard_output_and_refuses_another_format(tmp_path: Path) -> None:
     heavytop = partial(in_process.heavytop, "export", ROOT / "results" / "growth")
     done = heavytop("--to", "csv", "--out", tmp_path / "rows.csv")

@@ -55,6 +55,7 @@ def test_angles_of_the_truth_satisfy_3_2():
         assert numpy.abs(numpy.diff(curves.angles, axis=0)).max() < 1.5
 
 
+@pytest.mark.slow
 def test_the_files_are_complete_and_the_same_every_time(tmp_path):
     first = draw_figures(drawings(), tmp_path / "one")
     few = drawings()

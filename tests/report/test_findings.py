@@ -6,7 +6,7 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Explained, Law, Row, Subject
 from heavytop.report.compare.findings import MOST
-from heavytop.report.compare.noise import Policy
+from heavytop.report.compare.noise import Policy, Timings
 from support.report_helpers import error
 from support.reports import compare, replace
 from support.small_reports import report, row
@@ -183,3 +183,29 @@ def test_what_explains_the_states_comes_first_and_counts_its_rows() -> None:
     long = [replace(each, explained=Explained("start", "x" * 5000)) for each in faulty]
     assert len(found(healthy, long)[0]) <= 300
     assert not any("late" in each for each in found(faulty, [replace(faulty[0], metrics={}), *faulty[1:]]))
+
+
+def test_heyoka_beside_a_third_party_integrator_is_a_scale_and_no_verdict() -> None:
+    scale, mine = row(case="lagrange"), rk5(case="lagrange")
+    worse = replace(scale, metrics={**scale.metrics, "drift_energy_max": error("1e-3")})
+    for new in (worse, failing(scale), rk5(case="euler")):
+        result = compare(report(scale, mine), report(new, mine), Policy())
+        assert (result.exit_code, [each.verdict for each in result.changed if each.row.key == scale.key]) == (0, [])
+        assert result.sentences[0].startswith("Nothing changed") == (new.case == "lagrange")
+        assert result.sentences[-1].startswith(
+            "heyoka, measured for scale and not judged, changed in 1 row on lagrange"
+        )
+    assert compare(report(scale), report(worse), Policy()).exit_code == 1
+    # a candidate cannot excuse itself: the baseline says what is beside what
+    assert compare(report(scale), report(worse, mine), Policy()).exit_code == 1
+
+
+def test_what_explains_errors_is_said_of_errors_alone() -> None:
+    old = [work(n, f"1e-{4 * i}", seconds={"run": n / 10, "least": n / 10}) for i, n in enumerate((10, 100, 1000), 1)]
+    new = [*old[:2], replace(old[2], seconds={"run": 300.0, "least": 300.0})]
+    policy = Policy(timings=Timings("always"))
+    said = compare(report(*old), report(*new), policy).sentences
+    assert said[0].startswith("Seconds run 100 s → 300 s on euler")
+    assert not any("order" in each for each in said)
+    unasked = failing(old[0], "not_asked", "out of time in 2 other rows")
+    assert found(old[:1], [unasked])[0].endswith("not_asked, out of time in 2 other rows.")

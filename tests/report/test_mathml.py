@@ -80,6 +80,7 @@ def formula(random: Random, depth: int) -> str:
     return random.choice(shapes)
 
 
+@pytest.mark.slow
 def test_what_is_typeset_reads_as_the_same_formula() -> None:
     random = Random(30)
     symbols = {each: sympy.Symbol(each) for each in NAMES}

@@ -53,6 +53,7 @@ def test_a_law_that_another_takes_over_from_is_not_named() -> None:
     assert found.law == "unresolved"
 
 
+@pytest.mark.slow
 def test_one_walk_of_rounding_errors_is_given_no_law() -> None:
     """Its exponent is luck: without the size of rounding some would be given one."""
     random = numpy.random.default_rng(3)
@@ -116,6 +117,7 @@ def test_the_curves_are_the_series() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_comparison_draws_both_and_a_hostile_case_is_text() -> None:
     rows = [method(r.integrator, *r.series.values(), case=HOSTILE) for r in GROWTH]
     report = Report(SCHEMA, {"name": "x"}, {}, rows)

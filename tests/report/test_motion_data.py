@@ -147,6 +147,7 @@ runs = [{{ precision = "double", horizon = "1", samples = 4 }}]
 """
 
 
+@pytest.mark.slow
 def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
     def ran(centre: str, omega: str) -> Row:
         (tmp_path / "plan.toml").write_text(PLAN.format(centre=centre, omega=omega))
@@ -173,6 +174,7 @@ runs = [{ precision = "double", horizon = "1", samples = 4, decades = 1, starts 
 """
 
 
+@pytest.mark.slow
 def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN.format(centre="1/2", omega="9/10") + ENSEMBLE)
     found = [each for _, each in sorted(rows(expand(load(str(tmp_path / "plan.toml"))[0]), 1), key=itemgetter(0))]

@@ -123,6 +123,7 @@ def test_hostile_names_do_not_get_out_of_a_markdown_cell() -> None:
     assert "<script>" not in text.replace(r"\<", "")
 
 
+@pytest.mark.slow
 def test_a_long_comparison_stays_a_short_comment() -> None:
     old = report(*(row(case=f"top-{i}") for i in range(300)))
     new = report(*(row(case=f"top-{i}", metrics={**row().metrics, "drift_energy_max": error("1")}) for i in range(300)))
@@ -154,6 +155,7 @@ def test_a_history_marks_each_step_at_the_report_it_came_with() -> None:
     assert document["tracks"][0]["values"] == track.values
 
 
+@pytest.mark.slow
 def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps() -> None:
     names, reports = three()
     tracks = history(reports, Policy())
@@ -181,6 +183,7 @@ def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps() -> None:
 CONTROL = "a\x00\x1b[31m\x07\x9b1m\u202e\ufffe[/red]$b"
 
 
+@pytest.mark.slow
 def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
     metrics = {"error_max": error("1e-5"), CONTROL: error("1e-12")}
     rows = [

@@ -194,6 +194,7 @@ return bad;
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ALL)
 def test_nothing_overflows_is_clipped_overlaps_errs_or_is_loaded(
     browser: Browser, pages: dict[str, Path], page: str
@@ -219,6 +220,7 @@ document.querySelectorAll('details').forEach(each => each.open = true);
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "finds"),
     [
@@ -252,6 +254,7 @@ UNITS = re.compile(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_every_plot_has_a_name_and_axes_with_units(browser: Browser, pages: dict[str, Path], page: str) -> None:
     browser.open(pages[page], 390, "light")
@@ -310,6 +313,7 @@ def test_contrast_is_that_of_the_standard() -> None:
     assert contrast("rgb(119, 119, 119)", "rgb(255, 255, 255)") == pytest.approx(4.48, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("page", PAGES)
 def test_contrast_is_enough_in_light_and_dark(browser: Browser, pages: dict[str, Path], page: str, scheme: str) -> None:
@@ -323,6 +327,7 @@ def test_contrast_is_enough_in_light_and_dark(browser: Browser, pages: dict[str,
     assert dark == (scheme == "dark")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ["report", "comparison"])
 def test_a_hostile_name_is_text(browser: Browser, pages: dict[str, Path], page: str) -> None:
     browser.open(pages[page], 1280, "light")
@@ -333,6 +338,7 @@ def test_a_hostile_name_is_text(browser: Browser, pages: dict[str, Path], page: 
     assert browser.ask(named)
 
 
+@pytest.mark.slow
 def test_on_paper_the_numbers_are_unfolded(browser: Browser, pages: dict[str, Path]) -> None:
     unseen = """return [...document.querySelectorAll('details.numbers table')].filter(
       each => !each.checkVisibility({contentVisibilityAuto: true})).length"""
@@ -342,6 +348,7 @@ def test_on_paper_the_numbers_are_unfolded(browser: Browser, pages: dict[str, Pa
     assert browser.ask(unseen) == 0
 
 
+@pytest.mark.slow
 def test_the_keyboard_reaches_the_content_first(browser: Browser, pages: dict[str, Path]) -> None:
     from selenium.webdriver.common.keys import Keys
 

@@ -78,6 +78,7 @@ def test_pandas_reads_values_as_text_and_logarithms_as_numbers(file: Path) -> No
     assert table["metric"].isna().tolist() == [False] * 4 + [True, True]
 
 
+@pytest.mark.slow
 def test_duckdb_reads_laws_and_rows_without_any_number(file: Path) -> None:
     import duckdb
 
@@ -103,6 +104,7 @@ def test_the_plan_is_in_the_metadata_and_the_bytes_are_the_same_twice(file: Path
     assert (tmp_path / "again.parquet").read_bytes() == file.read_bytes()
 
 
+@pytest.mark.slow
 def test_rows_stream_through_in_row_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parquet, "_GROUP", 600)
     from pyarrow.parquet import ParquetFile

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import pickle
 from fractions import Fraction
 from itertools import product
@@ -118,3 +119,19 @@ def test_metrics_under_their_names_are_others_than_those_given() -> None:
     named = by_name({quantity: given})
     assert named["drift_energy_max"].quantity == quantity
     assert given.quantity is None
+
+
+def test_a_compressed_report_is_read_as_it_was_and_a_damaged_one_refused(tmp_path: Path) -> None:
+    original = Path(__file__).parents[2] / "results" / "long"
+    for name in ("report.json", "report.json.sha256"):
+        (tmp_path / name).write_bytes((original / name).read_bytes())
+    content = (tmp_path / "report.json").read_bytes()
+    (tmp_path / "report.json").unlink()
+    packed = tmp_path / "report.json.gz"
+    packed.write_bytes(gzip.compress(content))
+    assert ht.read_report(tmp_path) == ht.read_report(packed) == ht.read_report(original)
+    edited = gzip.compress(content.replace(b"gyrostat", b"gyrostax", 1))
+    for damaged in (packed.read_bytes()[:-20], b"not gzip", edited):
+        packed.write_bytes(damaged)
+        with pytest.raises(ht.InputError, match=r"There is no report|its checksum differs"):
+            ht.read_report(tmp_path)

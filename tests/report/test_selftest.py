@@ -6,6 +6,8 @@ import pytest
 
 from heavytop.api import selftest
 
+pytestmark = pytest.mark.slow
+
 PLAN = """
 name = "small"
 [[measure]]

@@ -123,6 +123,7 @@ def ran(folder: Path, more: str) -> Row:
     return measure(task)
 
 
+@pytest.mark.slow
 def test_a_plan_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
     monkeypatch.setattr(work_precision, "_FOR_COMPARISON", Repeats(11, 20, 0.0, 3, band=True))
@@ -152,3 +153,35 @@ def test_the_band_holds_the_middle_of_the_runs() -> None:
     assert spent(Repeats(11, 11, 0.0), 3.1)["repeats"] == 1
     assert spent(Repeats(11, 11, 0.0, 3, band=True), 3.1, 3.2, 3.3)["repeats"] == 3
     assert "band" not in spent(Repeats(11, 11, 0.0), *[1.0] * 11)
+
+
+ALWAYS = {"timings": Timings("always", ratio=2, floor=0.0)}
+PLAIN = {"compile": 0.1, "run": 2.0, "least": 1.0, "repeats": 34.0, "reference": 0.5, "program": 0.9}
+
+
+def plainly(**seconds: float) -> tuple[str, str]:
+    return judged(PLAIN | seconds, PLAIN, **ALWAYS)
+
+
+@pytest.mark.parametrize("name", sorted({*PLAIN, "unheard of"} - {"run", "least"}))
+def test_of_the_seconds_of_a_policy_only_times_of_the_integrator_are_judged(name: str) -> None:
+    """Counts, compiling, references and what a program says of itself are not."""
+    for factor in (1e-3, 71 / 34, 1e3):
+        assert plainly(**{name: PLAIN.get(name, 1.0) * factor}) == ("same", "")
+
+
+def test_the_fastest_run_counts_since_other_work_only_adds() -> None:
+    assert plainly(run=2.0 * 71 / 34) == ("same", "")
+    assert plainly(least=2.1, run=2.1) == ("worse", "seconds run: 2.1 times as long")
+    alone = {"compile": 0.1, "run": 1.0}
+    assert judged({"compile": 9.0, "run": 2.1}, alone, **ALWAYS)[0] == "worse"
+
+
+def test_seconds_that_are_not_resolved_are_as_many_as_are() -> None:
+    quick = SECONDS | {"run": 3e-5, "least": 1.4e-5, "unresolved": 1e-4, "band": 0.4}
+    other = quick | {"run": 9e-5, "least": 6e-5}
+    assert judged(other, quick) == judged(quick, other) == ("same", "")
+    assert judged(SECONDS | {"run": 1.4e-4, "least": 1.2e-4}, quick) == ("same", "")
+    assert judged(SECONDS | {"run": 1.4e-3, "least": 1.2e-3}, quick)[0] == "worse"
+    assert judged(quick, SECONDS | {"run": 1.4e-3, "least": 1.2e-3})[0] == "better"
+    assert judged(other, quick, **ALWAYS) == ("same", "")

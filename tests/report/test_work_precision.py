@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from heavytop.errors import InputError
@@ -177,7 +178,7 @@ def test_the_summary_says_it() -> None:
         console.print(summary(Report(SCHEMA, {"name": "peers"}, {}, ALL)))
     text = capture.get()
     assert "4.5 times faster than the best other integrator, cyrk:DOP853" in text
-    assert "did not reach their horizon" not in text
+    assert "Failed measurements" not in text
     (line,) = [line for line in text.splitlines() if "sundials:CVODE" in line]
     assert line.split() == ["sundials:CVODE", "-", "-", "-", "-", "-", "1"]
 
@@ -226,6 +227,7 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
     assert fastest([]) is None
 
 
+@pytest.mark.slow
 def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
     report = Report(SCHEMA, {}, {}, growth)
@@ -286,3 +288,20 @@ def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     (alone,) = beside_ours(mine[:2])
     assert alone.notes == ["mine:rk4: largest error in its time"]
     assert alone.rows == [["step 1/10", "1.0e-04 in 12 ms"], ["step 1/30", "2.0e-10 in 123 s"]]
+
+
+def test_seconds_that_are_not_resolved_are_printed_as_that_and_compared_with_nothing() -> None:
+    quick = row("mine:rk4 step=1/100", -11, 1.4e-5)
+    quick = msgspec.structs.replace(quick, seconds={**quick.seconds, "unresolved": 1e-4})
+    slow = row("mine:rk4 step=1/300", -12, 0.5)
+    rows = [*OURS, quick, slow]
+    ((unresolved, resolved),) = ([line[1] for line in table.rows] for table in beside_ours(rows))
+    assert unresolved == "1.0e-11 in < 0.1 ms"
+    assert resolved == "1.0e-12 in 500 ms (4 s)"
+    assert leads(rows) == []
+    assert fastest([quick]) == Headline("The least error is 1e-11: mine:rk4 on top/T=9, in < 0.1 ms.")
+    section = work_precision([("", Report(SCHEMA, {}, {}, rows))])
+    assert section is not None
+    assert [cells[5] for cells in section.rows] == ["1", "4", "< 0.0001", "0.5"]
+    assert "1e-12 in 500 ms" in section.pictures[0].description
+    assert '"unresolved":0.0001' in msgspec.json.encode(quick).decode()

@@ -24,6 +24,8 @@ from heavytop.records import SCHEMA, Metric, Report
 from support import in_process
 from support.reports import Row, expand, load, measure, replace, store
 
+pytestmark = pytest.mark.slow
+
 SUPPORT = Path(__file__).parents[1] / "support"
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
 PLAN = """name = "tiny"

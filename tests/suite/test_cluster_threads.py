@@ -30,6 +30,7 @@ def address() -> Iterator[str]:
             sys.setswitchinterval(before)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_worker_of_four_threads_gives_the_rows_of_one_process(tmp_path: Path, address: str) -> None:
     file = tmp_path / "threads.toml"

@@ -52,8 +52,8 @@ IN_SOLVE = {
     "sys.exit(0)": "called sys.exit(0)",
     "numpy.zeros(10**14)": "raised MemoryError",
     "return solve(given)": "raised RecursionError",
-    "yield [0.0] * 6": "returned a generator instead of Solved",
-    "return right(given).states": "returned a list instead of Solved",
+    "yield [0.0] * 6": "returned a generator instead of Solution",
+    "return right(given).states": "returned a list instead of Solution",
     "return Solved((x for x in right(given).states), 2.0, 5)": "returned states of object",
     "return Solved([[0.0] * 5] * 2, 2.0, 5)": "of the shape (2, 5) for 2 times",
     "return Solved(numpy.zeros((6, 2)), 2.0, 5)": "of the shape (6, 2) for 2 times",
@@ -112,6 +112,7 @@ def test_a_solver_that_is_only_rude_leaves_nothing_behind(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_what_destroys_modules_is_a_failed_row_and_the_others_have_a_process_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "tears.py").write_text(HEAD + TEARS + "solve = right\n")
     (tmp_path / "mine.py").write_text(HEAD + "solve = right\n")

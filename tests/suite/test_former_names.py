@@ -23,6 +23,8 @@ from heavytop.report.store.store import DIGEST, FILE
 from support import in_process
 from support.reports import compare, plan_of, read_plan, store
 
+pytestmark = pytest.mark.slow
+
 TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
 START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
 PLAN = """name = "tiny"

@@ -42,6 +42,7 @@ def row(tmp_path: Path, case: str, run: str):
     return measure(task)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLASSES)
 def test_random_starts_are_exact_of_the_class_and_the_same_for_the_same_seed(name: str) -> None:
     case = CASES[name]
@@ -77,6 +78,7 @@ def test_a_special_motion_is_taken_with_other_roundings(name: str) -> None:
         ensemble_of(case, 2**14 + 1, 1)
 
 
+@pytest.mark.slow
 def test_the_roundings_of_one_motion_have_one_reference(tmp_path: Path) -> None:
     found = row(tmp_path, "hess-pendulum", 'horizon = "60", starts = 9, samples = 8, decades = 2')
     assert found.measured.endswith("9 roundings of one motion, root mean square over them")
@@ -90,6 +92,7 @@ def test_the_roundings_of_one_motion_have_one_reference(tmp_path: Path) -> None:
     assert len(set(map(id, truths))) == 1
 
 
+@pytest.mark.slow
 def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
     found = row(tmp_path, "gyrostat", 'horizon = "1e4", starts = 24, samples = 8')
     assert (found.outcome, found.finite, found.starts) == ("success", True, 24)
@@ -118,11 +121,13 @@ def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
     assert found.series["drift_area"].times[-1] == found.horizon == "10000"
 
 
+@pytest.mark.slow
 def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
     one, two = (row(tmp_path, "euler", 'horizon = "50", starts = 9, decades = 3') for _ in range(2))
     assert msgspec.structs.replace(one, seconds={}) == msgspec.structs.replace(two, seconds={})
 
 
+@pytest.mark.slow
 def test_other_roundings_of_the_same_starts_are_the_same_law_and_no_alarm(tmp_path: Path) -> None:
     text = 'horizon = "1e4", starts = 16'
     (task,) = tasks(tmp_path, '"lagrange"', f'precision = "double", {text}')
@@ -133,6 +138,7 @@ def test_other_roundings_of_the_same_starts_are_the_same_law_and_no_alarm(tmp_pa
     assert compare(*reports, Policy()).verdict == "same"
 
 
+@pytest.mark.slow
 def test_an_integrator_that_truncates_makes_integrals_grow_like_t(tmp_path: Path) -> None:
     found = row(tmp_path, "lagrange", 'horizon = "1e5", starts = 12, samples = 8, decades = 4, tolerance = "1e-9"')
     assert found.integrator.endswith(" tolerance 1e-9")
@@ -140,6 +146,7 @@ def test_an_integrator_that_truncates_makes_integrals_grow_like_t(tmp_path: Path
     assert found.laws["solution_error_along"].growth == "t^2"
 
 
+@pytest.mark.slow
 def test_a_wrong_coefficient_is_seen_as_bounded_integrals_and_a_phase_like_t(tmp_path: Path) -> None:
     found = row(tmp_path, "euler", 'horizon = "2e3", starts = 12, samples = 8, decades = 4, bias = "1e-12"')
     assert found.flags["bias"] == "1e-12"
@@ -150,6 +157,7 @@ def test_a_wrong_coefficient_is_seen_as_bounded_integrals_and_a_phase_like_t(tmp
     assert found.laws["solution_error_along"].growth == "t"
 
 
+@pytest.mark.slow
 def test_chaos_is_exponential_and_takes_every_digit(tmp_path: Path) -> None:
     found = row(tmp_path, "generic", 'horizon = "600", starts = 12, samples = 24, reference = "extended"')
     assert "computed, not proven: words of 106 and 176 bits agree within" in found.against
@@ -165,6 +173,7 @@ def test_chaos_is_exponential_and_takes_every_digit(tmp_path: Path) -> None:
     assert found.laws["drift_energy"].growth in ("t^0.5", "unresolved")
 
 
+@pytest.mark.slow
 def test_what_takes_too_long_to_compute_has_drift_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(truth, "EFFORT_OF_MANY", 1e-3)
     found = row(tmp_path, "generic", 'horizon = "20", starts = 8, decades = 2')
@@ -173,6 +182,7 @@ def test_what_takes_too_long_to_compute_has_drift_alone(tmp_path: Path, monkeypa
     assert "no closed form" in found.against
 
 
+@pytest.mark.slow
 def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def with_a_wild_one(case, count, seed):
         (top, first), *rest = ensemble_of(case, count, seed)
@@ -192,6 +202,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
     assert Fraction(found.metrics["drift_energy_max"].value) < Fraction(1, 10**13)
 
 
+@pytest.mark.slow
 def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
     console = Console(width=160, record=True, file=StringIO())
     (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "2e3", starts = 9, decades = 4')
@@ -221,6 +232,7 @@ def test_an_impossible_ensemble_is_refused(tmp_path: Path, cases: str, run: str,
         tasks(tmp_path, cases, run)
 
 
+@pytest.mark.slow
 def test_the_plan_growth_plants_its_faults() -> None:
     runs = [task.options for task in expand(load("growth")[0])]
     assert {run.tolerance for run in runs} == {None, "1e-9"}
@@ -228,6 +240,7 @@ def test_the_plan_growth_plants_its_faults() -> None:
     assert {run.high_accuracy for run in runs} == {False, True}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "run"),
     [
@@ -287,6 +300,7 @@ def _with_a_nan(_, problems, times, observer, finished, **options):
     return propagate_ensemble(problems, times, observer=spoilt, finished=finished, **options)
 
 
+@pytest.mark.slow
 def test_a_start_that_is_not_finite_is_kept_as_it_is(tmp_path: Path, monkeypatch) -> None:
     (task,) = tasks(tmp_path, '"euler"', 'precision = "double", horizon = "20", starts = 9, samples = 4')
     monkeypatch.setattr(ChosenIntegrator, "propagate_many", _with_a_nan)

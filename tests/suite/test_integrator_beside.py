@@ -63,6 +63,7 @@ def test_whatever_heyoka_measures_is_measured_beside_it(plan: str) -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])
 def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) -> None:
     tasks = read(plan, KINDS, integrator=integrator)[2]

@@ -43,6 +43,7 @@ def solve(given):
 '''
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "part", "verdict", "said"),
     [
@@ -67,6 +68,7 @@ def test_what_was_found_before_a_part_that_hangs_stands(
     assert rest == ([] if verdict == "note" else ["rest of the contract"])
 
 
+@pytest.mark.slow
 def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) -> None:
     """It holds the pipes of the process that forked it."""
     fault = f"os.fork() or (open({str(tmp_path / 'left')!r}, 'a').write(f'{{os.getpid()}} '), time.sleep(600))"
@@ -79,6 +81,7 @@ def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) ->
     assert not any(alive(int(each)) for each in left)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM])
 def test_a_check_that_is_stopped_says_nothing_and_leaves_no_process(number: signal.Signals, tmp_path: Path) -> None:
     """The processes that clean up behind others hold standard error until they end."""

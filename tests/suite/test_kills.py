@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import pytest
+
 from support.kills import TINY, kill_and_resume
 
 
+@pytest.mark.slow
 def test_kills_change_nothing(tmp_path: Path) -> None:
     """Two of them; ``python tests/support/kills.py PLAN KILLS`` makes as many as one likes."""
     plan = tmp_path / "kills.toml"

@@ -15,15 +15,16 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.errors import InputError
+from heavytop.errors import InputError, NotAsked, OutOfTime
 from heavytop.features.kinds import KINDS
 from heavytop.guard import how_it_ended
 from heavytop.harness.limited import RowLimits
 from heavytop.harness.plan import read
+from heavytop.records import Row
 from heavytop.report.compare.noise import Policy
 from support.helpers import without_progress
 from support.midpoint import MIDPOINT
-from support.reports import all_good, compare, rows
+from support.reports import all_good, compare, failed_row, rows
 
 PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 MODULE = """
@@ -111,6 +112,7 @@ def ended(process: int) -> bool:
     return not there
 
 
+@pytest.mark.slow
 def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Path) -> None:
     names = ("mine.py:solve", "mine.py:stuck", "silent", "mine.py:leaves", "mine.py:interrupts")
     file = plan(tmp_path, *names)
@@ -131,6 +133,7 @@ def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Pa
     assert ended(int((tmp_path / "left").read_text()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
 def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> None:
     file = plan(tmp_path, "silent", "mine.py:stuck")
@@ -149,6 +152,7 @@ def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> N
     assert gone("sleep", "987")
 
 
+@pytest.mark.slow
 def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: Path) -> None:
     def measured(precision: str) -> ht.Report:
         tasks = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
@@ -186,16 +190,17 @@ def test_an_end_is_named_by_its_signal_or_its_exit_code() -> None:
     assert {code: how_it_ended(code) for code in said} == said
 
 
+@pytest.mark.slow
 def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: Path) -> None:
     task = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2][0]
     other = replace(task, key=read(str(plan(tmp_path, "mine.py:sleeps")), KINDS)[2][0].key)
     limits = RowLimits()
     assert [limits.seconds(task, cost) for cost in (1.0, 5.0)] == [40, 80]
-    limits.finished(task, 2.0, 1.0)  # quicker than heyoka: no less time
-    assert limits.seconds(task, 1.0) == 40
+    limits.finished(task, 2.0, 1.0)  # quicker than heyoka: no less time; it has compiled
+    assert limits.seconds(task, 1.0) == 20
     limits.finished(task, 2.0, 20.0)
     limits.finished(task, 2.0, 6.0)
-    assert limits.seconds(task, 3.0) == 330  # ten times the slowest
+    assert limits.seconds(task, 3.0) == 310  # ten times the slowest
     assert limits.seconds(other, 3.0) == 60
     found = []
     for _ in range(5):
@@ -204,10 +209,11 @@ def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: 
     assert found == [60, 30, 20, 15, 12]
     assert limits.seconds(other, 0.1) == 10
     limits.finished(other, 1.0, 1.0)
-    assert limits.seconds(other, 3.0) == 60
+    assert limits.seconds(other, 3.0) == 40
     assert RowLimits(7.0).seconds(task, 100.0) == 7
 
 
+@pytest.mark.slow
 def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
     file = plan(tmp_path, "mine.py:solve")
     for bad in (0, -1, "soon", "1e99"):
@@ -255,6 +261,7 @@ def solved(given):
     return Solved([given.start] * len(given.times), given.times[-1], 1)
 
 
+@pytest.mark.slow
 def test_a_callable_is_an_integrator_without_a_package(tmp_path: Path) -> None:
     top = ht.HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))
     start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
@@ -271,3 +278,42 @@ def test_a_callable_is_an_integrator_without_a_package(tmp_path: Path) -> None:
     for bad in (lambda: 0, lambda a, b: 0, 3, int):
         with pytest.raises(InputError):
             ht.propagate(top, start, [1], integrator=bad)
+
+
+ROWS = """
+[[measure]]
+kind = "drift"
+cases = ["euler", "lagrange", "pendulum", "kovalevskaya"]
+integrator = "mine.py:sleeps"
+runs = [{ precision = "double", horizon = "2", samples = 4 }]
+"""
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(workers: int, tmp_path: Path) -> None:
+    file = plan(tmp_path)
+    file.write_text(file.read_text() + ROWS)
+    tasks = read(str(file), KINDS)[2]
+    found = dict(rows(tasks, workers, row_timeout=1.0))
+    outcomes = sorted(row.outcome for row in found.values())
+    under_way = outcomes.count("out_of_time") - 2
+    assert 0 <= under_way < workers
+    assert outcomes == ["not_asked"] * (2 - under_way) + ["out_of_time"] * (2 + under_way)
+    (said, *_) = [row.reference.reason for row in found.values() if row.outcome == "not_asked"]
+    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was not asked again in ")
+    assert not all_good(list(found.values()))
+
+
+def test_what_was_not_asked_is_no_number_and_the_same_as_what_ran_out_of_time(tmp_path: Path) -> None:
+    (task,) = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2]
+    (good,) = (row for _, row in rows([task], 1))
+    late, unasked = (failed_row(task, "slow", kind) for kind in (OutOfTime, NotAsked))
+
+    def verdict(old: Row, new: Row) -> int:
+        reports = (ht.Report("heavytop-report/2", {}, {}, [each]) for each in (old, new))
+        return compare(*reports, Policy()).exit_code
+
+    assert {verdict(old, new) for old in (late, unasked) for new in (late, unasked)} == {0}
+    assert verdict(good, late) == 1
+    assert verdict(good, unasked) == 3
+    assert verdict(unasked, good) == 0

@@ -21,6 +21,7 @@ def task(label: str) -> Task:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "rate"), [("ershkov-partial-6", 2.5), ("delone", 1.25 / math.sqrt(2))])
 def test_the_break_away_time_grows_linearly_with_the_bits(case: str, rate: float) -> None:
     labels = [f"homoclinic {case}/forward {name}" for name in ("double", "extended", "quad", "real:237")]
@@ -36,12 +37,14 @@ def test_the_break_away_time_grows_linearly_with_the_bits(case: str, rate: float
         assert row.bits * math.log(2) / rate * 0.6 < time < row.bits * math.log(2) / rate
 
 
+@pytest.mark.slow
 def test_a_failed_member_is_left_out_of_the_law() -> None:
     row = measure(task("homoclinic delone/forward double"))
     failed = msgspec.structs.replace(measure(task("homoclinic delone/forward extended")), outcome="step_limit")
     assert break_away_law([row, failed]) == []
 
 
+@pytest.mark.slow
 def test_the_long_run_of_euler_is_held_against_its_closed_form() -> None:
     row = measure(task("drift euler double"))
     assert row.against.startswith("known: closed form: Euler-Poinsot")
@@ -62,6 +65,7 @@ def test_printed_formulas_that_die_are_said_not_to_be_finite() -> None:
     assert stable.metrics["claim_evaluation_psi_not_finite_from"].value == "never"
 
 
+@pytest.mark.slow
 def test_the_verdict_on_the_claim_is_a_row() -> None:
     row = measure(task("audit ershkov-partial heavy_top"))
     refuted = {name for name, metric in row.metrics.items() if metric.value == "0" and " smooth " in name}
@@ -70,6 +74,7 @@ def test_the_verdict_on_the_claim_is_a_row() -> None:
     assert {metric.value for metric in row.metrics.values()} == {"1"}
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
     given = task("drift lagrange double")

@@ -1,7 +1,7 @@
 """Files of quaternions, matrices, Euler angles, positions and Ω in space: scored to the digits that they have, mistakes
 of convention named, right ones not accused, bad input refused by its place.
 
-The motions are those of benchmarks/conventions.py: Taylor series on the full tensor, in extended precision.
+The motions are those of validation/conventions.py: Taylor series on the full tensor, in extended precision.
 """
 
 import importlib.util
@@ -22,7 +22,7 @@ from heavytop.features.score.trajectories.files import read
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 
-FILE = Path(__file__).parents[2] / "benchmarks" / "conventions.py"
+FILE = Path(__file__).parents[2] / "validation" / "conventions.py"
 SPEC = importlib.util.spec_from_file_location("conventions", FILE)
 conventions = importlib.util.module_from_spec(SPEC)
 sys.modules["conventions"] = conventions
@@ -47,6 +47,7 @@ def off(size: float) -> "conventions.Motion":
     return replace(motion, rotation=np.array([turn @ r for r in motion.rotation]), omega=motion.omega + size / 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_any_conventions_have_the_digits_of_omega_and_gamma(seed: int, tmp_path: Path) -> None:
     source, (motion, q, omega) = random.Random(seed), BODY
@@ -92,12 +93,14 @@ LIGHT = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIGHT)
 def test_a_planted_mistake_of_convention_is_named(name: str, tmp_path: Path) -> None:
     planted, kinds = conventions.PLANTED[name], conventions.named(name, BODY, tmp_path)
     assert any(kind in planted.kinds or (kind == "refused" and planted.refused) for kind in kinds), kinds
 
 
+@pytest.mark.slow
 def test_the_sentence_says_what_fits_and_the_digits_that_are_right_with_it(tmp_path: Path) -> None:
     content = conventions.planted("scalar last, columns", *BODY)
     found = scored(content, tmp_path)
@@ -226,6 +229,7 @@ def test_json_says_the_same_as_csv(tmp_path: Path) -> None:
     assert scored(json.dumps(as_matrices), tmp_path, "motion.json").digits_right > 15
 
 
+@pytest.mark.slow
 def test_python_takes_arrays_of_any_kind() -> None:
     motion, q, omega = BODY
     body = Body(motion.mass, motion.gravity, motion.centre, motion.inertia, motion.about)
@@ -251,6 +255,7 @@ def test_python_takes_arrays_of_any_kind() -> None:
             ht.score(motion.times, top=body, start=start, **wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [-60, 40])
 def test_units_of_any_size_change_no_diagnosis(power: int, tmp_path: Path) -> None:
     size = f"1e{power}"
@@ -273,6 +278,6 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
     lines = [f"# {key}: {value}" for key, value in (keys | {"omega": "0,150,-4.61538"}).items()]
     file = tmp_path / "motion.csv"
     file.write_text("\n".join([*lines, "t,qw,qx,qy,qz", "0,1,0,0,0", "0.01,0.73,0,0.68,0"]) + "\n", "utf-8")
-    told = [text for text in read(file, None, True).warnings() if "not that of a rigid body" in text]
+    told = [text for text in read(file, None, True).warnings() if "no rigid body's" in text]
     assert len(told) == (about == "pivot")
     assert all('give about = "centre of mass"' in text for text in told)

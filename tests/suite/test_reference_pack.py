@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from heavytop.harness import reference_pack
+import reference_pack
 from heavytop.precision import exact
 
 PACK = Path(__file__).parents[2] / "results" / "reference"
@@ -51,6 +51,7 @@ def test_the_pack_keeps_its_schema() -> None:
     assert faults(DOCUMENT, SCHEMA) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", ["version", "value", "key", "width", "motions"])
 def test_a_spoilt_pack_breaks_the_schema(spoil: str) -> None:
     document = json.loads(json.dumps(DOCUMENT))
@@ -81,6 +82,7 @@ def test_the_pack_has_every_motion_at_fifty_times_to_forty_digits() -> None:
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["bruels-cardona-arnold", "full-tensor", "flywheel-gyroscope", "lagrange", "steklov", "dokshevich"]
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from heavytop.harness.reference_table import CertifiedMotion, cases, motion, write
+from reference_table import CertifiedMotion, cases, motion, write
 
 TABLE = Path(__file__).parents[2] / "results" / "reference" / "states.json"
 MOTIONS = json.loads(TABLE.read_text(encoding="utf-8"))
@@ -71,15 +71,17 @@ def test_the_homoclinic_motion_of_the_table_has_come_back_to_its_saddle():
         assert abs(Fraction(ball["value"]) - saddle) <= Fraction(ball["radius"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["grioli", "pendulum, separatrix"])
 def test_the_committed_entries_are_what_the_command_makes(name):
     made = motion(next(case for case in cases() if case.name == name), 100)
     assert json.loads(msgspec.json.encode(made)) == of(name)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_table_that_reads_back(tmp_path, monkeypatch):
     few = [case for case in cases() if case.name in ("staude", "lagrange, sleeping")]
-    monkeypatch.setattr("heavytop.harness.reference_table.cases", lambda: iter(few))
+    monkeypatch.setattr("reference_table.cases", lambda: iter(few))
     made = msgspec.json.decode(write(tmp_path / "new", 20).read_bytes(), type=list[CertifiedMotion])
     assert [m.case for m in made] == [case.name for case in few]
     assert all(entry.certificate.agreed_digits >= 20 for m in made for entry in m.states)

@@ -13,6 +13,8 @@ from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.verdicts import Verdict
 from support.reports import compare, contradictions, expand, measure, plan_of, replace
 
+pytestmark = pytest.mark.slow
+
 PLAN = plan_of(
     {
         "name": "tiny",

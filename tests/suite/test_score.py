@@ -54,6 +54,7 @@ def started(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
 command = in_process.heavytop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(160)], ids=lambda p: p.name)
 def test_our_own_motion_scores_as_it_scored_itself(precision, tmp_path: Path) -> None:
     given = document(precision)
@@ -85,6 +86,7 @@ def test_csv_and_json_decimal_and_hexadecimal_say_the_same(number, tmp_path: Pat
     assert one == two
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(237)], ids=lambda p: p.name)
 def test_the_format_is_inferred_from_what_is_written(precision, tmp_path: Path) -> None:
     given = document(precision)
@@ -119,6 +121,7 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
     assert digits_kept(none) is None
 
 
+@pytest.mark.slow
 def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
     given = document(case=CASES["generic"], times=[Fraction(3000)])  # no digit of a double is left
     row = score(read(written(tmp_path, given)))
@@ -217,6 +220,7 @@ def test_a_misspelt_key_is_named_with_the_nearest_and_comments_stay_free(tmp_pat
     assert read(tmp_path / "a.csv").states == plain.states
 
 
+@pytest.mark.slow
 def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Path) -> None:
     given = document()
     assert read(written(tmp_path, given)).warnings() == []
@@ -234,6 +238,7 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
     assert "off 1 by 1.00E+400 at t" in warning
 
 
+@pytest.mark.slow
 def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:
     options = ["--inertia", "5/2,5/2,3/2", "--weight", "2", "--centre", "0,0,3/4", "--omega", "1/5,-1/3,7/4"]
     options += ["--gamma", "2/7,3/7,6/7", "--times", "1,5", "--json"]

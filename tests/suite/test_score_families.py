@@ -34,6 +34,7 @@ def kinds(found: Assessment) -> list[str]:
     return [each.kind for each in found.diagnoses]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", ["1e77", "-1e154", "1e155", "1e308", "1e400", "nan", "-inf", "0", "1e-400"])
 def test_a_number_of_any_size_is_scored_in_any_place(value: str) -> None:
     for row, column in ((0, 0), (7, 4), (19, 2)):
@@ -68,6 +69,7 @@ DEGENERATE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 12])
 def test_degenerate_trajectories_are_scored(rows: int) -> None:
     for name, states in DEGENERATE.items():
@@ -75,6 +77,7 @@ def test_degenerate_trajectories_are_scored(rows: int) -> None:
         assert set(kinds(found)) <= {"constant", "frozen", "integrals_off", "one_state", "some_states"}, name
 
 
+@pytest.mark.slow
 def test_centres_on_an_axis_and_constant_gamma_leave_nothing_to_fit() -> None:
     for centre in ((0, 0, 1), (0, 0, 0)):
         top, start = HeavyTop((2, 2, 1), 1, centre), State((Fraction(1, 10), 0, 3), (0, 0, 1))
@@ -91,6 +94,7 @@ def test_states_a_row_late_or_early_are_named_where_times_are_uneven(kind: str, 
     assert kinds(scored(states, times))[0] == kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [0, 41, 98, 99])
 def test_one_state_among_a_hundred_is_named(row: int) -> None:
     times = [Fraction(k, 2) for k in range(1, 101)]
@@ -103,6 +107,7 @@ def test_one_state_among_a_hundred_is_named(row: int) -> None:
     assert diagnosis_text(told).startswith(f"Only the state at t = {told.numbers['t']} is off (state {row + 1} of 100)")
 
 
+@pytest.mark.slow
 def test_several_states_are_named_and_a_tail_is_not() -> None:
     times = [Fraction(k, 2) for k in range(1, 41)]
     right = motion(TOP, START, HEAVY_TOP, times)
@@ -124,6 +129,7 @@ def test_several_states_are_named_and_a_tail_is_not() -> None:
 FACTORS = {"omega_in_degrees": 180 / np.pi, "omega_in_turns": 0.5 / np.pi, "omega_in_rpm": 30 / np.pi}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.02, -1.02, 0.001])
 def test_a_factor_of_omega_is_told_with_its_number(factor: float) -> None:
     (told,) = scored(RIGHT * (factor * OMEGA + GAMMA)).diagnoses
@@ -132,12 +138,14 @@ def test_a_factor_of_omega_is_told_with_its_number(factor: float) -> None:
     assert f"Ω is {told.numbers['factor']} times what fits" in diagnosis_text(told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FACTORS)
 @pytest.mark.parametrize("rows", [1, 20])
 def test_units_of_omega_are_named(kind: str, rows: int) -> None:
     assert kinds(scored((RIGHT * (FACTORS[kind] * OMEGA + GAMMA))[:rows], TIMES[:rows])) == [kind]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "kind"), [(30 / np.pi, "rpm"), (3, "")])
 def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str) -> None:
     start = State([w * Fraction(factor) for w in START.omega], START.gamma)
@@ -146,6 +154,7 @@ def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str)
     assert kind or float(told.numbers["factor"]) == pytest.approx(factor, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (5, 0.0)])
 def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float) -> None:
     states = RIGHT.copy()
@@ -156,6 +165,7 @@ def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float
     assert float(told.numbers.get("factor", 0)) == pytest.approx(factor)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", ["1.02", "1.3"])
 def test_a_factor_of_time_is_told(factor: str) -> None:
     (told,) = scored(RIGHT, [time * Fraction(factor) for time in TIMES]).diagnoses
@@ -163,6 +173,7 @@ def test_a_factor_of_time_is_told(factor: str) -> None:
     assert float(told.numbers["factor"]) == pytest.approx(1 / float(Fraction(factor)), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_sentence_about_first_integrals_says_of_which_it_is_true() -> None:
     noise = np.random.default_rng(1).normal(size=(20, 3))
     turned = RIGHT[:, 3:] + 0.1 * noise
@@ -175,6 +186,7 @@ def test_the_sentence_about_first_integrals_says_of_which_it_is_true() -> None:
     assert "area and energy vary" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", ["0.1", "2.5", "3", "0"])
 @pytest.mark.parametrize("precision", [DOUBLE, QUAD, None], ids=lambda form: getattr(form, "name", "guessed"))
 def test_a_permanent_rotation_in_few_digits_is_not_accused(omega: str, precision: Precision | None) -> None:
@@ -188,6 +200,7 @@ def test_a_permanent_rotation_in_few_digits_is_not_accused(omega: str, precision
         assert kinds(scored(states, TIMES[:6], top, start)) == ["omega_scaled"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["delone", "ershkov-partial-6", "generic", "hess-pendulum", "lagrange", "pendulum"])
 @pytest.mark.parametrize("digits", [3, 8, 17, 50])
 def test_a_right_trajectory_of_any_digits_is_not_accused(case: str, digits: int) -> None:
@@ -199,6 +212,7 @@ def test_a_right_trajectory_of_any_digits_is_not_accused(case: str, digits: int)
     assert found.digits_right > min(digits, 15) - 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [-100, 60])
 def test_units_of_any_size_change_no_diagnosis(power: int) -> None:
     size = Fraction(10) ** power

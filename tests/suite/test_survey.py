@@ -57,6 +57,7 @@ def plan(folder: Path, count: int = 5, more: str = "") -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["any", "euler", "lagrange", "kovalevskaya"])
 def test_records_equal_the_scorers(family: str) -> None:
     sweep = Random(name="s", seed=7, count=4, family=family)  # type: ignore[arg-type]
@@ -123,6 +124,7 @@ def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPa
         records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
 
 
+@pytest.mark.slow
 def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", 4)
     run = heavytop("run", "--plan", plan(tmp_path, 9), "--out", tmp_path / "out", "--workers", 1)
@@ -162,6 +164,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     assert compare(none, none, Policy()).verdict == "same"
 
 
+@pytest.mark.slow
 def test_records_do_not_depend_on_where_chunks_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def recorded(count: int, size: int) -> list[list[dict[str, object]]]:
         monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", size)
@@ -175,6 +178,7 @@ def test_records_do_not_depend_on_where_chunks_end(tmp_path: Path, monkeypatch: 
         assert list(chain.from_iterable(parts)) == whole[:count]
 
 
+@pytest.mark.slow
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.survey.measured.CHUNK", 3)
     file, whole, half = plan(tmp_path, 6), tmp_path / "whole", tmp_path / "half"
@@ -197,6 +201,7 @@ def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest
     assert [r.worst for r in ht.read_report(whole).rows] == [r.worst for r in ht.read_report(half).rows]
 
 
+@pytest.mark.slow
 def test_an_integrator_without_lanes_is_surveyed_too() -> None:
     sweep = Random(name="s", seed=7, count=2)
     motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
@@ -241,6 +246,7 @@ def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> N
         ht.read_survey(tmp_path, columns=["nothing"])
 
 
+@pytest.mark.slow
 def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) -> None:
     file = plan(tmp_path, 45, 'map = ["omega3", "gamma3"]')
     ht.run(file, tmp_path / "out", workers=1)
@@ -276,6 +282,7 @@ def _surveyed(folder: Path, monkeypatch: pytest.MonkeyPatch, fault: float = 0.0,
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_motions_that_got_worse_are_listed_with_the_command_that_shows_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -308,6 +315,7 @@ def test_a_command_made_of_a_record_measures_the_same_motion(tmp_path: Path, mon
         assert [*map(float, state["states"][-1])] == [*map(float, expected.states[-1])]
 
 
+@pytest.mark.slow
 def test_a_fault_that_no_quantile_sees_is_listed_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = tuple(range(0, 80, 3))  # a third of the motions is off in both
     healthy = _surveyed(tmp_path / "healthy", monkeypatch, 1e-9, before)
@@ -317,6 +325,7 @@ def test_a_fault_that_no_quantile_sees_is_listed_all_the_same(tmp_path: Path, mo
     assert [each.index for each in found.motions[0].first] == [11]
 
 
+@pytest.mark.slow
 def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -328,6 +337,7 @@ def test_a_motion_that_fails_now_is_worse_than_any_that_lost_digits(
     assert ht.compare(faulty, faulty).motions[0].worse == 0
 
 
+@pytest.mark.slow
 def test_surveys_of_other_tops_are_not_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     healthy = _surveyed(tmp_path / "healthy", monkeypatch)
     file = plan(tmp_path, 9)

@@ -120,6 +120,7 @@ def test_a_million_rows_are_planned_without_making_them(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_path: Path) -> None:
     tasks = plan_of(tmp_path, RANDOM + MEASURE.replace('"euler", "sweep:g", ', ""))
     assert tasks[0].times is tasks[2].times
@@ -129,6 +130,7 @@ def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_pa
     assert all(row.outcome == "success" for row in found.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -38,6 +38,7 @@ def tasks_of(folder: Path, text: str):
     return expand(load(str(folder / "plan.toml"))[0])
 
 
+@pytest.mark.slow
 def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN + FAR)
     done = heavytop("run", "--plan", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
@@ -60,6 +61,7 @@ def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path:
     assert heavytop("show", tmp_path / "out").returncode == 0
 
 
+@pytest.mark.slow
 def test_a_row_out_of_reach_has_the_key_that_it_has_within(tmp_path: Path) -> None:
     far, near = (tasks_of(tmp_path, PLAN + FAR.replace("1e100", end)) for end in ("1e100", "2"))
     keys, others = (

@@ -44,6 +44,7 @@ def error(row, name: str) -> float:
     return float(row.metrics[name].value)
 
 
+@pytest.mark.slow
 def test_the_error_is_the_distance_from_the_closed_form(tmp_path: Path) -> None:
     (row,) = rows(tmp_path, "lagrange", "20", '{ integrator = "scipy:DOP853", tolerances = ["1e-6"] }')
     case = CASES["lagrange"]
@@ -65,6 +66,7 @@ def test_the_error_is_the_distance_from_the_closed_form(tmp_path: Path) -> None:
     assert row.seconds["least"] <= row.seconds["run"]
 
 
+@pytest.mark.slow
 def test_finer_rungs_err_less_and_every_format_has_its_floor(tmp_path: Path) -> None:
     ladders = [
         '{ integrator = "heyoka", tolerances = ["1e-6", "1e-9", "eps"] }',
@@ -82,6 +84,7 @@ def test_finer_rungs_err_less_and_every_format_has_its_floor(tmp_path: Path) -> 
     assert compare(report, report, Policy()).verdict == "same"
 
 
+@pytest.mark.slow
 def test_the_way_back_of_a_symmetric_method_says_nothing_about_its_error(tmp_path: Path) -> None:
     ladders = [
         '{ integrator = "splitting:4", steps = ["1/4"] }',
@@ -93,6 +96,7 @@ def test_the_way_back_of_a_symmetric_method_says_nothing_about_its_error(tmp_pat
     assert error(lsoda, "error_max") / 100 < error(lsoda, "return_error") < error(lsoda, "error_max") * 100
 
 
+@pytest.mark.slow
 def test_a_splitting_bounds_the_energy_and_its_phase_grows_more_slowly(tmp_path: Path) -> None:
     ladders = [
         '{ integrator = "heyoka", tolerances = ["1e-9"] }',
@@ -117,6 +121,7 @@ def test_a_run_that_gives_up_is_a_failure_and_no_point(tmp_path: Path) -> None:
     assert (line.points, len(line.failures)) == ([], 1)
 
 
+@pytest.mark.slow
 def test_without_a_reference_there_is_no_error(tmp_path: Path) -> None:
     (row,) = found = rows(tmp_path, "generic", "3000", '{ integrator = "heyoka", tolerances = ["1e-6"] }', samples=1)
     assert "no reference" in row.against
@@ -125,6 +130,7 @@ def test_without_a_reference_there_is_no_error(tmp_path: Path) -> None:
     assert not panels(found)["generic/T=3000"][0].points
 
 
+@pytest.mark.slow
 def test_a_rotor_has_no_way_back(tmp_path: Path) -> None:
     (row,) = rows(tmp_path, "gyrostat", "5", '{ integrator = "splitting:2", steps = ["1/50"] }')
     assert "return_error" not in row.metrics

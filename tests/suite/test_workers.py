@@ -31,6 +31,8 @@ from heavytop.report.render.terminal import brief, summary
 from heavytop.report.store.checks import contradictions
 from support.reports import rows
 
+pytestmark = pytest.mark.slow
+
 PLAN = """name = "tiny"
 [[measure]]
 kind = "drift"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from fractions import Fraction
@@ -516,7 +517,9 @@ def verdict(baseline: Path, folder: Path, changed: Document) -> str:
 
 def document_of(baseline: Path) -> Document:
     """The report at ``baseline``, with seconds as of a plan with ``timings = true``."""
-    document: Document = msgspec.json.decode((baseline / store.FILE).read_bytes())
+    packed = baseline / f"{store.FILE}.gz"
+    content = gzip.decompress(packed.read_bytes()) if packed.exists() else (baseline / store.FILE).read_bytes()
+    document: Document = msgspec.json.decode(content)
     for row in document["rows"]:
         if row["measure"] == "work_precision" and row["seconds"].get("run"):
             row["seconds"]["band"] = 0.03

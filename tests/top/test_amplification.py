@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from itertools import permutations
+from random import Random
 
+import numpy
 import pytest
 
+import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import QUAD, exact, number
-from heavytop.top.amplification import FOLLOWED, _path, amplification, rate
+from heavytop.precision import exact, number, real
+from heavytop.top.amplification import FOLLOWED, _path, amplification, loss, rate
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -31,37 +34,132 @@ def hanging(sign: int, weight: object = 1) -> HeavyTop:
 STILL = State((0, 0, 0), (0, 0, 1))
 
 
+FINE = real(200)
+FLIPS = (Fraction(919, 15000), Fraction(967, 15000), Fraction(83, 15000))
+"""The moments of a body that turns over about its axis 1."""
+
+
+def drawn(seed: int) -> tuple[HeavyTop, State, Fraction]:
+    """A random top and start, and a horizon of some radians."""
+    draw = Random(seed)
+    inertia = [Fraction(draw.randint(60, 100), 100) for _ in range(3)]
+    centre = [Fraction(draw.randint(-9, 9), 10) for _ in range(3)]
+    omega = [Fraction(draw.randint(-20, 20), 10) for _ in range(3)]
+    return HeavyTop(inertia, draw.randint(0, 3), centre), State(omega, ("2/7", "3/7", "6/7")), Fraction(8)
+
+
+def turning_over(part: str, until: str) -> tuple[HeavyTop, State, Fraction]:
+    return HeavyTop(FLIPS, 0, (0, 0, 0)), State((10, 0, part), (0, "3/5", "4/5")), Fraction(until)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "horizon"), [("generic", 30), ("lagrange", 20), ("gyrostat", 15), ("kovalevskaya", -9)]
+    ("top", "start", "horizon"),
+    [
+        *((case.top, case.start, Fraction(t)) for case, t in ((GENERIC, 10), (CASES["kovalevskaya"], -9))),
+        *map(drawn, range(2)),
+        turning_over("1e-3", "2.5"),
+        turning_over("1e-6", "5"),
+    ],
 )
-def test_it_is_that_of_runs_from_changed_starts(name: str, horizon: int) -> None:
-    case, small = CASES[name], Fraction(1, 10**12)
-    problem = Problem.of(case.top, case.start, QUAD, case.system)
-    p, y = problem.parameters, problem.start.flat
-    scale = rate(case.system, p, y)
+def test_it_is_that_of_runs_from_states_changed_at_any_time(top: HeavyTop, start: State, horizon: Fraction) -> None:
+    count, every, small = (96, 4, Fraction(1, 10**30)) if top.inertia == FLIPS else (60, 10, Fraction(1, 10**20))
+    times = [horizon * k / count for k in range(count + 1)]
+    p = HEAVY_TOP.parameters(top, start)
+    scale = rate(HEAVY_TOP, p, start.flat)
     units = [scale] * 3 + [Fraction(1)] * 3
-    times = [Fraction(horizon) * k / 40 for k in range(1, 41)]
-
-    def states(start) -> list:
-        changed = Problem(case.system, QUAD, p, State(start[:3], start[3:]), None)
-        return follow_all(changed, times)
-
-    plain = states(y)
-    columns = [
-        states([v + small * u * (k == j) for k, (v, u) in enumerate(zip(y, units, strict=True))]) for j in range(6)
-    ]
-    largest = 1.0
-    for at in range(len(times)):
-        parts = [(column[at][k] - plain[at][k]) / units[k] / small for column in columns for k in range(6)]
-        largest = max(largest, math.sqrt(float(sum(part * part for part in parts)) / 6))
-    found = amplification(case.system, p, tuple(y), Fraction(horizon))
+    along = [list(start.flat), *follow_all(problem_of(p, list(start.flat)), times[1:])]
+    # where a change is made, and samples after it
+    largest = lost = 1.0
+    for at in range(0, count, every):
+        columns = []
+        for j in range(6):
+            state = [v + small * u * (k == j) for k, (v, u) in enumerate(zip(along[at], units, strict=True))]
+            changed = follow_all(problem_of(p, state), [t - times[at] for t in times[at + every :: every]])
+            parts = [
+                [(a - b) / u / small for a, b, u in zip(there, plain, units, strict=True)]
+                for there, plain in zip(changed, along[at + every :: every], strict=True)
+            ]
+            columns.append([float(sum(part * part for part in line)) for line in parts])
+        weights = [float(v / u) ** 2 for v, u in zip(along[at], units, strict=True)]
+        for squares in zip(*columns, strict=True):
+            largest = max(largest, math.sqrt(sum(squares) / 6))
+            lost = max(lost, math.sqrt(sum(a * b for a, b in zip(squares, weights, strict=True))))
+    given = HEAVY_TOP, p, tuple(start.flat), horizon
     # its own samples are the ends of its steps, not these
-    assert found == pytest.approx(largest, rel=0.1)
+    assert amplification(*given) == pytest.approx(largest, rel=0.5 if top.inertia == FLIPS else 0.25)
+    assert loss(*given) == (pytest.approx(lost, rel=0.5 if top.inertia == FLIPS else 0.25), True)
+
+
+def problem_of(p: Parameters, state: list[Fraction]) -> Problem:
+    return Problem(HEAVY_TOP, FINE, p, State(state[:3], state[3:]), None)
 
 
 def follow_all(problem: Problem, times: list[Fraction]) -> list[list[Fraction]]:
-    run = follow(problem, [number(time, QUAD) for time in times])
+    run = integrate_to_samples(problem, [number(time, FINE) for time in times])
     return [[exact(value) for value in state] for state in run.states]
+
+
+def largest_error(run: ht.Trajectory, known: ht.Reference) -> float:
+    pairs = [
+        (a, b) for one, two in zip(run.states, known.states, strict=True) for a, b in zip(one[:3], two[:3], strict=True)
+    ]
+    return max(abs(float(exact(a) - exact(b.value))) for a, b in pairs)
+
+
+@pytest.mark.slow
+def test_a_body_that_turns_over_twice_loses_every_digit_of_double_and_not_of_quad() -> None:
+    top, start, horizon = turning_over("1e-10", "10")
+    times = [horizon * k / 20 for k in range(1, 21)]
+    known = ht.reference(top, start, times, digits=40)
+    wide = numpy.finfo(numpy.longdouble).nmant > 60
+    for precision, text in (
+        ("double", "has lost all 16 digits before t = 10" if wide else "has lost at least 1"),
+        ("quad", "has lost at least 1"),
+    ):
+        run = ht.propagate(top, start, times, precision)
+        assert text in run.amplification_text()
+        assert text in repr(run)
+        assert (largest_error(run, known) > 5) == (precision == "double")
+
+
+def near_a_separatrix(seed: int) -> tuple[HeavyTop, State]:
+    """A random free body that turns about its middle axis, but for 1e-6 to 1e-12 of its rate."""
+    draw = Random(seed)
+    axes, inertia, omega = [0, 1, 2], [Fraction(0)] * 3, [Fraction(0)] * 3
+    draw.shuffle(axes)
+    for axis, moment in zip(axes, sorted(draw.sample(range(50, 100), 3)), strict=True):
+        inertia[axis] = Fraction(moment, 100)
+    omega[axes[1]], omega[axes[2]] = Fraction(draw.randint(10, 90), 10), Fraction(1, 10 ** draw.randint(6, 12))
+    return HeavyTop(inertia, 0, (0, 0, 0)), State(omega, ("2/7", "3/7", "6/7"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_where_all_digits_are_said_to_be_lost_no_integrator_has_one_right(seed: int) -> None:
+    top, start = near_a_separatrix(seed)
+    p, until = HEAVY_TOP.parameters(top, start), Fraction(4)
+    while loss(HEAVY_TOP, p, tuple(start.flat), until)[0] < 2.0**57:
+        until *= Fraction(5, 4)
+        assert until < 10**4
+    times = [until * k / 100 for k in range(1, 101)]
+    known = ht.reference(top, start, times, digits=30)
+    for integrator in ("heyoka", "scipy:DOP853", "splitting:8"):
+        run = ht.propagate(top, start, times, integrator=integrator)
+        assert "all 16 digits" in run.amplification_text()
+        assert largest_error(run, known) > 0.1 * float(max(start.omega))
+
+
+def test_what_stays_0_is_not_rounded_and_nothing_is_claimed_beyond_what_is_followed() -> None:
+    middle = turning_over("0", "1000")
+    p = HEAVY_TOP.parameters(*middle[:2])
+    assert amplification(HEAVY_TOP, p, tuple(middle[1].flat), Fraction(1000)) == 1e300
+    assert loss(HEAVY_TOP, p, tuple(middle[1].flat), Fraction(3))[0] < 200
+    assert loss(HEAVY_TOP, HEAVY_TOP.parameters(hanging(1), STILL), tuple(STILL.flat), Fraction(30)) == (1.0, True)
+    top, start, _ = turning_over("1e-10", "10")
+    lost, followed = loss(HEAVY_TOP, HEAVY_TOP.parameters(top, start), tuple(start.flat), Fraction(200))
+    assert not followed
+    assert 2.0**53 < lost < 2.0**64
 
 
 @pytest.mark.parametrize("weight", [1, 4, "1/9"])
@@ -84,6 +182,7 @@ def test_on_a_homoclinic_motion_it_goes_on_where_double_has_left_the_saddle() ->
     assert late - early == pytest.approx(75 * case.rate, rel=0.1)
 
 
+@pytest.mark.slow
 def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> None:
     case = CASES["euler"]
     short, long = (of(case.top, case.start, time) for time in (200, 400))
@@ -92,6 +191,7 @@ def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> 
     assert of(case.top, case.start, 10**6) == pytest.approx(10**6 / 400 * long, rel=0.3)
 
 
+@pytest.mark.slow
 def test_neither_units_nor_names_of_axes_matter() -> None:
     top, start = GENERIC.top, GENERIC.start
     plain = of(top, start, 20)

@@ -30,6 +30,7 @@ def test_the_angles_come_back_from_gamma_and_xi() -> None:
         assert euler_angles(gamma, xi, math) == pytest.approx((phi, theta, psi), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_gamma_and_xi_turn_as_3_1_says() -> None:
     """γ' = γ × Ω and ξ' = ξ × Ω with Ω of (3.1), symbolically."""
     t = sympy.Symbol("t")

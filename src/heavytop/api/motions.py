@@ -32,12 +32,12 @@ from heavytop.precision import (
     Array,
     OrderedRing,
     Precision,
+    as_integer,
+    cache_last_call,
     exact,
-    last_call,
     number,
     numbers,
     ordered,
-    whole,
 )
 from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
@@ -187,7 +187,7 @@ def _prepared(
     return call
 
 
-_kept = last_call(_prepared)
+_kept = cache_last_call(_prepared)
 
 
 def motion(
@@ -331,7 +331,7 @@ def known(
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
     seconds = EFFORT if effort is None else seconds_of(effort, "effort")
-    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which, seconds)
+    return proven(body, state, given, as_integer(digits, "digits"), about, finder, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
@@ -354,7 +354,7 @@ def _watching(setups: Sequence[Setup], observer: EnsembleObserver | None) -> Ens
     """An observer that is given the states in the axes given."""
     if observer is None or not callable(observer) or all(setup.frame is None for setup in setups):
         return observer
-    return lambda index, time, state: observer(index, time, setups[index].turned(state))
+    return lambda index, time, state: observer(index, time, setups[index].in_body_axes(state))
 
 
 def _options(

@@ -15,7 +15,7 @@ from heavytop.display import Tabular, TitledTable, printable
 from heavytop.errors import InputError, quoted
 from heavytop.features.kinds import KINDS
 from heavytop.measure.scalar import digits_kept
-from heavytop.precision import ordered, whole
+from heavytop.precision import as_integer, ordered
 from heavytop.report.compare import compare as comparing
 from heavytop.report.compare import noise as policies
 from heavytop.report.compare.compare import beside
@@ -103,7 +103,7 @@ class Comparison(Tabular, comparing.Differences):
         """The page of `compare --html`, with both reports on the same axes; their rows are read for it."""
         from heavytop.report.render.page import comparison_page
 
-        old, new = (store.whole(report) for report in self.reports)
+        old, new = (store.full_report(report) for report in self.reports)
         return comparison_page(old, new, self, KINDS)
 
     def to_junit(self) -> str:
@@ -169,7 +169,7 @@ def run(
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (`heavytop docs plans`).
+        plan: one of `harness.plan.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
@@ -195,7 +195,7 @@ def run(
         resume=bool(arguments.flag(resume, "resume")),
         workers=workers,
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
-        seed=whole(seed, "seed"),
+        seed=as_integer(seed, "seed"),
         integrator=_integrator(integrator),
         with_parquet=bool(arguments.flag(parquet, "parquet")),
         row_timeout=row_timeout,

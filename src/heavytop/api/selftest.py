@@ -1,7 +1,7 @@
-"""The suite's own detectors, tried on integrators that are deliberately broken.
+"""The suite's own detectors, tried on deliberately faulty integrators.
 
-Each fault of :mod:`heavytop.integrate.broken` runs the plan `selftest`, and its report is compared with that of the
-healthy integrator, as any candidate is with its baseline.
+Each plug-in of :mod:`heavytop.api.faulty_integrators` runs the plan `selftest`, and its report is compared
+with that of the healthy integrator, as any candidate is with its baseline.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from heavytop.api.faulty_integrators import FAULTS
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.harness.plan import expand, load
 from heavytop.harness.rows import Task
 from heavytop.harness.run import rows
-from heavytop.integrate.broken import FAULTS
 from heavytop.precision import exact, log10
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.compare.compare import Differences, compare
@@ -108,7 +108,8 @@ def tasks(plan: str = "selftest") -> list[Task]:
     """The measurements of the plan for every integrator: healthy, healthy with other roundings, each fault."""
     healthy = expand(load(plan, KINDS)[0])
     control = [replace(task, seed=1) for task in healthy]
-    return [*healthy, *control, *(replace(task, fault=fault) for fault in FAULTS for task in healthy)]
+    plug_ins = [fault.integrator for fault in FAULTS.values()]
+    return [*healthy, *control, *(replace(task, source=faulty) for faulty in plug_ins for task in healthy)]
 
 
 def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]) -> list[Trial]:

@@ -13,11 +13,12 @@ from heavytop.cli import integrators, motions, output, reports  # noqa: F401  # 
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
+from heavytop.features.body import command as body  # noqa: F401
 from heavytop.features.claims import command as claims  # noqa: F401
 
 _ORDER = (
     *("run", "compare", "history", "show", "export"),
-    *("propagate", "reference", "score", "audit", "claims", "figures"),
+    *("propagate", "reference", "score", "audit", "claims", "figures", "body"),
     *("selftest", "check-integrator", "new", "hunt", "list", "docs"),
 )
 """The commands in the order of ``heavytop --help``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -11,9 +12,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from heavytop.cli.output import printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ImpossibleBody, InputError, quoted
 
 app = typer.Typer(
     help="Measure how wrong computed and claimed motions of a heavy top are, against references that are proven.",
@@ -80,6 +82,16 @@ def cases(begun: str) -> list[str]:
     return [name for name in CASES if name.startswith(begun)]
 
 
+class _Command(TyperCommand):
+    """A command whose help shows of a list of files the type of its entries."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        for parameter in self.params:
+            if parameter.nargs == -1:
+                parameter.display_type = lambda ctx: "<path>..."  # type: ignore[attr-defined]
+
+
 def command(function: Callable[..., int]) -> Callable[..., None]:
     """A command of the program that ends with the exit code which ``function`` returns."""
 
@@ -87,12 +99,13 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
     def with_exit_code(*args: Any, **options: Any) -> None:
         from heavytop.cli.output import told_when_slow
 
-        with told_when_slow(name):
+        with told_when_slow(name), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImpossibleBody)  # the command says so itself
             code = function(*args, **options)
         raise typer.Exit(code)
 
     name = function.__name__.rstrip("_").replace("_", "-")
-    return app.command(name=name)(with_exit_code)
+    return app.command(name=name, cls=_Command)(with_exit_code)
 
 
 def show_on_terminal(renderable: Any) -> None:

@@ -97,7 +97,11 @@ def write_motion(
 
 Events = Annotated[
     list[str] | None,
-    typer.Option("--events", help="Also the times, up to the last, at which omega1=0 or the like changes sign."),
+    typer.Option(
+        "--events",
+        metavar="FUNCTION",
+        help="Also the times, up to the last, at which omega1=0 or the like changes sign.",
+    ),
 ]
 EventDirection = Annotated[
     int, typer.Option("--event-direction", help="1: where it rises with time; -1: where it falls; 0: both.")

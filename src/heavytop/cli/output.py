@@ -246,7 +246,8 @@ class Bar:
         if not percent and not left:
             return counted or "how far is not known"
         percent_text = f"{percent:.1g} %" if 0 < percent < 1 else f"{percent:.0f} %"
-        return ", ".join(filter(None, (counted, percent_text, f"about {duration(left)} left")))
+        time_left = f"about {duration(left)} left" if left or percent == 100 else "longer than expected"
+        return ", ".join(filter(None, (counted, percent_text, time_left)))
 
     def state(self) -> str:
         """What is being done and how far it is, in a line."""

@@ -121,7 +121,7 @@ def show(
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
     from heavytop.api.reports import read_report
-    from heavytop.files import whole
+    from heavytop.files import atomic_write
     from heavytop.report.store import parquet as tables
 
     if parquet is not None:
@@ -136,9 +136,9 @@ def show(
         stack.enter_context(writing())
         if html is not None:
             page = found.to_html().encode()
-            stack.enter_context(whole(html)).write(page)
+            stack.enter_context(atomic_write(html)).write(page)
         if markdown is not None:
-            stack.enter_context(whole(markdown)).write(found.to_markdown().encode())
+            stack.enter_context(atomic_write(markdown)).write(found.to_markdown().encode())
         if parquet is not None:
             tables.write(parquet, found.rows, found.plan)
     for path in files:
@@ -197,7 +197,11 @@ def export(
 @command
 def run(
     plan: Annotated[
-        str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.", autocompletion=plans)
+        str,
+        typer.Option(
+            help="smoke, default, growth, long, peers, gate, bodies, claims, selftest, or a TOML file.",
+            autocompletion=plans,
+        ),
     ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
@@ -306,6 +310,9 @@ def score(
     Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
     first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
     Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
+
+    Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
+    3 where it ended early, or that is not known.
     """
     from heavytop.features.score.api import read_trajectory, scored
 

@@ -74,7 +74,7 @@ class Resolved:
     uncertainty: Uncertainty | None
 
     @property
-    def turned(self) -> bool:
+    def is_rotated(self) -> bool:
         """Whether the axes given are not these."""
         return self.axes != IDENTITY
 
@@ -269,7 +269,7 @@ class BodyMotion:
             return self.method, self._enclosed
         method, inner = state_and_attitude(known[1], latest, bits, self.effort)
         inner = _from_start(known, inner)
-        if not known[0].turned:
+        if not known[0].is_rotated:
             return method, inner
         return method, lambda time, bits: _turned(known, bits, lambda _known, working: inner(time, working))
 
@@ -322,7 +322,7 @@ class BodyMotion:
 
 def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate) -> list[arb]:
     """What is evaluated, in the axes given, with ``bits`` bits."""
-    if not known[0].turned:
+    if not known[0].is_rotated:
         return list(evaluate(known, bits))
     working = bits + 4
     for _ in range(_ATTEMPTS):

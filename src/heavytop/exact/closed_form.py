@@ -46,7 +46,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 Made = TypeVar("Made")
 
 
-def kept(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
     """``make(motion)`` once for each motion and working precision: kept in the motion's ``made``.
 
     A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
@@ -239,7 +239,7 @@ class ClosedForm(Evaluated):
     """The motion of ``top`` from ``start``; the dataclass of each case brings ``method`` and its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
-    made: what :func:`heavytop.exact.closed_form.kept` keeps.
+    made: what :func:`heavytop.exact.closed_form.cached_per_precision` keeps.
     """
 
     top: HeavyTop

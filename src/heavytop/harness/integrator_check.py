@@ -19,7 +19,7 @@ from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
+from heavytop.integrate.peers.command import Command, ProgramRequest, Session, begin_row, close_all, session
 from heavytop.integrate.peers.contract import said
 from heavytop.integrate.registry import IntegratorSource
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -330,7 +330,9 @@ class _Contract:
         assert self.program is not None
         alone = [list(state) for state in self._run([1, 2]).states]
         sign = -1 if self.backward_only else 1
-        request = Request(self._problem(), [Fraction(sign), Fraction(2 * sign)], self._default(), self.program.hex)
+        request = ProgramRequest(
+            self._problem(), [Fraction(sign), Fraction(2 * sign)], self._default(), self.program.hex
+        )
         both = [Session(self.program) for _ in range(2)]
         try:
             with ThreadPoolExecutor(2) as threads:
@@ -393,7 +395,7 @@ class _Contract:
         return f"{subject} is right to {decimal_text(off, 2)}." if off else f"{subject} is right to the last bit."
 
 
-class _Extended(Request):
+class _Extended(ProgramRequest):
     """A request with a line that no program knows."""
 
     def text(self, label: int) -> bytes:

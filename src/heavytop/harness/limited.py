@@ -7,6 +7,7 @@ which ends as a whole: what an integrator started does not outlive it.
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -19,19 +20,22 @@ from itertools import islice, product
 from time import monotonic
 from typing import Any
 
-from heavytop.errors import HeavyTopError, OutOfTime
+from heavytop.errors import HeavyTopError, NotAsked, OutOfTime
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
+from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import said
 from heavytop.processes import GuardedProcess
-from heavytop.records import OUT_OF_TIME, Row
+from heavytop.records import FAILED, OUT_OF_TIME, Row
 
-_BASE = 30.0
-"""Seconds that every row may take."""
+_BASE, _BASE_LATER = 30.0, 10.0
+"""Seconds that every row may take; fewer once the integrator has begun, compiled and finished a row."""
 _TIMES = 10.0
 """How many times as long as expected a row may take beside that."""
 _LEAST = 10.0
 """Seconds of a row of an integrator that keeps running out of time."""
+_MOST_OUT_OF_TIME = 2
+"""Rows in which an integrator may run out of time before it is asked for no more of them."""
 _MOST_DEATHS = 3
 _LOOKED_AT = 64
 """Tasks that wait, among which one in the format of a worker is looked for."""
@@ -41,19 +45,26 @@ _AHEAD, _SHORT = 4, 0.25
 
 @dataclass(slots=True)
 class _Record:
-    """What the rows of one integrator took: seconds over the expected cost, at most, and how many just ran out."""
+    """What the rows of one integrator took: seconds over the expected cost, at most, and how many just ran out.
+
+    base: seconds of a row beside that.  out_of_time: how many ran out in all.
+    """
 
     ratio: float = 1.0
     lost: int = 0
+    base: float = _BASE
+    out_of_time: int = 0
 
 
 @dataclass(slots=True)
 class RowLimits:
     """Seconds that a row of a third-party integrator may take.
 
-    30 s and ten times its expected cost: that of heyoka for the same row, times the largest ratio of seconds to cost
-    among the integrator's finished rows, and at least that.  Each row in succession that ran out of time divides the
-    next limit, by 2, 3, ..., down to 10 s.  fixed: the limit of every row in the place of all that.
+    30 s, or 10 s once it has finished a row, and ten times the expected cost: that of heyoka for the same row, times
+    the largest ratio of seconds to cost among the integrator's finished rows, and at least that.  Each row in
+    succession that ran out of time divides the next limit, by 2, 3, ..., down to 10 s; once two ran out no other is
+    asked for.
+    fixed: the limit of every row in the place of all that.
     """
 
     fixed: float | None = None
@@ -64,22 +75,37 @@ class RowLimits:
         if self.fixed is not None:
             return self.fixed
         record = self._of(task)
-        return max((_BASE + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
+        return max((record.base + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
 
     def finished(self, task: Task, cost: float, seconds: float) -> None:
         """A row ended by itself."""
         record = self._of(task)
-        record.lost, record.ratio = 0, max(record.ratio, seconds / cost)
+        record.lost, record.ratio, record.base = 0, max(record.ratio, seconds / cost), _BASE_LATER
 
     def ran_out(self, task: Task) -> None:
         """A row was stopped at its limit."""
-        self._of(task).lost += 1
+        record = self._of(task)
+        record.lost, record.out_of_time = record.lost + 1, record.out_of_time + 1
+
+    def not_asked(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Row]]:
+        """Takes those out of the tasks that wait whose integrator has run out of time twice: their rows."""
+        lost = {name for name, record in self._records.items() if record.out_of_time >= _MOST_OUT_OF_TIME}
+        left = [index for index in waiting if lost and tasks[index].key.subject.name in lost]
+        if left:
+            others = [index for index in waiting if tasks[index].key.subject.name not in lost]
+            waiting.clear()
+            waiting.extend(others)
+        for index in left:
+            name = tasks[index].key.subject.name
+            cause = f"{name} ran out of time in {_MOST_OUT_OF_TIME} other rows and was not asked again"
+            yield index, failed(tasks[index], cause, NotAsked)
 
     def took(self, task: Task, cost: float, row: Row, seconds: float) -> None:
-        """A row of any integrator ended, by itself or at its limit."""
-        if row.outcome == OUT_OF_TIME:
+        """A row of any integrator ended, by itself, at its limit or at the time limit of a request to a program."""
+        timeout = task.source.seconds if isinstance(task.source, Command) else math.inf
+        if row.outcome == OUT_OF_TIME or (row.outcome == FAILED and seconds >= timeout):
             self.ran_out(task)
-        elif task.is_third_party:
+        elif task.is_third_party and row.outcome != FAILED:
             self.finished(task, cost, seconds)
 
     def _of(self, task: Task) -> _Record:
@@ -221,6 +247,7 @@ def in_processes(
                     if worker.rows:
                         begun(tasks[worker.rows[0][0]])
                     yield index, row
+                    yield from limits.not_asked(waiting, tasks)
     finally:
         for worker in pool:
             worker.end()
@@ -305,7 +332,7 @@ def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row |
         else:  # it changed what is around it, such as modules of this program
             row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
             worker.end()
-        limits.finished(task, cost, monotonic() - worker.began)
+        limits.took(task, cost, row, monotonic() - worker.began)
         worker.finish()
         return row
     if worker.left is None or worker.left > 0:

@@ -56,13 +56,17 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """A top of the plan's own, or a body in any axes; numbers as exact text, or as they are written in TOML.
 
     With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
-    numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
-    ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle`` ("x,y,z:angle").
+    numbers of its tensor, about "pivot" or "centre of mass".  With ``file``, and ``link`` where it has several, the
+    body of a URDF, MJCF, SDF, USD or TOML file; a relative path is from the working directory.  The start has ``omega``
+    or ``omega_space``, and one of ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle``
+    ("x,y,z:angle").
     """
 
     name: str
-    inertia: list[str]
-    centre: list[str]
+    inertia: list[str] | None = None
+    centre: list[str] | None = None
+    file: str | None = None
+    link: str | None = None
     weight: str | None = None
     mass: str | None = None
     gravity: str | None = None
@@ -110,14 +114,14 @@ def read(
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
     integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
-    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`beside` does.
+    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`with_integrator` does.
     """
     plan, digest = load(name, kinds)
     try:
         defined = definitions(plan, Path() if name in BUILT_IN else Path(name).parent)
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
-            plan = beside(plan, integrator)
+            plan = with_integrator(plan, integrator)
         if not isinstance(integrator, str):
             defined = defined | {integrator.name: integrator}
         return plan, digest, expand(plan, seed, defined)
@@ -199,7 +203,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
     return defined
 
 
-def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
+def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     """The plan with the same measurements of another integrator after heyoka's.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
@@ -209,7 +213,7 @@ def beside(plan: Plan, integrator: str | IntegratorSource) -> Plan:
     if not isinstance(integrator, str) and not is_third_party(integrator.name):
         raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
-    added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
+    added = [other for table in plan.measure if (other := table.with_integrator(integrator)) is not None]
     if not added:
         raise InputError(f"The plan {plan.name} does not measure {HEYOKA}.", "Use --plan gate.")
     return msgspec.structs.replace(plan, measure=[*plan.measure, *added])

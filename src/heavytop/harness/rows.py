@@ -13,7 +13,16 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 
 from heavytop.cases import Case
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, OutOfTime, PeerFailed, Unsupported
+from heavytop.errors import (
+    Contradiction,
+    HeavyTopError,
+    InputError,
+    NotAsked,
+    OutOfReach,
+    OutOfTime,
+    PeerFailed,
+    Unsupported,
+)
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
@@ -28,6 +37,7 @@ from heavytop.records import (
     EXACT,
     FAILED,
     FINEST,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNSUPPORTED,
@@ -55,8 +65,8 @@ class Task:
     case: None where no motion is measured.
     times: exact, of the sign of the direction; keep: those that go into the series.
     options: what else the kind of measurement needs to know, and it alone.
+    request: what decides the outcome beside key, case and times; it stands in the row.
     seed: which roundings; 0 for those of the data as given.
-    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
     source: of an integrator that is neither built in nor a package's.
     """
 
@@ -68,8 +78,8 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     options: Any = None
     seed: int = 0
-    fault: str = ""
     source: IntegratorSource | None = None
+    request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case of the same system."""
@@ -94,12 +104,12 @@ class Task:
     @property
     def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
+        return ChosenIntegrator(self.key.subject.name, source=self.source)
 
     @property
     def is_third_party(self) -> bool:
         """Whether code or a program of others computes the motion."""
-        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
+        return self.key.subject.what == "computed" and is_third_party(self.key.subject.name)
 
     @property
     def given(self) -> Case:
@@ -180,6 +190,7 @@ def exact_row(
         measured=measured,
         series=series or {},
         samples=len(task.times),
+        request=task.request,
     )
 
 
@@ -216,6 +227,7 @@ def computed_row(
         samples=len(run.times),
         seconds=run.seconds,
         amplification=_amplification(run.problem, horizon),
+        request=task.request,
     )
 
 
@@ -224,6 +236,7 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
     PeerFailed: FAILED,
     Unsupported: UNSUPPORTED,
     OutOfTime: OUT_OF_TIME,
+    NotAsked: NOT_ASKED,
 }
 
 
@@ -260,6 +273,7 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
         key=task.key,
         reference=Against("none", reason=reason.cause),
         measured="nothing",
+        request=task.request,
     )
 
 
@@ -296,7 +310,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None

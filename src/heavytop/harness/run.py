@@ -127,6 +127,7 @@ def _on_cluster(
                     raise
                 limits.took(tasks[index], costs[index], row, seconds)
                 yield index, row
+                yield from limits.not_asked(waiting, tasks)
         except (CancelledError, OSError):
             raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{RESUME}.") from None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
@@ -97,6 +98,13 @@ class SweepGrid(Strict, tag="grid"):
                 raise InputError(f"The sweep's {label(index)}: {error.cause}", error.remedy) from None
         return Lazy(size, point)
 
+    @property
+    def exact_data(self) -> str:
+        """How many values each quantity has, and a digest of all of them."""
+        axes = [self._axis(what) for what in _AXES]
+        digest = hashlib.sha256(str(axes).encode()).hexdigest()
+        return f"grid of {' x '.join(str(len(axis)) for axis in axes)}, {digest[:16]}"
+
     def _axis(self, what: str) -> list[Any] | tuple[Any]:
         """The values of one of the six: a list where the plan lists them, a tuple of one where it gives one."""
         given = getattr(self, what)
@@ -131,6 +139,11 @@ class Random(Strict, tag="random"):
     def cases(self) -> Sequence[Case]:
         """The tops; each depends on the seed and its own index alone."""
         return Lazy(_bounded(self.name, self.count), self._case)
+
+    @property
+    def exact_data(self) -> str:
+        """All that the tops depend on, in words."""
+        return f"{self.count} random tops, {self.family}, seed {self.seed}"
 
     def integers(self, index: int) -> tuple[int, ...]:
         """Fourteen that make a motion: thousandths of the three moments, of the weight, of centre and omega; the three

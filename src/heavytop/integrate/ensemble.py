@@ -16,7 +16,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.lanes import Lanes, Work
-from heavytop.integrate.heyoka.motions import follow
+from heavytop.integrate.heyoka.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact, number
 from heavytop.top.heavy_top import check_times
@@ -137,7 +137,7 @@ def _one_by_one(work: Work) -> None:
         while taken := work.take():
             index, problem = taken
             observer = partial(work.observe, index) if work.observed else None
-            run = follow(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
+            run = integrate_to_samples(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
             work.finish(index, run)
 
 

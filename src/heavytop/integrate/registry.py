@@ -1,8 +1,7 @@
 """Integrators: what each is to this program and can do, found by name or source, and called with the options asked for.
 
-heyoka, multiword, the peers and the deliberately faulty ones (:mod:`heavytop.integrate.broken`) are instances of
-:class:`Integrator`, and so is what an entry point of another package names.  A new one of this program's is a line in
-:data:`INTEGRATORS`.
+heyoka, multiword and the peers are records of the table :data:`INTEGRATORS`, where a new one is a line; what an entry
+point of another package names is one too.  A record that is in no table is its own source.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, i
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
-from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
+from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import (
@@ -39,9 +38,9 @@ from heavytop.precision import (
     OrderedRing,
     Precision,
     Vector,
+    cache_last_call,
     decimal_text,
     exact,
-    last_call,
     log10,
     parse,
 )
@@ -122,6 +121,10 @@ class Integrator:
         missing = [name for name in _EVERY if name not in (self.formats or ())]
         return "" if len(missing) > 1 else "every format" + (f" but {missing[0]}" if missing else "")
 
+    def load(self) -> Callable[..., Any]:
+        """The function that propagates, imported."""
+        return load(self.propagate)  # type: ignore[no-any-return]
+
     def capabilities(self) -> dict[str, Any]:
         """As `list --json` shows them; None for what is not declared."""
         return {
@@ -145,9 +148,10 @@ def name_of(which: str | IntegratorSource) -> str:
 
 
 def described(which: str | IntegratorSource) -> Integrator:
-    """What is known of it, without looking for it: of one that is not this program's, nothing."""
-    own = INTEGRATORS.get(which) if isinstance(which, str) else None
-    return own or foreign(name_of(which))
+    """Capabilities, without a look at the integrator: a record's own; of another package's or a file's, nothing."""
+    if isinstance(which, str):
+        return INTEGRATORS.get(which) or foreign(which)
+    return which if isinstance(which, Integrator) else foreign(which.name)
 
 
 def load(place: str | Callable[..., Any]) -> Any:
@@ -155,8 +159,7 @@ def load(place: str | Callable[..., Any]) -> Any:
     return EntryPoint("", place, "").load() if isinstance(place, str) else place
 
 
-loaded = lru_cache(maxsize=64)(load)
-"""The same, looked up once: for this program's own."""
+loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
 
 
 def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
@@ -179,9 +182,9 @@ INTEGRATORS = {
         _peer("heyoka:lanes", "heyoka_taylor:lanes"),
         Integrator(
             "multiword",
-            f"{_HERE}.multiword.motions:propagate_words",
+            f"{_HERE}.multiword.motions:propagate_multiword",
             _EVERY,
-            ensemble=f"{_HERE}.multiword.lanes:propagate_words_ensemble",
+            ensemble=f"{_HERE}.multiword.lanes:propagate_multiword_ensemble",
             attitude=True,
             streams=True,
         ),
@@ -375,8 +378,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
         if own or (isinstance(which, str) and which not in known()):
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    declared = getattr(chosen, "declared", None)
-    declared = declared if isinstance(declared, Declared) else None
+    declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
     given: dict[str, Any] = dict([setting] if setting else [])
     if setting is not None or not own:
         with contained(name, " when its arguments were looked at"):
@@ -391,7 +393,7 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
                 raise PeerFailed(f"{name} has no {control}")
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
-    return Contained(name, chosen, own, declared, given)
+    return CheckedPlugin(name, chosen, own, declared, given)
 
 
 def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
@@ -481,7 +483,7 @@ def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None
     return math.isqrt(square.numerator // square.denominator)
 
 
-@last_call
+@cache_last_call
 def _square_in_doubles(problem: Problem) -> float:
     """The square of the rate at which the motion changes; inf where doubles do not hold it."""
     try:
@@ -655,7 +657,7 @@ class Setup:
             return cls(body, start, None, system, precision, None)
         found = resolve(body, start, precision.bits + _SPARE_BITS)
         xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.turned:
+        if not found.is_rotated:
             return cls(found.top, found.start, xi, system, precision, None)
         if system is GYROSTAT:
             raise InputError(
@@ -676,11 +678,11 @@ class Setup:
         """What an ensemble is made of."""
         return Problem.of(self.top, self.start, self.precision, self.system)
 
-    def turned(self, state: Any) -> Any:
+    def in_body_axes(self, state: Any) -> Any:
         """A state of an observer in the axes given."""
         return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
 
-    def turned_exactly(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
+    def exactly_in_body_axes(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
         """Vectors in principal axes, in the axes given, in exact rationals."""
         if self.frame is None:
             return state
@@ -691,7 +693,7 @@ class Setup:
         """An observer that is given the states in the axes given."""
         if observer is None or self.frame is None or not callable(observer):
             return observer
-        return lambda time, state: observer(time, self.turned(state))
+        return lambda time, state: observer(time, self.in_body_axes(state))
 
     def given(self, run: Trajectory) -> Trajectory:
         """The run in the axes given."""

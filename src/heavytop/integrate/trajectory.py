@@ -18,10 +18,10 @@ from heavytop.precision import (
     DOUBLE,
     Precision,
     Vector,
+    cache_last_call,
     cross,
     decimal_text,
     exact,
-    last_call,
     native,
     native_text,
     number,
@@ -181,6 +181,8 @@ def _text(value: Any, digits: int) -> str:
 
 _FEW_DIGITS = 3.0
 """An amplification that costs fewer digits is not mentioned."""
+_BEYOND = 4
+"""Every digit is lost where a rounding has grown to so many bits more than the format has: most are smaller."""
 _SHOWN = 15
 """Digits of a number in a table for people; all of them are in :meth:`Trajectory.texts`."""
 
@@ -255,7 +257,7 @@ class Problem:
         return [number(exact(value), self.precision) for value in values]
 
 
-@last_call
+@cache_last_call
 def _rounded(
     top: HeavyTop, start: State, precision: Precision, system: System, xi: tuple[Fraction, ...] | None
 ) -> Problem:
@@ -268,7 +270,7 @@ def _rounded(
     return Problem(system, precision, parameters, rounded_start, None if xi is None else both(xi), (top, start))
 
 
-@last_call
+@cache_last_call
 def _rounded_parameters(top: HeavyTop, start: State | None, precision: Precision, system: System) -> Parameters:
     given = system.parameters(top, _ANY_START if start is None else start)
     return given.mapped(lambda value: rounded(Fraction(value), precision))
@@ -282,7 +284,7 @@ class OtherFlags(InputError):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ResumePoint:
     """Where a run is: all that it needs to go on with the same bits, in native numbers.
 
     samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
@@ -328,7 +330,7 @@ class Place:
         }
 
     @classmethod
-    def of(cls, content: dict[str, Any], precision: Precision) -> Place:
+    def of(cls, content: dict[str, Any], precision: Precision) -> ResumePoint:
         """The place with that :meth:`content`."""
         state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
         samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
@@ -387,7 +389,7 @@ class InSpace:
         return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
 
 
-class _MadeWhenAsked:
+class LazyStates:
     """States that a function makes when they are first asked for."""
 
     __slots__ = ("_make",)
@@ -406,7 +408,7 @@ class _MadeWhenAsked:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trajectory(_MadeWhenAsked, Tabular, InSpace):
+class Trajectory(LazyStates, Tabular, InSpace):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
@@ -500,25 +502,42 @@ class Trajectory(_MadeWhenAsked, Tabular, InSpace):
 
     @property
     def amplification(self) -> float:
-        """The largest factor by which the motion itself has amplified a change of its start up to ``time_reached``.
+        """The largest factor by which the motion itself has amplified a change of its state up to ``time_reached``,
+        whenever that was made.
 
         An estimate from the variational equation, computed when it is asked for.
         """
         from heavytop.top.amplification import amplification
 
+        return amplification(*self._followed)
+
+    @property
+    def digits_lost(self) -> tuple[float, bool]:
+        """Decimal digits that a state loses until ``time_reached`` where it is rounded to the format at the worst time
+        before; and whether that is followed so far, not a lower estimate.
+        """
+        from heavytop.top.amplification import digits_eaten, loss
+
+        factor, followed = loss(*self._followed)
+        return digits_eaten(factor), followed
+
+    @property
+    def _followed(self) -> tuple[System, Parameters, tuple[Fraction, ...], Fraction]:
         problem = self.problem
-        return amplification(problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached)
+        return problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached
 
     def amplification_text(self) -> str:
         """What the amplification costs, in a sentence; "" where it costs fewer than three digits."""
-        lost, digits = math.log10(self.amplification), round(self.problem.precision.bits * math.log10(2))
+        (lost, followed), precision = self.digits_lost, self.problem.precision
         if lost < _FEW_DIGITS:
             return ""
-        until = decimal_text(self.time_reached, 6)
-        if lost >= digits:
-            return f"the motion itself amplifies roundings: all {digits} digits are lost before t = {until}"
-        by = f"by 1e{lost:.0f} until t = {until}: {lost:.0f} of {digits} digits are lost"
-        return f"the motion itself amplifies roundings {by}"
+        digits, until = round(precision.bits * math.log10(2)), decimal_text(self.time_reached, 6)
+        state = f"the motion itself amplifies roundings: a state rounded to {precision.name} on the way has lost"
+        if lost >= (precision.bits + _BEYOND) * math.log10(2):
+            return f"{state} all {digits} digits before t = {until}"
+        return (
+            f"{state} {'' if followed else 'at least '}{min(int(lost), digits - 1)} of {digits} digits by t = {until}"
+        )
 
     def _repr_html_(self) -> str:
         states, carried = self.states, self.states.shape[1:] == (9,)
@@ -568,11 +587,11 @@ class SampledRun(Protocol):
         """How it came to the time, given as the native number and exactly, and the native state there."""
         ...
 
-    def take_up(self, place: Place, covered: Any) -> None:
+    def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
         ...
 
-    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""
         ...
 
@@ -583,8 +602,8 @@ def sampled(
     flags: dict[str, str],
     began: float,
     observer: Observer | None,
-    place: Place | None,
-    mark: Callable[[Place], None] | None,
+    place: ResumePoint | None,
+    mark: Callable[[ResumePoint], None] | None,
 ) -> tuple[tuple[Fraction, ...], tuple[Any, ...], Outcome, float]:
     """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
 

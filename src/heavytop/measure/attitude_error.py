@@ -207,7 +207,7 @@ class ObservedErrors(Statistics):
             found.append(Quantity(SOLUTION_ERROR, "omega"))
         if "gamma" in names or self.form:
             found.append(Quantity(SOLUTION_ERROR, "gamma"))
-        if whole(names):
+        if gives_state(names):
             found += [Quantity(SOLUTION_ERROR, "along"), Quantity(SOLUTION_ERROR, "across")]
         if self.form:
             found.append(Quantity(ATTITUDE_ERROR))
@@ -300,7 +300,7 @@ def _vector_error(name: str, given: Sequence[arb], true: Sequence[arb]) -> dict[
     }
 
 
-def whole(names: Sequence[str]) -> bool:
+def gives_state(names: Sequence[str]) -> bool:
     """Whether these columns give Ω and γ."""
     attitude = any(form in names for form in FORMS)
     return ("omega" in names or ("omega_space" in names and attitude)) and ("gamma" in names or attitude)
@@ -308,7 +308,7 @@ def whole(names: Sequence[str]) -> bool:
 
 def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[arb] | None:
     """Ω and γ in principal axes of a sample that gives both, else None; Ω of the body's axes before that of space."""
-    if not whole(list(values)):
+    if not gives_state(list(values)):
         return None
     with working_precision(bits):
         given = {name: [ball(value) for value in part] for name, part in values.items()}
@@ -369,7 +369,7 @@ class ObservedScorer(DriftAndError):
         self.truth, self.said, self.posed = truth, said, posed
         self.bits = problem.precision.bits + GUARD_BITS
         plain = replace(problem, xi=None)
-        self.drift = Drift(plain, problem.integrals(), keep) if whole(names) else None
+        self.drift = Drift(plain, problem.integrals(), keep) if gives_state(names) else None
         self.error: ObservedErrors | None = None
         if not isinstance(truth, str):
             self.error = ObservedErrors(problem, truth, posed, said, names, keep)

@@ -115,7 +115,7 @@ def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
 
     kept: columns that are no vectors, the principal moments.
     """
-    if not resolved.turned:
+    if not resolved.is_rotated:
         return matrix
     longest = max(int(value.mid().man_exp()[0]).bit_length() for row in matrix for value in row)
     with working_precision(longest + 64):

@@ -237,7 +237,7 @@ def _widened(slope: float, interval: Interval, scatter: float) -> Interval:
     """The interval of an exponent, such that 95 % hold the truth for every law.
 
     The bootstrap alone knows nothing of what all starts share: an error that oscillates is seen at a few phases, the
-    same in each, which bends the line by its own standard error, ``scatter`` (`benchmarks/law_coverage.py` counts).
+    same in each, which bends the line by its own standard error, ``scatter`` (`validation/law_coverage.py` counts).
     """
     low, high = (math.hypot(max(part, 0.0), 2 * scatter) for part in (slope - interval[0], interval[1] - slope))
     return slope - low, slope + high

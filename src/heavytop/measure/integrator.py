@@ -16,7 +16,6 @@ from flint import arb
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import registry
-from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
@@ -30,7 +29,7 @@ from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
 from heavytop.precision import Array, OrderedRing, Precision, decimal_text, exact
-from heavytop.records import Law, Metric, Quantity, Series
+from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -41,14 +40,13 @@ _AGAIN_SECONDS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ChosenIntegrator:
-    """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka.
+    """The integrator of that name.
 
     setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
     source: where the integrator is defined, if it is neither built in nor a package's.
     """
 
     name: str = HEYOKA
-    fault: str = ""
     setting: tuple[str, Fraction] | None = None
     source: IntegratorSource | None = None
 
@@ -63,22 +61,22 @@ class ChosenIntegrator:
         return self.source or self.name
 
     @property
-    def can(self) -> Integrator:
+    def capabilities(self) -> Integrator:
         """What it can do."""
-        return FAULTS[self.fault].integrator if self.fault else described(self.which)
+        return described(self.which)
 
     @property
     def supports_ensemble(self) -> bool:
         """Whether many motions go side by side, which makes each cheap."""
-        return bool(self.can.ensemble)
+        return bool(self.capabilities.ensemble)
 
     @property
     def carries_attitude(self) -> bool:
         """Whether it declares that ξ rides along; not one that cannot be used."""
         if isinstance(self.source, Command):
             return self.source.attitude
-        if self.can.own:
-            return self.can.attitude
+        if self.capabilities.own:
+            return self.capabilities.attitude
         try:
             peer: Any = registry.ready(self.which)
         except (InputError, PeerFailed):
@@ -96,29 +94,25 @@ class ChosenIntegrator:
         *,
         xi: Sequence[Fraction] | None = None,
         again: bool = True,
-        **going_on: Any,
+        **resume: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
-        package is made twice, to see whether it is the same.  going_on: place and mark as in
+        package is made twice, to see whether it is the same.  resume: place and mark as in
         :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
-        if self.fault:
-            watch = observer or (lambda time, state: None)
-            spoilt: Trajectory = load(self.can.propagate)(top, start, times, precision, system=system, observer=watch)
-            return spoilt
-        if self.can.streams:
-            call = registry.propagator(self.name, {})
-            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **going_on)
+        if self.capabilities.streams:
+            call = registry.propagator(self.which, {})
+            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
             return run
         try:
             peer = registry.ready(self.which, self.setting)
             beside = {} if xi is None else {"xi": xi}
             run = peer(top, start, times, precision, system=system, **beside)
-            if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
+            if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
                 require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
         except Unsupported:
             raise
@@ -167,7 +161,9 @@ class ChosenIntegrator:
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
     ) -> tuple[Trajectory, list[TaylorStep]]:
         """As :func:`heavytop.integrate.heyoka.motions.first_steps`, where its steps are exposed."""
-        found: tuple[Trajectory, list[TaylorStep]] = load(self.can.steps)(top, start, until, precision, system=system)
+        found: tuple[Trajectory, list[TaylorStep]] = load(self.capabilities.steps)(
+            top, start, until, precision, system=system
+        )
         return found
 
 
@@ -249,6 +245,7 @@ def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list
         runs.append(run(len(runs) + 1))
     spent = [each.seconds["run"] for each in runs]
     figures = {"run": median(spent), "least": min(spent), "repeats": float(len(spent))}
+    figures |= next(({key: each.seconds[key]} for each in runs if (key := UNRESOLVED_SECONDS) in each.seconds), {})
     if how.band and len(spent) > 1 and min(spent) > 0:
         low, high = numpy.quantile(numpy.log10(spent), [0.025, 0.975])
         figures["band"] = round(float(high - low) / 2, 4)

@@ -228,6 +228,7 @@ class Motion:
             "flags": run.flags,
             "seconds": run.seconds,
             "amplification": run.amplification if math.isfinite(run.amplification) else None,
+            "digits_lost": dict(zip(("value", "followed"), run.digits_lost, strict=True)),
             "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
         }
         if run.problem.xi is not None:
@@ -257,12 +258,12 @@ class _Watcher:
         self.wanted = wanted
         self.kept: list[tuple[Fraction, Any]] = []
         start = (*problem.start.flat, *(problem.xi or ()))
-        self.angles = FollowedAngles(problem, setup.turned_exactly(start)) if follow else None
+        self.angles = FollowedAngles(problem, setup.exactly_in_body_axes(start)) if follow else None
 
     def __call__(self, time: Fraction, state: Any) -> None:
         self.reached(time)
         if self.angles is not None:
-            self.angles.see(time, self.setup.turned(state))
+            self.angles.see(time, self.setup.in_body_axes(state))
         if time in self.wanted:
             self.kept.append((time, state))
             self.drift(time, state)
@@ -312,7 +313,9 @@ def compute(
     attitudes = angles = None
     if watcher.angles is not None:
         angles_of = watcher.angles
-        again = registry.watched(integrator, options, lambda time, state: angles_of.see(time, setup.turned(state)))
+        again = registry.watched(
+            integrator, options, lambda time, state: angles_of.see(time, setup.in_body_axes(state))
+        )
         followed = watcher.angles.complete(lambda more: again(setup.top, setup.start, more, precision, system=system))
         attitudes = [line[6:] for line in texts]
         angles = [_angles(state, followed[time], precision) for time, state in zip(run.times, run.states, strict=True)]

@@ -26,8 +26,8 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.multiword.engines import accuracy, choose
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
-from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
@@ -145,7 +145,7 @@ def compute(
 ) -> list[ComputedReference]:
     """The motions at ``times``, from runs in about ``bits`` bits and in at least :data:`MORE_BITS` more.
 
-    times: as for :func:`heavytop.integrate.multiword.motions.propagate_words`.
+    times: as for :func:`heavytop.integrate.multiword.motions.propagate_multiword`.
     format_bits: those of the format that is measured, in which the motions may lose all digits; None for no format.
     effort: seconds of the model of the cost that each run may take; None for 60, or the 600 of an ensemble shared out.
     Raises OutOfReach if a run does not reach the last time within the effort.
@@ -250,8 +250,8 @@ def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int
     """In words; one by itself is not put into lanes."""
     targets = [number(time, problems[0].precision) for time in check_times(times)]
     if len(problems) == 1:
-        return [follow(problems[0], targets, step_limit=limit)]
-    return propagate_words_ensemble(problems, targets, step_limit=limit)
+        return [integrate_to_samples(problems[0], targets, step_limit=limit)]
+    return propagate_multiword_ensemble(problems, targets, step_limit=limit)
 
 
 @whole_evaluation

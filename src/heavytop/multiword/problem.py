@@ -36,7 +36,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 class Status(Enum):
     """How an advance ended."""
 
-    FINE = 0
+    OK = 0
     NON_FINITE = 1
     TOO_SMALL = 2
     CAPACITY = 3

@@ -1,8 +1,10 @@
-"""How much a motion itself amplifies a rounding error, whatever integrator follows it.
+"""How much a motion itself amplifies a rounding error, whatever integrator follows it and whenever it is made.
 
-A change δ of the start is Φ(t) δ at t, with the variational equation Φ' = J(y) Φ, Φ(0) = 1.  Motion and Φ are computed
-together by Taylor series in double; components of Ω are measured in units of the motion's :func:`rate`, so that neither
-the units of the data nor a renaming of the axes matters.  An estimate, not a bound.
+A change δ of the state at s is Φ(t, s) δ at t, with the variational equation Φ' = J(y) Φ, Φ(s, s) = 1.  A rounding on
+the way may grow by far more than one of the start: past a saddle that the motion leaves again, by the square.  Motion
+and Φ are computed together by Taylor series in double, and each step multiplies Φ(t, s) of every step's end s at once;
+no Φ is inverted.  Components of Ω are measured in units of the motion's :func:`rate`, so that neither the units of the
+data nor a renaming of the axes matters.  An estimate, not a bound.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ _TOLERANCE = 2.0**-52
 _STEPS = 1000
 """Beyond so many steps the amplification is extrapolated."""
 FOLLOWED = 1e14
-"""Beyond this amplification a motion computed in double is another one: it goes on as it has grown until there."""
+"""Beyond this loss a motion computed in double is another one: it goes on as it has grown until there."""
 _STEEPER = 100.0
 """Amplification grows like t along a regular motion; so many times more than that is taken as exponential growth."""
 _LARGEST = 1e300
@@ -55,28 +57,59 @@ def rate(system: System, parameters: Parameters, start: Sequence[Fraction]) -> F
 def amplification(
     system: System, parameters: Parameters, start: tuple[Fraction, ...], horizon: Fraction, steps: int = _STEPS
 ) -> float:
-    """The largest factor, up to the time ``horizon``, by which the motion has amplified a change of its start.
+    """The largest factor by which the motion has amplified a change of its state, between any two times up to
+    ``horizon``.
 
-    The root mean square over the six directions, with Ω in units of :func:`rate`; 1 at t = 0, at least 1.
+    The root mean square over the six directions, with Ω in units of :func:`rate`; at least 1.
     start: six exact numbers.  About (rate·t) on a regular motion, e^(rate t) near a saddle and on a chaotic one.
     After ``steps`` steps, or where all digits of double are lost, it is extrapolated: in proportion to t, or
     exponentially where it has grown 100 times more than that.  At most 1e300; infinite for data beyond double.
     """
-    scale = rate(system, parameters, start)
-    if not scale or not horizon:
-        return 1.0
     try:
-        span = float(scale * abs(horizon))
-        path = _path(system, parameters, start, horizon > 0)
+        largest, _, done, span = _followed(system, parameters, start, horizon, steps)
     except OverflowError:
         return math.inf
-    largest, done = path.largest(span, steps)
     if done >= span or not done:
         return min(largest, _LARGEST)
     further = span / done
     if largest <= _STEEPER * (1 + done):
         return min(largest * further, _LARGEST)
     return 10 ** min(math.log10(largest) * further, math.log10(_LARGEST))
+
+
+def loss(system: System, parameters: Parameters, start: tuple[Fraction, ...], horizon: Fraction) -> tuple[float, bool]:
+    """How many relative roundings of its components, made at the worst time, the error of a state amounts to by
+    ``horizon``; and whether that is followed so far, not a lower estimate.
+
+    A component that stays 0 is not rounded, and one that is small is by as much less: 1 of a motion that keeps to an
+    invariant plane, however unstable that is.  Arguments: as in :func:`amplification`.  Followed in the 64 bits of
+    numpy's longdouble, where it has them, as far as double does not do; a regular motion after many
+    steps in proportion to t.
+    """
+    try:
+        _, lost, done, span = _followed(system, parameters, start, horizon, _STEPS)
+        if lost > FOLLOWED:
+            _, lost, done, span = _followed(system, parameters, start, horizon, _STEPS, wide=True)
+    except OverflowError:
+        return 1.0, False
+    further = span / done if done and lost <= FOLLOWED else 1.0
+    return lost * max(1.0, further), done >= span
+
+
+def _followed(
+    system: System,
+    parameters: Parameters,
+    start: tuple[Fraction, ...],
+    horizon: Fraction,
+    steps: int,
+    wide: bool = False,
+) -> tuple[float, float, float, float]:
+    """Amplification and loss up to the time followed; that time, and the horizon, times the rate."""
+    scale = rate(system, parameters, start)
+    if not scale or not horizon:
+        return 1.0, 1.0, 0.0, 0.0
+    span = float(scale * abs(horizon))
+    return *_path(system, parameters, start, horizon > 0, wide).largest(span, steps), span
 
 
 def _units(scale: Fraction) -> list[Fraction]:
@@ -111,71 +144,83 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Double
     return linear, products
 
 
-def _nearest(value: mpq) -> float:
-    """The nearest double; raises OverflowError beyond them."""
-    return float(Fraction(int(value.numerator), int(value.denominator))) if value else 0.0
+def _nearest(value: mpq | Fraction) -> numpy.longdouble:
+    """The nearest longdouble; raises OverflowError beyond doubles."""
+    import numpy
+
+    exactly = Fraction(int(value.numerator), int(value.denominator))
+    first = float(exactly)
+    return numpy.longdouble(first) + numpy.longdouble(float(exactly - Fraction(first)))
 
 
 class _Path:
     """A motion and its Φ, followed by full steps as far as anyone asked; every format and horizon shares it.
 
-    Each entry of ``steps``: the time after a step, the state, Φ, the largest amplification up to it.
+    Each entry of ``_steps``: the time after a step, and the largest amplification and loss up to it.  ``_carried``:
+    Φ(t, s), shape (6, steps, 6), from the beginning s of each step; ``_sizes``: |y(s)|, shape (steps, 6).
     """
 
-    def __init__(self, linear: Doubles, products: Doubles, start: Sequence[float]) -> None:
+    def __init__(self, linear: Doubles, products: Doubles, start: Doubles) -> None:
         import numpy
 
         self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
-        self._steps = [(0.0, numpy.array(start), numpy.eye(6), 1.0)]
+        self._steps = [(0.0, 1.0, 1.0)]
+        kind = start.dtype
+        self._state, self._carried, self._sizes = start, numpy.empty((6, 0, 6), kind), numpy.empty((0, 6), kind)
+        self._most = FOLLOWED * 2.0 ** (numpy.finfo(kind).nmant - 52)
         self._ended = False
         self._lock = Lock()
 
-    def largest(self, span: float, steps: int) -> tuple[float, float]:
-        """The largest amplification up to ``span``, or as far as ``steps`` steps go, and how far that is."""
+    def largest(self, span: float, steps: int) -> tuple[float, float, float]:
+        """The largest amplification and loss up to ``span``, or as far as ``steps`` steps go, and how far that is."""
         with self._lock:
             while not self._ended and self._steps[-1][0] < span and len(self._steps) <= steps:
-                self._advance()
+                self._ended = not self._advance()
         place = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
         if place == min(len(self._steps), steps + 1):
-            time, *_, largest = self._steps[place - 1]
-            return largest, time
-        before = self._steps[max(place - 1, 0)]
-        time, *_, largest = self._step(before, span - before[0]) or before
-        return largest, time
+            time, largest, lost = self._steps[place - 1]
+            return largest, lost, time
+        (time, *before), (end, *after) = self._steps[max(place - 1, 0)], self._steps[place]
+        part = (span - time) / (end - time) if math.isfinite(end) and end > time else 0.0
+        largest, lost = (a ** (1 - part) * b**part for a, b in zip(before, after, strict=True))
+        return largest, lost, span
 
-    def _advance(self) -> None:
-        found = self._step(self._steps[-1], math.inf)
-        if found is not None:
-            self._steps.append(found)
-        self._ended = found is None or found[3] > FOLLOWED or found[0] == math.inf
-
-    def _step(self, before: _Step, most: float) -> _Step | None:
-        """One step, no longer than ``most``; None where Φ is beyond double or time stands still."""
+    def _advance(self) -> bool:
+        """One step; whether another may follow: not where Φ is beyond double, time stands still or all is lost."""
         import numpy
 
-        time, state, carried, largest = before
-        series = _series(self._linear, self._twice, state)
+        time, largest, lost = self._steps[-1]
+        series = _series(self._linear, self._twice, self._state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
-        step = min(most, _TOLERANCE ** (1 / _ORDER) / last if last else most)
-        if step == math.inf:
-            return math.inf, state, carried, largest
-        there = numpy.tensordot(step ** numpy.arange(_ORDER + 1), series, 1)
-        state, carried = there[:, 0], there[:, 1:] @ carried
-        size = math.sqrt(float((carried * carried).sum()) / 6)
-        if not math.isfinite(size) or time + step == time:
-            return None
-        return time + step, state, carried, max(largest, size)
-
-
-_Step: TypeAlias = "tuple[float, Doubles, Doubles, float]"
+        if not last:
+            self._steps.append((math.inf, largest, lost))
+            return False
+        step = _TOLERANCE ** (1 / _ORDER) / last
+        there = numpy.tensordot(self._state.dtype.type(step) ** numpy.arange(_ORDER + 1), series, 1)
+        carried = numpy.concatenate([self._carried, numpy.eye(6)[:, None]], 1).reshape(6, -1)
+        with numpy.errstate(over="ignore", invalid="ignore"):
+            self._carried = (there[:, 1:] @ carried).reshape(6, -1, 6)
+            self._sizes = numpy.concatenate([self._sizes, numpy.abs(self._state)[None]])
+            squares = (self._carried**2).sum(axis=0)
+            size = math.sqrt(squares.sum(axis=1).max() / 6)
+            error = math.sqrt((squares * self._sizes**2).sum(axis=1).max())
+        self._state = there[:, 0]
+        if not (math.isfinite(size) and math.isfinite(error)) or time + step == time:
+            return False
+        self._steps.append((time + step, max(largest, size), max(lost, error)))
+        return error <= self._most
 
 
 @lru_cache(maxsize=64)
-def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], forwards: bool) -> _Path:
-    """The path of a motion; backwards in time is forwards with the field reversed."""
+def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], forwards: bool, wide: bool) -> _Path:
+    """The path of a motion, in longdouble if wide; backwards in time is forwards with the field reversed."""
+    import numpy
+
     scale = rate(system, parameters, start)
     linear, products = _taken_apart(system, parameters, scale if forwards else -scale)
-    return _Path(linear, products, [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
+    state = numpy.array([_nearest(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
+    kind = numpy.longdouble if wide else numpy.float64
+    return _Path(linear.astype(kind), products.astype(kind), state.astype(kind))
 
 
 def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
@@ -187,7 +232,8 @@ def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
     """
     import numpy
 
-    found, jacobians = numpy.empty((_ORDER + 1, 6, 7)), numpy.empty((6, 6 * _ORDER))
+    kind = state.dtype
+    found, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
     found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)
     columns, shares = found.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import permutations
 from math import isqrt, lcm
+from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, quoted
@@ -21,6 +22,7 @@ from heavytop.precision import (
     rational_root,
     round_to,
     shown,
+    six_digits,
     vector,
 )
 from heavytop.top.attitude import Attitude, Rows, Three, multiplied, perpendicular, rotated, rotation_of, transposed
@@ -264,6 +266,21 @@ class Body:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    @classmethod
+    def from_file(
+        cls, path: str | Path, link: str | None = None, pivot: Iterable[Any] | None = None, gravity: Given = "9.81"
+    ) -> Body:
+        """The body of a URDF, MJCF, SDF, USD (text) or TOML file, or its link of that name, in the axes of the link.
+
+        pivot: the fixed point there; without it the ball joint of the body, or the origin.
+        Raises InputError for a file that cannot be read, for several bodies without ``link``, and for a tensor that no
+        body has, with the slip that makes it one.
+        """
+        from heavytop.top.body_files import read_body
+
+        found = read_body(Path(path), link).about(None if pivot is None else vector(pivot, "pivot"))
+        return cls(found.mass, gravity, found.centre, found.six, PIVOT if found.at_pivot else CENTRE)
+
     def __repr__(self) -> str:
         texts = [[exact_text(value) for value in row] for row in self.tensor]
         extra = "" if self.rotor is None else f", rotor={_texts(self.rotor)}"
@@ -396,9 +413,20 @@ def _warnings_about_centre(body: Body) -> list[str]:
     whole = dot(vector(second[0], "row"), cross(vector(second[1], "row"), vector(second[2], "row")))
     if min(second[0][0], second[1][1], second[2][2], *pairs, whole) >= 0:
         return []
-    moments = ", ".join(shown(central[i][i]) for i in range(3))
+    moments = ", ".join(six_digits(value) for value in _principal_moments(central))
     meant = "" if body.about == CENTRE else f' If it was meant about it, give about = "{CENTRE}".'
-    return [f"The inertia tensor about the centre of mass, diagonal {moments}, is not that of a rigid body.{meant}"]
+    return [f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's.{meant}"]
+
+
+def _principal_moments(tensor: Tensor) -> list[Fraction]:
+    """In increasing order, to the digits of double; exact of a diagonal tensor."""
+    import numpy
+
+    if not any(tensor[i][j] for i, j in ((0, 1), (0, 2), (1, 2))):
+        return sorted(tensor[i][i] for i in range(3))
+    size = max(abs(value) for row in tensor for value in row)
+    values = numpy.linalg.eigvalsh([[float(value / size) for value in row] for row in tensor])
+    return [Fraction(value) * size for value in values.tolist()]
 
 
 def _require_positive(tensor: Tensor) -> None:
@@ -435,9 +463,19 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     Raises InputError for what is missing, contradicts another, or is no body or start.
     """
     given = {key: value for key, value in values.items() if value is not None and value != []}
+    if "file" in given:
+        return body_of(given), _start(given, normalize)
     for key in ("inertia", "centre"):
         _require(given, key)
     return _body(given), _start(given, normalize)
+
+
+def body_of(given: Mapping[str, Any]) -> Body:
+    """The body of a ``file``, and ``link``, with the gravity that stands beside it; raises InputError for more keys."""
+    twice = [key for key in BODY if key in given and key != "gravity"]
+    if twice:
+        raise InputError(f"file and {twice[0]} were given.", f"The file says {twice[0]}: leave it out.")
+    return Body.from_file(given["file"], given.get("link"), gravity=given.get("gravity", "9.81"))
 
 
 def _require(given: Mapping[str, Any], key: str) -> Any:

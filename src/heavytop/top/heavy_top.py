@@ -15,15 +15,16 @@ from heavytop.precision import (
     MOST_MEMBERS,
     Given,
     Vector,
+    cache_last_call,
     decimal_text,
     dot,
     exact,
     exact_text,
-    last_call,
     ordered,
     physical,
     round_to,
     shown,
+    six_digits,
     vector,
 )
 from heavytop.top.attitude import Attitude, rotated, transposed
@@ -100,7 +101,7 @@ class HeavyTop:
             others = sum(self.inertia) - value
             if value > others:
                 found.append(
-                    f"I{axis + 1} = {shown(value)} exceeds the sum {shown(others)} of the other two: "
+                    f"I{axis + 1} = {six_digits(value)} exceeds the sum {six_digits(others)} of the other two: "
                     "no rigid body has such moments."
                 )
         return found
@@ -114,7 +115,7 @@ def require_physical(top: HeavyTop, start: State) -> None:
             physical(value, what)
 
 
-@last_call
+@cache_last_call
 def _require_physical_top(top: HeavyTop) -> None:
     named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre, "rotor": top.rotor or ()}
     for what, values in named.items():

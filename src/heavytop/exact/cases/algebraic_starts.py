@@ -21,7 +21,7 @@ from flint import arb
 from heavytop.errors import InputError
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import IntervalCurve, OneGapMotion, gaps, value
-from heavytop.exact.closed_form import kept
+from heavytop.exact.closed_form import cached_per_precision
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, WithBearing
@@ -110,12 +110,12 @@ class AlgebraicMotion(WithBearing):
         return _largest(self.state(time, bits), other, bits)
 
 
-@kept
+@cached_per_precision
 def _azimuth(motion: AlgebraicMotion) -> Azimuth:
     return _motion(motion).azimuth()
 
 
-@kept
+@cached_per_precision
 def _motion(motion: AlgebraicMotion) -> OneGapMotion:
     q, r = motion.curve.squares(motion.place)
     return OneGapMotion.of(motion.curve, motion.place, (motion.signs[0] * (q > 0), motion.signs[1] * (r > 0)))

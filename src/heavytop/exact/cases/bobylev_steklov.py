@@ -28,10 +28,10 @@ from heavytop.exact.closed_form import (
     ClosedForm,
     across,
     balls,
+    cached_per_precision,
     carried_xi,
     half_angle,
     instant,
-    kept,
     rotate,
     sign,
     taylor,
@@ -196,7 +196,7 @@ def _height(case: BobylevSteklov) -> Fraction:
     return case.top.moment[0] * case.start.gamma[0] + case.top.inertia[2] * case.start.omega[2] ** 2 / 2
 
 
-@kept
+@cached_per_precision
 def _lattice(case: BobylevSteklov) -> _Lattice | None:
     """None where nothing moves."""
     if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
@@ -227,7 +227,7 @@ def _lattice(case: BobylevSteklov) -> _Lattice | None:
     return _Lattice(functions, rate, sign(-speed) * side * origin, amplitude, steep, crossing, shares)
 
 
-@kept
+@cached_per_precision
 def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
     """What does not depend on the time in the attitude."""
     return prepared_axis(case.top, case.start, across(case.start.gamma))

@@ -39,7 +39,16 @@ from flint import acb, arb
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.kovalevskaya import Interval, along_gamma, level_vector, ordered, pole
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, PhiRoot, WorkingStart, start_of
-from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, initial_xi, instant, kept, tanh_sech
+from heavytop.exact.closed_form import (
+    ClosedForm,
+    WithAngles,
+    balls,
+    cached_per_precision,
+    constant,
+    initial_xi,
+    instant,
+    tanh_sech,
+)
 from heavytop.exact.elliptic.quartic import PreparedMotion, QuarticMotion
 from heavytop.exact.flint.balls import BallLike, Undecided, ball, coefficient, current_length, series_length, to_bits
 from heavytop.exact.separable.abel import phase_at
@@ -211,7 +220,7 @@ def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
     return n1 * n1 + n2 * n2, n1 * w1 + n2 * w2, n1 * w2 - n2 * w1, w1 * w1 + w2 * w2
 
 
-@kept
+@cached_per_precision
 def _prepared(case: Delone) -> tuple[PreparedMotion, list[arb]]:
     square, along, across, weight = _constants(case)
     spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
@@ -227,7 +236,7 @@ def _prepared(case: Delone) -> tuple[PreparedMotion, list[arb]]:
     return QuarticMotion(quartic, Fraction(0), -across / (2 * square)).prepared(), balls(_constants(case))
 
 
-@kept
+@cached_per_precision
 def _azimuth(case: Delone) -> DeloneAzimuth:
     initial_xi(case.start.gamma)  # raises InputError for γ = 0
     return DeloneAzimuth.of(KovalevskayaLevel.of(case.top, case.start))

@@ -27,7 +27,7 @@ from typing import Any
 from flint import acb, arb, arb_series
 
 from heavytop.errors import InputError
-from heavytop.exact.closed_form import ClosedForm, kept, sign
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, sign
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -301,7 +301,7 @@ def _data(motion: Any) -> Data:
     return data
 
 
-@kept
+@cached_per_precision
 def _swing(motion: Any) -> _Swing:
     if isinstance(motion, AlgebraicDokshevich):
         return motion.swing()
@@ -312,7 +312,7 @@ def _swing(motion: Any) -> _Swing:
     return _Swing(balls, ball(x * x / (square * unit)).sqrt(), ball(z) / ball(unit).sqrt(), sign(x))
 
 
-@kept
+@cached_per_precision
 def _frame(motion: Any) -> _Frame:
     if isinstance(motion, AlgebraicDokshevich):
         return motion.frame()
@@ -324,7 +324,7 @@ def _frame(motion: Any) -> _Frame:
     return _Frame(axes, ball(skew) * unit.sqrt(), unit.sqrt(), ball(skew) * unit / size)
 
 
-@kept
+@cached_per_precision
 def _azimuth(motion: Any) -> Azimuth:
     return _swing(motion).azimuth()
 

@@ -30,7 +30,7 @@ from typing import Any
 
 from flint import acb, arb
 
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, kept, rotate, sign, unit
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, cached_per_precision, rotate, sign, unit
 from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.elliptic.weierstrass import imag, real
 from heavytop.exact.flint.balls import BallLike, Balls, ball
@@ -107,7 +107,7 @@ class _Lattice:
         return omega, carry
 
 
-@kept
+@cached_per_precision
 def _lattice(case: Euler) -> _Lattice | None:
     """None for a steady rotation."""
     if case.steady:

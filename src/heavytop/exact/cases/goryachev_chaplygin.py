@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.cases.lagrange import Reduced, polynomial
-from heavytop.exact.closed_form import ClosedForm, constant, kept
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, constant
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -612,12 +612,12 @@ class Sretensky(GoryachevChaplygin):
     body = *GoryachevChaplygin.body, AXIAL_ROTOR
 
 
-@kept
+@cached_per_precision
 def _attitude(case: GoryachevChaplygin) -> GoryachevChaplyginAttitude:
     return GoryachevChaplyginAttitude.of(_motion(case))
 
 
-@kept
+@cached_per_precision
 def _motion(case: GoryachevChaplygin) -> GoryachevMotion:
     return GoryachevMotion.of(GoryachevLevel.of(case.top, case.start))
 

@@ -55,7 +55,7 @@ from flint import acb, arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevLevel, separated_start, size_of
 from heavytop.exact.cases.one_interval import in_units
-from heavytop.exact.closed_form import ClosedForm, constant, instant, kept
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, constant, instant
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.flint.balls import BallLike, Balls, Undecided, ball, series_length
 from heavytop.exact.separable.oscillation import Bearing, WithBearing
@@ -119,7 +119,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         return Bearing.of(gamma, momentum, place.azimuth())
 
 
-@kept
+@cached_per_precision
 def _motion(case: GoryachevChaplyginRest) -> RestMotion | UprightMotion:
     level = GoryachevLevel.of(case.top, case.start)
     return RestMotion.of(level) if _room(level) else UprightMotion.of(level)

@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, kept, rotate, taylor, turned
+from heavytop.exact.closed_form import ClosedForm, balls, cached_per_precision, initial_xi, rotate, taylor, turned
 from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
 from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, to_bits
@@ -170,7 +170,7 @@ class _Prepared:
     gamma: _Fixed | None
 
 
-@kept
+@cached_per_precision
 def _prepared(motion: Gyrostat) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
@@ -181,7 +181,7 @@ def _prepared(motion: Gyrostat) -> _Prepared:
     return _Prepared(prepared, prepared.companions(winding, *both), inverses, gamma)
 
 
-@kept
+@cached_per_precision
 def _units(motion: Gyrostat) -> list[_Fixed]:
     """The axes of the body at t = 0."""
     return [_fixed(motion, _prepared(motion).motion, unit) for unit in _UNITS]

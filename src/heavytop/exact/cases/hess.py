@@ -35,7 +35,16 @@ from heavytop.exact.cases.hess_transfer import System2, Transfer, plan
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import in_units
 from heavytop.exact.cases.pendulum import Swing, swing
-from heavytop.exact.closed_form import Carry, ClosedForm, WithAttitude, between, constant, kept, sign, tanh_sech
+from heavytop.exact.closed_form import (
+    Carry,
+    ClosedForm,
+    WithAttitude,
+    between,
+    cached_per_precision,
+    constant,
+    sign,
+    tanh_sech,
+)
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -174,12 +183,12 @@ class Hess(WithBearing, ClosedForm):
         return motion.bearing(_azimuth(self), ball(motion.level.rate * time))
 
 
-@kept
+@cached_per_precision
 def _azimuth(case: Hess) -> Azimuth:
     return _motion(case).azimuth()
 
 
-@kept
+@cached_per_precision
 def _motion(case: Hess) -> HessMotion:
     return HessMotion.of(HessLevel.of(case.top, case.start))
 
@@ -349,7 +358,7 @@ class HessPendulum(WithAttitude):
         return [size * e / i for e, i in zip(frame[0], path.inertia, strict=True)], between(began, frame)
 
 
-@kept
+@cached_per_precision
 def _path(case: HessPendulum) -> tuple[_Path, list[list[arb]]]:
     path = _Path.of(case.top, case.start)
     return path, path.at(arb(0))[0]

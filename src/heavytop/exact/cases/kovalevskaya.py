@@ -44,7 +44,7 @@ from heavytop.exact.cases.kovalevskaya_theta import (
     separation,
     start_of,
 )
-from heavytop.exact.closed_form import ClosedForm, kept
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -579,7 +579,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         return to_bits(evaluate, bits, time, 1)
 
 
-@kept
+@cached_per_precision
 def _motion(case: Kovalevskaya) -> AbelMotion | ThetaMotion:
     level = KovalevskayaLevel.of(case.top, case.start)
     try:
@@ -590,7 +590,7 @@ def _motion(case: Kovalevskaya) -> AbelMotion | ThetaMotion:
     return ThetaMotion.of(level)
 
 
-@kept
+@cached_per_precision
 def _attitude(case: Kovalevskaya) -> KovalevskayaAttitude:
     motion = _motion(case)
     if isinstance(motion, ThetaMotion):
@@ -598,7 +598,7 @@ def _attitude(case: Kovalevskaya) -> KovalevskayaAttitude:
     return KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
 
 
-@kept
+@cached_per_precision
 def _thetas(case: Kovalevskaya) -> ThetaMotion:
     return ThetaMotion.of(KovalevskayaLevel.of(case.top, case.start))
 

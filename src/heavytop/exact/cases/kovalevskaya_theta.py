@@ -38,8 +38,8 @@ from heavytop.exact.flint.balls import (
     coefficient,
     current_length,
     midpoint,
+    nearest_integer,
     series_length,
-    whole,
 )
 from heavytop.top.equations import Parameters, heavy_top, kovalevskaya
 
@@ -423,8 +423,8 @@ class ThetaMotion:
         tau = self.curve.tau
         y = arb_mat([[tau[i, j].imag for j in (0, 1)] for i in (0, 1)])
         parts = (y.inv() * arb_mat([[z[0, 0].imag], [z[1, 0].imag]])).entries()
-        z = z - tau * acb_mat([[2 * whole(part / 2)] for part in parts])
-        return z - acb_mat([[2 * whole(z[i, 0].real / 2)] for i in (0, 1)])
+        z = z - tau * acb_mat([[2 * nearest_integer(part / 2)] for part in parts])
+        return z - acb_mat([[2 * nearest_integer(z[i, 0].real / 2)] for i in (0, 1)])
 
     def _thetas(self, z: acb_mat) -> list[Any]:
         """All 16 as series along v."""

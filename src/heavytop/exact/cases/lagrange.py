@@ -40,10 +40,10 @@ from heavytop.exact.closed_form import (
     ClosedForm,
     across,
     balls,
+    cached_per_precision,
     carried_xi,
     initial_xi,
     instant,
-    kept,
     rotate,
     taylor,
     turned,
@@ -214,7 +214,7 @@ class _Prepared:
         return [first * u + second * v + third * a for u, v, a in parts]
 
 
-@kept
+@cached_per_precision
 def _prepared(motion: Lagrange) -> _Prepared:
     prepared, winding, (across, axis) = motion.quartic().prepared(), motion.winding(), motion.frame
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
@@ -240,7 +240,7 @@ def _along(direction: Vector, rows: Sequence[Sequence[Fraction]]) -> list[Fracti
     return [dot(direction, values) for values in zip(*rows, strict=True)]
 
 
-@kept
+@cached_per_precision
 def _axis(motion: Lagrange) -> Companions:
     """h = a·Z of Z = ξ + iη, η = γ × ξ/s, for the vector ξ that is :func:`across` γ at t = 0, fixed in space."""
     vector = across(motion.start.gamma)

@@ -28,7 +28,7 @@ from flint import acb, arb, arb_series, fmpq, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.lagrange import polynomial
-from heavytop.exact.closed_form import ClosedForm, kept
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -359,12 +359,12 @@ class Steklov(WithBearing, ClosedForm):
         return _motion(self).bearing(_azimuth(self), ball(rate * time))
 
 
-@kept
+@cached_per_precision
 def _azimuth(case: Steklov) -> Azimuth:
     return _motion(case).azimuth()
 
 
-@kept
+@cached_per_precision
 def _motion(case: Steklov) -> OneGapMotion:
     rate, _ = _units(case.top, case.start)
     p, q, r = (w / rate for w in case.start.omega)

@@ -25,9 +25,9 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.closed_form import Carry, WithAttitude, about, kept, sign
+from heavytop.exact.closed_form import Carry, WithAttitude, about, cached_per_precision, sign
 from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
-from heavytop.exact.flint.balls import BallLike, Balls, ball, whole
+from heavytop.exact.flint.balls import BallLike, Balls, ball, nearest_integer
 from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
@@ -111,7 +111,7 @@ class Swing:
         quarter = self.functions.quarter
         if not self.rotating or quarter is None:
             return arb.atan2(sine, cosine)
-        turns = whole((self.rate * time + self.origin) / (2 * quarter))
+        turns = nearest_integer((self.rate * time + self.origin) / (2 * quarter))
         side = -1 if turns % 2 else 1
         return arb.atan2(side * sine, side * cosine) + self.amplitude * turns * arb.pi()
 
@@ -160,7 +160,7 @@ class _Lattice:
         return [-speed * e for e in self.axis], partial(about, self.axis, c * c - s * s, -2 * c * s)
 
 
-@kept
+@cached_per_precision
 def _lattice(case: Pendulum) -> _Lattice | None:
     """None where it stands still."""
     if case.steady:

@@ -34,7 +34,16 @@ from typing import Any
 from flint import arb, arb_mat, fmpq_mat
 
 from heavytop.errors import LevelNotDone
-from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor, without_turning
+from heavytop.exact.closed_form import (
+    ClosedForm,
+    balls,
+    cached_per_precision,
+    initial_xi,
+    instant,
+    rotate,
+    taylor,
+    without_turning,
+)
 from heavytop.exact.elliptic.quartic import lift
 from heavytop.exact.elliptic.weierstrass import (
     Lattice,
@@ -292,7 +301,7 @@ def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     return found
 
 
-@kept
+@cached_per_precision
 def _curve(case: ZhukovskyVolterra) -> _Curve:
     exact = _exact(case)
     order = _POLE if exact.denominator[4] else _POLE - 1
@@ -301,7 +310,7 @@ def _curve(case: ZhukovskyVolterra) -> _Curve:
     return _Curve(arb_mat(rows), order, body)
 
 
-@kept
+@cached_per_precision
 def _lattice(case: ZhukovskyVolterra) -> Lattice:
     found = from_invariants(*case.invariants())
     assert isinstance(found, Lattice)
@@ -350,12 +359,12 @@ class _Fixed:
         return found
 
 
-@kept
+@cached_per_precision
 def _gamma(case: ZhukovskyVolterra) -> _Fixed:
     return _fixed(case, case.start.gamma)
 
 
-@kept
+@cached_per_precision
 def _axes(case: ZhukovskyVolterra) -> list[_Fixed]:
     """The axes of the body at t = 0."""
     return [_fixed(case, unit) for unit in _UNITS]

@@ -24,7 +24,7 @@ from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series
 
 from heavytop.exact.closed_form import constant
 from heavytop.exact.elliptic.weierstrass import Theta, real
-from heavytop.exact.flint.balls import BallLike, coefficient, current_length, series_length, whole
+from heavytop.exact.flint.balls import BallLike, coefficient, current_length, nearest_integer, series_length
 
 _I = acb(0, 1)
 _REACH = arb(1.25)  # quarter periods: the largest reduced argument
@@ -59,7 +59,7 @@ class Jacobi:
         """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no series needs it."""
         if self.period is None:
             return u, 0
-        turns = whole(constant(u) / self.period[0])
+        turns = nearest_integer(constant(u) / self.period[0])
         rest = u - turns * self.period[0]
         return (rest, turns) if abs(constant(rest)) < self.period[1] else (arb("nan"), 0)
 

@@ -457,7 +457,7 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
 
 
 @whole_evaluation
-def whole(value: arb) -> int:
+def nearest_integer(value: arb) -> int:
     """The integer nearest to the middle of a ball; 0 if it is not finite."""
     found = (value + _HALF).mid().floor().unique_fmpz()
     return 0 if found is None else int(found)

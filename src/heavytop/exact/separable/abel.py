@@ -27,7 +27,7 @@ from heavytop.exact.flint.balls import (
     Undecided,
     current_length,
     current_precision,
-    whole,
+    nearest_integer,
     working_precision,
 )
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
@@ -127,7 +127,7 @@ class Inversion:
             cells = periods.solve(aim).entries()
         except ZeroDivisionError:
             return lost
-        turns = [whole(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
+        turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
         rest = aim - periods * arb_mat([[n] for n in turns])
         first = [float(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         if not all(cell.is_finite() for cell in cells):

@@ -35,7 +35,7 @@ from flint import acb, arb, arb_mat, arb_poly, fmpq
 from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.closed_form import Evaluated, constant, kept, tanh_sech
+from heavytop.exact.closed_form import Evaluated, cached_per_precision, constant, tanh_sech
 from heavytop.exact.flint.balls import Balls, current_precision, to_bits, working_precision
 from heavytop.precision import cross, dot
 
@@ -302,8 +302,8 @@ def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     if not np.isfinite(rows).all():
         return rows
     sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
-    kept = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
-    return rows[:, : kept[-1] + 1] if kept.size else rows[:, :1]
+    cached_per_precision = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
+    return rows[:, : cached_per_precision[-1] + 1] if cached_per_precision.size else rows[:, :1]
 
 
 # A variable that leaves and approaches a double root of a polynomial, and its Abel integrals with a proven error.
@@ -498,6 +498,6 @@ class WithBearing(Evaluated):
         return to_bits(evaluate, bits, self.own_time(time))
 
 
-@kept
+@cached_per_precision
 def _began(case: WithBearing) -> arb:
     return case.bearing(Fraction(0)).azimuth

@@ -29,7 +29,7 @@ def audit(
 ) -> int:
     """Prove or refute a claimed motion, by equation.
 
-    Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
+    Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 2 to 7
     seconds.  With --library: 0 if every verdict is the expected one, 1 if one is not, 3 if one is undecided.
     """
     from heavytop.features.claims.audit.audit import PAPER, only_branch, require_branch

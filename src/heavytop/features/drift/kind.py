@@ -13,7 +13,7 @@ from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
-from heavytop.integrate.trajectory import Place, Problem, Trajectory
+from heavytop.integrate.trajectory import Problem, ResumePoint, Trajectory
 from heavytop.kind import Kind, with_explanation
 from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
@@ -74,6 +74,7 @@ class DriftTable(PlanTable, tag=NAME):
                 case,
                 *times,
                 options=Extent(self.attitude, self.noise),
+                request={"attitude": str(self.attitude)},
             )
             for case in map(find, self.cases)
             for precision, horizon, times in runs
@@ -112,14 +113,14 @@ class DriftKind(Kind):
             scorer.restore(before["measures"])
             _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], before["run"]["samples"])
 
-        def mark(place: Place) -> None:
+        def mark(place: ResumePoint) -> None:
             if saved.due():
                 saved.save({"run": place.content(precision), "measures": scorer.content()})
 
-        going_on: dict[str, Any] = {}
+        resume: dict[str, Any] = {}
         if task.integrator.supports_ensemble:
-            going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
-        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
+            resume = {"place": None if before is None else ResumePoint.of(before["run"], precision), "mark": mark}
+        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **resume)
         return _row(task, run, scorer)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:

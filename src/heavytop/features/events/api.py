@@ -22,13 +22,13 @@ from heavytop.features.events.functions import (
     Section,
     event_function,
     first_term,
-    turned,
+    in_body_axes,
 )
 from heavytop.features.events.located import locate
 from heavytop.features.events.proven import proven_events
 from heavytop.integrate.registry import Setup, named
 from heavytop.measure.reference import DIGITS, Ball
-from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
+from heavytop.precision import DOUBLE, Precision, as_integer, exact, exact_text, physical
 from heavytop.top.amplification import amplification
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, System, area, energy
@@ -144,7 +144,15 @@ def events(
         )
     body, state = arguments.motion(top, start, of_any_size=True)
     return known_events(
-        body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system, body), most, reached
+        body,
+        state,
+        _until(until),
+        which,
+        way,
+        as_integer(digits, "digits"),
+        arguments.system(system, body),
+        most,
+        reached,
     )
 
 
@@ -166,7 +174,7 @@ def computed_events(
     setup = Setup.of(top, start, form, system)
     axes = None if setup.frame is None else setup.frame.axes
     if function.rational:
-        own = function if axes is None else turned(function, axes)
+        own = function if axes is None else in_body_axes(function, axes)
         first_term(own, system, system.parameters(setup.top, setup.start), setup.start.flat)
     name = named(integrator)
     run = dense(name, setup.problem, until, tolerance, step_limit)
@@ -292,7 +300,7 @@ def _until(value: Number) -> Fraction:
 
 def require_direction(value: int) -> int:
     """1, -1 or 0; raises InputError for any other."""
-    found = whole(value, "direction")
+    found = as_integer(value, "direction")
     if found not in (-1, 0, 1):
         raise InputError(f"direction = {quoted(found)} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")
     return found

@@ -227,7 +227,7 @@ class OfWords(Dense):
             began = run.time
             status = run.advance(goal, 1)
             self.steps, self.order = run.steps, run.order
-            if status is not Status.FINE:
+            if status is not Status.OK:
                 self.outcome = OUTCOMES[status]
                 return
             rows = _rows(run)

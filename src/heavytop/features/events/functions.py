@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -290,7 +291,7 @@ def _as_ratio(value: Any) -> Ratio:
     return value if isinstance(value, Ratio) else Ratio.of(value)
 
 
-def turned(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
+def in_body_axes(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
     """The function of the state in axes e of which the given ones are A e, the rows of A being ``axes``."""
     if not function.rational:
         return function
@@ -413,6 +414,7 @@ class Events(Tabular):
     be missed.
     times: numbers of the format, shape (n,).  states: at them, shape (n, 6), Ω1 Ω2 Ω3 γ1 γ2 γ3.
     directions: 1 where the function rises with time, −1 where it falls, shape (n,).
+    discontinuities: (time, "jump" or "pole") where a sampled function changes sign and |f| does not go to 0: no events.
     until: the exact time up to which was looked; outcome, time_reached, steps, order, seconds, flags: as of a
     trajectory.
     """
@@ -432,9 +434,19 @@ class Events(Tabular):
     order: int
     seconds: dict[str, float] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
+    discontinuities: tuple[tuple[Any, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def discontinuity_text(self) -> str:
+        """How often the function jumps or has a pole where it changes sign, and when first; "" for never."""
+        if not self.discontinuities:
+            return ""
+        kinds = Counter(kind for _, kind in self.discontinuities)
+        counted = " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items())
+        first = decimal_text(exact(self.discontinuities[0][0]), 6)
+        return f"no events, though the sign changes: {counted} of the function, first at t = {first}"
 
     def texts(self) -> list[list[str]]:
         """The states as full-precision decimal strings, shape (n, 6)."""
@@ -459,6 +471,9 @@ class Events(Tabular):
             "times": self.time_texts(),
             "directions": [int(value) for value in self.directions],
             "states": self.texts(),
+            "discontinuities": [
+                {"time": native_text(time, self.problem.precision), "kind": kind} for time, kind in self.discontinuities
+            ],
         }
 
     def _table(self) -> TitledTable:
@@ -472,7 +487,7 @@ class Events(Tabular):
             f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
             f"t = 0 to {decimal_text(self.until, 6)}"
         )
-        notes = [_EXPLAINED[self.guarantee]]
+        notes = [_EXPLAINED[self.guarantee], *filter(None, [self.discontinuity_text()])]
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"{self.outcome.message}; looked up to t = {decimal_text(self.time_reached, 6)} only")
         return TitledTable(title, ("t", "sign", *NAMES), LazyLines(len(self), line), notes)

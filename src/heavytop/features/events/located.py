@@ -24,8 +24,8 @@ from heavytop.features.events.functions import (
     Events,
     arrays,
     composed,
+    in_body_axes,
     terms_of,
-    turned,
 )
 from heavytop.integrate.multiword.motions import native_state
 from heavytop.integrate.trajectory import Outcome
@@ -38,15 +38,21 @@ _GUARD_BITS = 8
 _SAMPLES = 48
 """Samples of a step for a callable that needs numbers; steps of a Taylor method turn the body by less than a radian."""
 _NARROWED = 60
+_POLE = 2.0**10
+"""|f| grows by so much towards a pole, in a bisection by far more digits."""
 _ROUNDING, _TINY = 2.0**-36, 1e-250
 
 
 class Found(NamedTuple):
-    """An event in a piece: at s, rising or not in the direction of the run."""
+    """A change of sign in a piece: at s, rising or not in the direction of the run.
+
+    discontinuity: "jump" or "pole" where |f| does not go to 0 there; "" of an event.
+    """
 
     piece: Piece
     s: fmpq
     rising: bool
+    discontinuity: str = ""
 
 
 def locate(
@@ -67,7 +73,7 @@ def locate(
     Raises InputError where a callable raises, or gives no finite number.
     """
     precision, forwards = run.problem.precision, run.until > 0
-    inner = function if axes is None else turned(function, axes)
+    inner = function if axes is None else in_body_axes(function, axes)
     found_in = _watched(run, reached)
     events = (
         _of_rational(inner, found_in, precision)
@@ -77,8 +83,12 @@ def locate(
     times: list[Any] = []
     states: list[Any] = []
     directions: list[int] = []
+    discontinuities: list[tuple[Any, str]] = []
     outcome = None
     for found in events:
+        if found.discontinuity:
+            discontinuities.append((_native_time(found.piece.time(found.s), precision), found.discontinuity))
+            continue
         sign = 1 if found.rising == forwards else -1
         if direction not in (0, sign):
             continue
@@ -105,6 +115,7 @@ def locate(
         run.order,
         run.seconds,
         run.flags,
+        tuple(discontinuities),
     )
 
 
@@ -234,13 +245,15 @@ def _of_callable(sampler: _Sampler, pieces: Iterator[Piece]) -> Iterator[Found]:
         for n, (s, value) in enumerate(zip(places, values, strict=True)):
             now = _sign(value)
             if now and sign and now != sign:
-                at = places[0] if n == 0 else _bisected(sampler, piece, places[n - 1], s, sign)
-                yield Found(piece, at, now > 0)
+                if n == 0:
+                    yield Found(piece, places[0], now > 0)
+                else:
+                    yield _bisected(sampler, piece, (places[n - 1], s), sign)
             elif now and 0 < n < _SAMPLES and abs(values[n - 1]) > abs(value) < abs(values[n + 1]):
                 other = _narrowed(sampler, piece, places[n - 1], s, places[n + 1], now)
                 if other is not None and now == sign == _sign(values[n + 1]):
-                    yield Found(piece, _bisected(sampler, piece, places[n - 1], other, now), now < 0)
-                    yield Found(piece, _bisected(sampler, piece, other, places[n + 1], -now), now > 0)
+                    yield _bisected(sampler, piece, (places[n - 1], other), now)
+                    yield _bisected(sampler, piece, (other, places[n + 1]), -now)
             sign = now or sign
     if not sign and piece is not None:
         raise InputError(
@@ -253,15 +266,34 @@ def _sign(value: Any) -> int:
     return int(value > 0) - int(value < 0)
 
 
-def _bisected(sampler: _Sampler, piece: Piece, low: fmpq, high: fmpq, before: int) -> fmpq:
-    """Where the sign changes between ``low``, with the sign ``before``, and ``high``."""
-    for _ in range(sampler.precision.bits + _GUARD_BITS):
+def _bisected(sampler: _Sampler, piece: Piece, ends: tuple[fmpq, fmpq], before: int) -> Found:
+    """Where the sign changes between the two ends, at the first of which it is ``before``.
+
+    |f| goes to 0 at a zero, so it is smaller at the end of the bisection than in its middle, unless both are roundings.
+    """
+    (low, high), bits = ends, sampler.precision.bits + _GUARD_BITS
+    values = [sampler.value(piece, s) for s in ends]
+    sizes = [_size(values)]
+    for _ in range(bits):
         middle = (low + high) / 2
-        now = _sign(sampler.value(piece, middle))
+        value = sampler.value(piece, middle)
+        now = _sign(value)
         if now == 0:
-            return middle
-        low, high = (middle, high) if now == before else (low, middle)
-    return (low + high) / 2
+            return Found(piece, middle, before < 0)
+        if now == before:
+            low, values[0] = middle, value
+        else:
+            high, values[1] = middle, value
+        sizes.append(_size(values))
+    first, halfway, last = sizes[0], sizes[bits // 2], sizes[-1]
+    kind = ""
+    if last > first * 2.0 ** -(bits // 2) and 2 * last > halfway:
+        kind = "pole" if last > _POLE * first else "jump"
+    return Found(piece, (low + high) / 2, before < 0, kind)
+
+
+def _size(values: Sequence[Any]) -> Any:
+    return max(abs(value) for value in values)
 
 
 def _narrowed(sampler: _Sampler, piece: Piece, low: fmpq, middle: fmpq, high: fmpq, sign: int) -> fmpq | None:

@@ -35,9 +35,9 @@ from heavytop.features.events.functions import (
     by_omega,
     composed,
     first_term,
+    in_body_axes,
     rate_along,
     terms_of,
-    turned,
 )
 from heavytop.precision import decimal_text
 
@@ -206,8 +206,8 @@ def proven_events(
     cannot decide whether there is an event.
     """
     wanted = ceil(digits * log2(10)) + _GUARD_BITS
-    axes = None if resolved is None or not resolved.turned else resolved.axes
-    inner = function if axes is None else turned(function, axes)
+    axes = None if resolved is None or not resolved.is_rotated else resolved.axes
+    inner = function if axes is None else in_body_axes(function, axes)
     order, sign = (0, 0) if solution.uncertainty is not None else _begins(solution, inner)
     undecided: _Undecided | None = None
     for attempt in range(_ATTEMPTS):

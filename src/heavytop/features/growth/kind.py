@@ -108,7 +108,10 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
     subject = computed(integrator, seed=run.seed, **asked)
     key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
-    return Task(key, "", f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
+    reference = "" if run.reference is None else parse(run.reference).name
+    request = {"attitude": str(run.attitude), "reference": reference}
+    title = f"{integrator} {subject.variant}".rstrip()
+    return Task(key, "", title, case, times, times, run, request=request)
 
 
 class _Done(msgspec.Struct):
@@ -254,6 +257,7 @@ def _row(
         starts=len(motions),
         laws=found.laws,
         seconds=seconds,
+        request=task.request,
     )
 
 

@@ -19,7 +19,7 @@ from heavytop.integrate import registry
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.registry import IntegratorSource, named
 from heavytop.measure.integrator import ChosenIntegrator
-from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, physical, time_text, whole
+from heavytop.precision import DOUBLE_DOUBLE, Precision, as_integer, exact, physical, time_text
 
 _MOST = 1_000_000
 _MOST_SECONDS = 10**7
@@ -132,7 +132,7 @@ def _integrator(which: str | IntegratorSource) -> ChosenIntegrator:
 
 
 def _seed(value: int) -> int:
-    found = whole(value, "seed")
+    found = as_integer(value, "seed")
     if not 0 <= found <= 10**9:
         raise InputError(f"There is no seed {quoted(found)}.", "Give a number from 0 to 1000000000.")
     return found

@@ -16,7 +16,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, fa
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import exact, parse, time_text
+from heavytop.precision import exact, exact_text, parse, time_text
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import Block, Card, In, Note
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
@@ -57,7 +57,14 @@ class HuntTable(PlanTable, tag=NAME):
         system = HEAVY_GYROSTAT.name if self.family == HEAVY_GYROSTAT.name else HEAVY_TOP.name
         key = RowKey(NAME, name, system, computed(self.integrator), parse(self.precision).name)
         options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
-        return [Task(key, "", self.integrator, options=options)]
+        request = {
+            "horizon": time_text(horizon),
+            "budget": str(self.budget),
+            "against": self.against,
+            "limit": exact_text(exact(self.limit)) if self.limit else "",
+            "found": self.found,
+        }
+        return [Task(key, "", self.integrator, options=options, request=request)]
 
 
 class HuntKind(Kind):

@@ -23,7 +23,7 @@ from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed
 from heavytop.exact.catalogue import matches
 from heavytop.harness.sweeps import Random
 from heavytop.integrate import registry
-from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.registry import is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -31,7 +31,7 @@ from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
 from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
-from heavytop.top.amplification import FOLLOWED, amplification, digits_eaten, rate
+from heavytop.top.amplification import amplification, digits_eaten, rate
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -495,18 +495,9 @@ class Meter:
         return follow(integrator, *motion, self.times, self.precision)
 
     def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
-        """The same with the amplification over all directions, from the start on and from each sample on: what is
-        rounded on the way may grow by more than what is rounded at the start.
-        """
+        """The same with the amplification over all directions and from every time on."""
         problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
         largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
-        (states,) = self._finely([replace(problem, precision=self._fine)])
-        for time, state in zip(self.times[:-1], states or (), strict=False):
-            # of a motion that is lost anyway no more is asked
-            if largest > FOLLOWED:
-                break
-            later = amplification(problem.system, problem.parameters, tuple(state), self.horizon - time)
-            largest = max(largest, later)
         return replace(found, amplification=max(largest, found.amplification))
 
     def _runs(
@@ -541,7 +532,7 @@ class Meter:
     def _finely(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
         times = [number(time, self._fine) for time in self.times]
         try:
-            runs = propagate_words_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
+            runs = propagate_multiword_ensemble(problems, times, threads=1, step_limit=_STEP_LIMIT)
         except OutOfReach:
             return [None] * len(problems)
         done = [run.outcome is Outcome.SUCCESS for run in runs]

@@ -9,6 +9,7 @@ import msgspec
 
 from heavytop.errors import OutOfReach
 from heavytop.features.local_error import measurement as local_error
+from heavytop.features.local_error.field_faults import field_fault
 from heavytop.features.local_error.measurement import require_sum, single_calls
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
@@ -71,7 +72,7 @@ class LocalErrorKind(Kind):
         case, precision = task.given, task.precision
         given = case.top, case.start, task.times[-1], precision, case.system
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
-        if task.integrator.can.steps:
+        if task.integrator.capabilities.steps:
             run, taken = task.integrator.first_steps(*given)
             steps = zip(run.times, taken, strict=True)
         else:
@@ -79,12 +80,13 @@ class LocalErrorKind(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
-        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.can.own:
+        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.capabilities.own:
             require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
-        return msgspec.structs.replace(row, samples=error.running.count)
+        row = msgspec.structs.replace(row, samples=error.running.count)
+        return row if task.integrator.capabilities.own else _with_fault(row, error)
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
@@ -97,6 +99,15 @@ class LocalErrorKind(Kind):
         columns = "case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"
         title = "Single steps, each against the proven motion from where it starts"
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
+
+
+def _with_fault(row: Row, error: local_error.LocalError) -> Row:
+    """The row with the fault of the field that explains its steps, where these show no order, or less than declared."""
+    seen = row.metrics.get(local_error.ORDER.text)
+    if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
+        return row
+    found = field_fault(error.problem, error.calls, row.order or 0)
+    return msgspec.structs.replace(row, explained=found) if found else row
 
 
 def _cells(row: Row) -> list[Cell]:
@@ -123,8 +134,12 @@ def _said(row: Row) -> str:
     text = f"{what} in {row.precision}: a step is off by {largest} eps"
     order = row.metrics.get(local_error.ORDER.text)
     if order is None:
-        return f"{text} at most."
+        return f"{text} at most.{_explained(row)}"
     if not row.order:
-        return f"{text} at most; its order is {order.value}."
+        return f"{text} at most; its order is {order.value}.{_explained(row)}"
     declared = "as it says" if order.value == str(row.order) else f"not the {row.order} that it says"
-    return f"{text} at most; its order is {order.value}, {declared}."
+    return f"{text} at most; its order is {order.value}, {declared}.{_explained(row)}"
+
+
+def _explained(row: Row) -> str:
+    return f" {row.explained.text}" if row.explained else ""

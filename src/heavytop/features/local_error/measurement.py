@@ -63,6 +63,7 @@ class LocalError:
         self.bits = problem.precision.bits + GUARD_BITS
         self.running = Running()
         self.orders: list[float] = []
+        self.calls: list[Call] = []
 
     def __call__(self, time: Fraction, step: TaylorStep | Call) -> None:
         """Take in one step that ends at ``time``."""
@@ -73,6 +74,7 @@ class LocalError:
         truths = {n: truth.state(n * exact(step.length), self.bits) for n in (1, *beyond)}
         sums, order = self._following(step, truths, max(map(abs, begin)))
         self.running.take(time, sums, keep=False)
+        self.calls += [step] if isinstance(step, Call) else []
         self.orders += order
 
     @whole_evaluation

@@ -15,7 +15,7 @@ import numpy
 
 from heavytop.cases import Case
 from heavytop.features.survey.measured import Chunk
-from heavytop.files import whole
+from heavytop.files import atomic_write
 from heavytop.harness.case_text import forms
 from heavytop.harness.rows import Task, data_of
 from heavytop.integrate.trajectory import Outcome
@@ -84,7 +84,7 @@ def read_chunk(content: bytes) -> Any:
 def write(path: Path, chunks: Iterable[bytes]) -> None:
     """All chunks into one file, a row group each, one at a time in memory; whole or not at all."""
     schema = _schema()
-    with whole(path) as file, _writer(file, schema) as writer:
+    with atomic_write(path) as file, _writer(file, schema) as writer:
         for content in chunks:
             table = read_chunk(content).cast(schema)
             writer.write_table(table, row_group_size=max(1, table.num_rows))
@@ -238,6 +238,7 @@ class Gathered:
             steps=self._steps,
             measured=f"{motions} motions of the sweep {name}, {failed} of which did not reach the horizon",
             data=None,
+            request=_request(self._task),
             spread=Spread(histograms, self._cells()),
             worst=tuple(_worst(self._task, cases[each.index], each) for each in self._worst),
         )
@@ -301,12 +302,19 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
         found = sums.setdefault(key, None)
         if not isinstance(row.chunk, bytes):
-            lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key))
+            lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key, request=_request(task)))
             continue
         if found is None:
             found = sums[key] = Gathered(row, task)
         found.take(row)
     return [_survey(each, lost.get(key)) for key, each in sums.items()]
+
+
+def _request(task: Task) -> dict[str, str]:
+    """What is asked of the motions of a survey: which tops, and what its table says."""
+    assert isinstance(task.case, Chunk)
+    assert task.case.sweep is not None
+    return {"tops": task.case.sweep.exact_data, **(task.request or {})}
 
 
 def _survey(measured: Gathered | None, lost: Row | None) -> Row:

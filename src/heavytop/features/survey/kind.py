@@ -67,6 +67,7 @@ class SurveyTable(PlanTable, tag=NAME):
                 case,
                 times,
                 options=tuple(self.map),
+                request={"samples": str(self.samples)},
             )
             for case in map(find, self.cases)
         ]

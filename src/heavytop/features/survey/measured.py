@@ -21,7 +21,7 @@ from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Lazy, Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
-from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_words_ensemble
+from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
@@ -302,7 +302,7 @@ def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, to
     problems = [replace(drawn.problems[place], precision=DOUBLE_DOUBLE) for place in rest.tolist()]
     if problems:
         targets = [number(time, DOUBLE_DOUBLE) for time in times]
-        runs = propagate_words_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
+        runs = propagate_multiword_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
         again = _pairs([run.states for run in runs], len(times))
         states.high[rest], states.low[rest] = again.high, again.low
     return states

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from heavytop.features.work_precision.curves import ERRORS, Lead, WorkPrecisionLine, leads, panels, seconds_text
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
-from heavytop.records import Row, Series
+from heavytop.records import UNRESOLVED_SECONDS, Row, Series
 from heavytop.report.document.document import (
     DASHED,
     TIME,
@@ -118,7 +118,8 @@ def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], keys: Keys, title: 
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)
-            alternative.append(f"{key.label}: {scientific(points[0][0])} in {scientific(points[0][1])} s.")
+            finest = min(line.points, key=lambda point: point.log10)
+            alternative.append(f"{key.label}: {scientific(finest.log10)} in {finest.takes()}.")
         failures = [math.log10(seconds) for seconds in line.failures if seconds > 0]
         if line.failures:
             edge = {"transform": axes.get_yaxis_transform(), "clip_on": False, "color": COLOURS[key.colour]}
@@ -137,10 +138,18 @@ def _numbers(source: str, row: Row) -> list[str]:
         clip(row.integrator, 50),
         clip(row.precision, 20),
         *(short(error.value) if error else "" for error in errors),
-        *(f"{row.seconds[part]:.3g}" if part in row.seconds else "" for part in ("least", "compile")),
+        _least(row),
+        f"{row.seconds['compile']:.3g}" if "compile" in row.seconds else "",
         str(row.steps),
         clip(row.outcome, 30),
     ]
+
+
+def _least(row: Row) -> str:
+    """Seconds of the fastest run, or below how many they are not resolved."""
+    if UNRESOLVED_SECONDS in row.seconds:
+        return f"< {row.seconds[UNRESOLVED_SECONDS]:.3g}"
+    return f"{row.seconds['least']:.3g}" if "least" in row.seconds else ""
 
 
 # How the errors of different methods grow at about the same accuracy: one that preserves structure beside two others.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.precision import parse
-from heavytop.records import UNMEASURED, Quantity, Row
+from heavytop.records import UNMEASURED, UNRESOLVED_SECONDS, Quantity, Row
 from heavytop.report.document.document import In, Table
 
 _MOST_CASES = 2
@@ -22,13 +22,18 @@ ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final"
 class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
-    seconds: of its fastest run.  Other work on the machine only ever adds, and adds more to longer runs: medians on a
-    busy machine would flatter whoever is quick.
+    seconds: of its fastest run, or where these are too few to be resolved, as many as are.  Other work on the machine
+    only ever adds, and adds more to longer runs: medians on a busy machine would flatter whoever is quick.
     """
 
     log10: float
     seconds: float
     setting: str
+    resolved: bool = True
+
+    def takes(self, digits: int = 3) -> str:
+        """``15 ms``, or ``< 0.1 ms``."""
+        return ("" if self.resolved else "< ") + seconds_text(self.seconds, digits)
 
 
 @dataclass(slots=True)
@@ -37,6 +42,7 @@ class WorkPrecisionLine:
 
     failures: the seconds that points took which did not reach the end; they have no error.
     compile: seconds that compiling took, at most over the points; 0 where none is known.
+    resolution: seconds at and below which those of points are not resolved.
     """
 
     integrator: str
@@ -44,6 +50,7 @@ class WorkPrecisionLine:
     points: list[WorkPrecisionPoint] = field(default_factory=list)
     failures: list[float] = field(default_factory=list)
     compile: float = 0.0
+    resolution: float = 0.0
 
     @property
     def label(self) -> str:
@@ -55,6 +62,10 @@ class WorkPrecisionLine:
     def best(self) -> WorkPrecisionPoint | None:
         """The point with the smallest error."""
         return min(self.points, key=lambda point: point.log10, default=None)
+
+    def takes(self, seconds: float) -> str:
+        """``0.015 s``, or ``< 0.0001 s`` of what is not resolved."""
+        return f"< {self.resolution:.2g} s" if seconds <= self.resolution else f"{seconds:.2g} s"
 
     def seconds_at(self, log10: float) -> float | None:
         """The seconds for an error of 10^log10: the least over points as fine, and between points on either side of it,
@@ -149,12 +160,14 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
             continue
         name = row.key.subject.name
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), WorkPrecisionLine(name, row.precision))
-        seconds = row.seconds.get("least", math.nan)
+        seconds, resolution = row.seconds.get("least", math.nan), row.seconds.get(UNRESOLVED_SECONDS, 0.0)
         error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
-            line.points.append(WorkPrecisionPoint(error.log10, seconds, row.key.subject.asked))
+            point = WorkPrecisionPoint(error.log10, max(seconds, resolution), row.key.subject.asked, not resolution)
+            line.points.append(point)
+            line.resolution = max(line.resolution, resolution)
             line.compile = max(line.compile, row.seconds.get("compile", 0.0))
     return {case: list(lines.values()) for case, lines in found.items()}
 
@@ -188,8 +201,8 @@ def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
 
 
 def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
-    cell = f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)}"
-    if not ours:
+    cell = f"{10**point.log10:.1e} in {point.takes(2)}"
+    if not ours or not point.resolved:
         return cell
     seconds, _ = _quickest(ours, point.log10)
     return f"{cell} ({'not reached' if seconds is None else seconds_text(seconds, 2)})"
@@ -214,7 +227,7 @@ def _lead(case: str, log10: float, lines: Sequence[WorkPrecisionLine]) -> Lead |
     if not ours or not others:
         return None
     (mine, name), (theirs, other), (side_by_side, _) = (_quickest(group, log10) for group in (ours, others, lanes))
-    if mine is None and theirs is None:
+    if (mine is None and theirs is None) or (theirs or math.inf) <= max(line.resolution for line in others):
         return None
     name = name or ours[0].label
     general = [(line.label, line.seconds_at(log10)) for line in ours if line.integrator == OURS]

@@ -111,7 +111,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
             for precision, subject in points
         ]
 
-    def beside(self, which: str | IntegratorSource) -> PlanTable | None:
+    def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
@@ -134,7 +134,7 @@ class WorkPrecision(Kind):
 
     name = NAME
     table = WorkPrecisionTable
-    may_give_up = "work against precision"
+    may_end_early = "work against precision"
     place = 40
 
     def assumed_band(self, subject: Subject) -> float:
@@ -182,7 +182,7 @@ class WorkPrecision(Kind):
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
         end, how = task.times[-1:], _repeats(task)
         name = task.integrator.name
-        if not task.integrator.can.own and sampled.outcome is Outcome.SUCCESS:
+        if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
             counted = replace(alone, times=sampled.times, states=sampled.states)
             require_counts(name, counted, _setting(task.key.subject), error)
@@ -238,9 +238,9 @@ def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
     cells = []
     for line in lines:
         best = line.best
-        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", line.takes(best.seconds)]
         at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
-        found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+        found += ["-" if seconds is None else line.takes(seconds) for seconds in at]
         cells.append([line.label, *found, str(len(line.failures) or "")])
     columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "aborted"]
     return Cells(title, columns, cells)

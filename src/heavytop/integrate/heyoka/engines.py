@@ -17,7 +17,16 @@ import numpy
 
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, last_call, number, require, usable_tolerance
+from heavytop.precision import (
+    DOUBLE,
+    DOUBLE_DOUBLE,
+    Precision,
+    cache_last_call,
+    exact,
+    number,
+    require,
+    usable_tolerance,
+)
 from heavytop.top.equations import HEAVY_GYROSTAT, VARIABLES, Parameters, System
 
 # A compiled integrator takes one step that is known before it takes any other.
@@ -350,7 +359,7 @@ def load(engine: Any, problem: Problem) -> None:
     engine.time = 0.0 if problem.precision == DOUBLE else number(Fraction(0), problem.precision)
 
 
-@last_call
+@cache_last_call
 def arrays(problem: Problem) -> tuple[Any, Any]:
     """The parameters and the state that an engine is given, as native arrays."""
     p = problem.parameters

@@ -72,7 +72,7 @@ class Work:
             self.check()
         self.send((index, time, state))
 
-    def keep(self, run: OnTheWay, state: Any) -> None:
+    def keep(self, run: LaneRun, state: Any) -> None:
         """Send the run's next sample to the observer, or keep it."""
         time = self.times[len(run.times)]
         run.times.append(time)
@@ -83,7 +83,7 @@ class Work:
 
     def end(
         self,
-        run: OnTheWay,
+        run: LaneRun,
         integrator: str,
         outcome: Outcome,
         reached: Fraction,
@@ -118,7 +118,7 @@ class Work:
 
 
 @dataclass(slots=True, eq=False)
-class OnTheWay:
+class LaneRun:
     """A problem of an ensemble that is being computed, and its samples so far."""
 
     index: int
@@ -129,7 +129,7 @@ class OnTheWay:
 
 
 @dataclass(slots=True, eq=False)
-class _Run(OnTheWay):
+class _Run(LaneRun):
     """One in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
 
     parameters: Any

@@ -12,7 +12,7 @@ from typing import Any
 import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
-from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, TaylorStep, Trajectory, sampled
+from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, TaylorStep, Trajectory, sampled
 from heavytop.precision import OrderedRing, Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
@@ -161,7 +161,7 @@ class Stepper:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
         return self.engine.tc.copy()
 
-    def take_up(self, place: Place, covered: Any) -> None:
+    def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there and take the step again that covers the last sample.
 
         Raises ValueError for a state of another length.
@@ -175,10 +175,10 @@ class Stepper:
         if self.rest is None:
             place.require_covered(self.steps)
 
-    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""
         state, time, steps = self._before
-        return Place(samples, tuple(state), time, steps, seconds, flags)
+        return ResumePoint(samples, tuple(state), time, steps, seconds, flags)
 
     def sample(self, target: OrderedRing) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
@@ -210,7 +210,7 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
     if precision.family == "double":
         last = float(last)  # compared at every step: numpy's numbers take longer
 
-    def going_on() -> Generator[bool, Any, None]:
+    def proceed() -> Generator[bool, Any, None]:
         before, stepped = engine.time, (yield True)
         while before < (reached := stepped.time) < last:
             before, stepped = reached, (yield True)
@@ -218,7 +218,7 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
             before, stepped = reached, (yield True)
         yield False
 
-    answers = going_on()  # at every step: to go on with a generator takes half as long as a call
+    answers = proceed()  # at every step: to go on with a generator takes half as long as a call
     next(answers)
     end = far(bool(targets[-1] >= 0), precision)
     start = [] if targets[0] == 0 else [engine.time]
@@ -252,8 +252,8 @@ def propagate(
     step_limit: int | None = None,
     observer: Observer | None = None,
     stepping: type[Stepper] = Stepper,
-    place: Place | None = None,
-    mark: Callable[[Place], None] | None = None,
+    place: ResumePoint | None = None,
+    mark: Callable[[ResumePoint], None] | None = None,
     tolerance: Fraction | None = None,
     high_accuracy: bool = False,
     compact_mode: bool | None = None,
@@ -287,12 +287,14 @@ def propagate(
     )
     engine = tool.take()
     try:
-        return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
+        return integrate_to_samples(
+            tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark
+        )
     finally:
         tool.spare.append(engine)
 
 
-def follow(
+def integrate_to_samples(
     tool: Compiled,
     engine: Any,
     problem: Problem,
@@ -302,8 +304,8 @@ def follow(
     between: Callable[[], None] | None = None,
     *,
     stepping: type[Stepper] = Stepper,
-    place: Place | None = None,
-    mark: Callable[[Place], None] | None = None,
+    place: ResumePoint | None = None,
+    mark: Callable[[ResumePoint], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
     if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
@@ -323,7 +325,7 @@ def follow(
 def states_at(
     engine: Any, parameters: Any, start: Any, targets: Sequence[Any], step_limit: int | None, precision: Precision
 ) -> tuple[Any, Outcome, Any, int]:
-    """(states at the targets that were reached, outcome, time reached, steps), the bits of :func:`follow`.
+    """(states at the targets reached, outcome, time reached, steps), bit for bit as :func:`integrate_to_samples`.
 
     For who has native numbers already: ``parameters`` and ``start`` as arrays, targets that were checked.
     """

@@ -20,7 +20,7 @@ from heavytop.multiword.fixed_point.arithmetic import Grid, grid_for
 from heavytop.multiword.fixed_point.fixed_point_run import Fixed
 from heavytop.multiword.integers.integer_series import IntegerMotion
 from heavytop.multiword.problem import ResumableRun, Scaled, Status, Steps
-from heavytop.precision import DOUBLE, Precision, decimal_text, last_call
+from heavytop.precision import DOUBLE, Precision, cache_last_call, decimal_text
 from heavytop.top.equations import System
 
 # Machine code takes one known step before it takes any other.
@@ -40,7 +40,7 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
     start = tuple(map(Fraction, (*OMEGA, *GAMMA, *(XI if attitude else ()))))
     scaled = Scaled.of(system, given, start, bounded)
     run = begin(scaled)
-    _require(run.advance(Fraction(1, 2**40), 1) is Status.FINE, "the outcome of a step", bits)
+    _require(run.advance(Fraction(1, 2**40), 1) is Status.OK, "the outcome of a step", bits)
     exact = list(derivatives(system, attitude, min(run.order, _MOST_ORDERS) + 1, given))
     step, largest = run.time / scaled.rate, max(map(abs, scaled.state))
     terms = [
@@ -235,7 +235,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
     return DoubleDouble(wanted, OrderSchedule.of(inner), OrderSchedule.of(inner, FALL_IN_LANES))
 
 
-@last_call
+@cache_last_call
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 

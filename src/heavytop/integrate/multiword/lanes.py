@@ -20,9 +20,15 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind, processors
-from heavytop.integrate.heyoka.lanes import OnTheWay, Work
+from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
-from heavytop.integrate.multiword.motions import CHUNK_SECONDS, OUTCOMES, follow, native_state, sums_of_two
+from heavytop.integrate.multiword.motions import (
+    CHUNK_SECONDS,
+    OUTCOMES,
+    integrate_to_samples,
+    native_state,
+    sums_of_two,
+)
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
@@ -43,7 +49,7 @@ _RISE = 2
 
 
 @dataclass(slots=True, eq=False)
-class _Motion(OnTheWay):
+class _Motion(LaneRun):
     """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
 
     scaled: Scaled
@@ -209,7 +215,7 @@ class WordsLanes:
 # Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.
 
 
-def propagate_words_ensemble(
+def propagate_multiword_ensemble(
     problems: Sequence[Problem],
     times: Sequence[Any],
     *,
@@ -222,9 +228,9 @@ def propagate_words_ensemble(
     """The motions of ``problems`` at ``times``, computed in multi-word arithmetic, in the order of the problems.
 
     Where double-double serves the format and the tolerance, eight go side by side, unless they carry an attitude; else
-    each by itself, to the bits of :func:`heavytop.integrate.multiword.motions.propagate_words`.  No bit of a motion
+    each by itself, to the bits of :func:`heavytop.integrate.multiword.motions.propagate_multiword`.  No bit of a motion
     depends on the others.  The arguments: as in :func:`heavytop.integrate.ensemble.propagate_ensemble`; tolerance: as
-    in :func:`heavytop.integrate.multiword.motions.propagate_words`.
+    in :func:`heavytop.integrate.multiword.motions.propagate_multiword`.
 
     Raises InputError for no problems, for problems of several kinds, for times out of order, for fewer than 1 thread,
     and what that raises.
@@ -264,7 +270,7 @@ def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
 
 def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem) -> None:
     observer = partial(work.observe, index) if work.observed else None
-    work.finish(index, follow(problem, work.targets, tolerance, work.step_limit, observer, work.check))
+    work.finish(index, integrate_to_samples(problem, work.targets, tolerance, work.step_limit, observer, work.check))
 
 
 # Arrays of double-doubles as a ring, so that first integrals written once are evaluated for many motions at once.

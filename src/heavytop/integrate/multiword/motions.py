@@ -12,7 +12,7 @@ from typing import Any
 from heavytop.errors import InputError, OutOfReach
 from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.registry import expected_steps
-from heavytop.integrate.trajectory import Observer, Outcome, Place, Problem, Trajectory, sampled
+from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, Trajectory, sampled
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
@@ -37,14 +37,14 @@ _TOO_MANY, _FEW = 1000, 10**6
 _LEAST_LOW = 2.0**-960
 """A low word that is larger has all its bits."""
 OUTCOMES = {
-    Status.FINE: Outcome.SUCCESS,
+    Status.OK: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
     Status.TOO_SMALL: Outcome.STEP_TOO_SMALL,
     Status.CAPACITY: Outcome.CAPACITY,
 }
 
 
-def propagate_words(
+def propagate_multiword(
     top: HeavyTop,
     start: State,
     times: Sequence[OrderedRing],
@@ -55,8 +55,8 @@ def propagate_words(
     tolerance: Fraction | None = None,
     step_limit: int | None = None,
     observer: Observer | None = None,
-    place: Place | None = None,
-    mark: Callable[[Place], None] | None = None,
+    place: ResumePoint | None = None,
+    mark: Callable[[ResumePoint], None] | None = None,
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, at ``times``, computed in multi-word arithmetic and rounded to ``precision``
     once.
@@ -71,10 +71,10 @@ def propagate_words(
     # doubles serve here as they are: to make reals of them takes as long as hundreds of steps
     wide = precision.bits >= DOUBLE.bits
     targets = given.numbers if wide and isinstance(given, DoubleTimes) else numbers(given, precision)
-    return follow(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
+    return integrate_to_samples(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
 
 
-def follow(
+def integrate_to_samples(
     problem: Problem,
     targets: Sequence[Any],
     tolerance: Fraction | None = None,
@@ -82,8 +82,8 @@ def follow(
     observer: Observer | None = None,
     between: Callable[[], None] | None = None,
     *,
-    place: Place | None = None,
-    mark: Callable[[Place], None] | None = None,
+    place: ResumePoint | None = None,
+    mark: Callable[[ResumePoint], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order.
 
@@ -321,7 +321,7 @@ class _Pace:
                 self.between()
             began, before = perf_counter(), self.run.steps
             status = self.run.advance(goal, most)
-            if status is not Status.FINE:
+            if status is not Status.OK:
                 return OUTCOMES[status]
             a_step = (perf_counter() - began) / max(1, self.run.steps - before)
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
@@ -436,12 +436,12 @@ class _Pace:
         state = self.scaled.state if at_start else self.run.sample(abs(target) * self.scaled.rate)
         return None if state is None else self.scaled.back(state)
 
-    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began; at rest, the beginning."""
         words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
-        return Place(samples, (), (), steps, seconds, flags, words)
+        return ResumePoint(samples, (), (), steps, seconds, flags, words)
 
-    def take_up(self, place: Place, covered: Any) -> None:
+    def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
         if place.words:
             self.run.restore(place.words, place.steps)

@@ -20,7 +20,7 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from pathlib import Path
 from threading import Lock
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -31,6 +31,8 @@ from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import Declared, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.processes import stopwatch
+from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
@@ -57,6 +59,8 @@ _MOST_OVERHEAD = 1e-3
 """Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
 _LEAST_SHARE = 0.1
 """Of the seconds of a request, which remain at least: less than its noise is not measured."""
+_RESOLUTION = 1e-4
+"""Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _OF_STATES = b"0123456789+-.eE \tsta"
 """The characters of lines of states in decimal."""
@@ -146,7 +150,7 @@ class CommandIntegrator:
         value = self._setting(setting, precision)
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]
-        request = Request(problem, grid, value, command.hex)
+        request = ProgramRequest(problem, grid, value, command.hex)
         with session(command) as program:
             overhead = program.empty_request(problem)
             reply = program.ask(request)
@@ -177,7 +181,7 @@ class CommandIntegrator:
             return exact(number(DEFAULT_STEP, precision))
         return precision.eps if self.command.control else None
 
-    def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
+    def _trajectory(self, request: ProgramRequest, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
         flags = {command.control: number_text(request.setting, problem.precision)} if request.setting else {}
         steps = reply.counts.get("steps")
@@ -188,7 +192,7 @@ class CommandIntegrator:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
-        spent = {"compile": 0.0, "run": seconds}
+        spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
         own = reply.counts.get("seconds")
         return Trajectory(
             problem,
@@ -219,7 +223,7 @@ def numbers_texts(values: Sequence[Any], precision: Precision, hexadecimal: bool
     return [number_text(Fraction(value), precision, hexadecimal) for value in values]
 
 
-class Request:
+class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
     times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
@@ -278,7 +282,7 @@ def _times_written(times: list[Fraction], precision: Precision, hexadecimal: boo
 class Reply:
     """What a program answered: states of the format, counts, and what it says went wrong; wall: seconds here."""
 
-    def __init__(self, name: str, request: Request) -> None:
+    def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
         self.precision = request.problem.precision
         self.states: list[Any] = []
@@ -468,7 +472,7 @@ class Session:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first of a process is slow
-                wall = self.ask(Request(problem, [], None, self.command.hex)).wall
+                wall = self.ask(ProgramRequest(problem, [], None, self.command.hex)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
@@ -482,14 +486,14 @@ class Session:
         """Whether the program ended by itself after the last request of a row."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: Request) -> Reply:
+    def ask(self, request: ProgramRequest) -> Reply:
         """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout."""
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
-        began = perf_counter()
+        seconds = stopwatch(self.process.pid)
         self._exchange(text, reply, "done")
-        reply.wall = perf_counter() - began
+        reply.wall = seconds()
         return reply
 
     def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str) -> None:

@@ -29,6 +29,7 @@ import numpy
 from heavytop.errors import HeavyTopError, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.processes import stopwatch
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -185,7 +186,7 @@ def with_tolerance(run: Run) -> Callable[..., Trajectory]:
     return propagate
 
 
-class Contained:
+class CheckedPlugin:
     """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
 
     own: whether it is one of this program's: these say in words what they cannot be asked, end as ``non_finite``
@@ -241,10 +242,10 @@ class Contained:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
-            began = perf_counter()
+            seconds = stopwatch()
             try:
                 run = self.call(*given, system=system, **own)
-                spent = perf_counter() - began
+                spent = seconds()
             finally:
                 changed = [name for name, part in parts.items() if getattr(system, name) is not part]
                 for name in changed:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy
 from CyRK import cyjit, nbsolve2_ivp
 
-from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, count, double_peer, fill, timed
+from heavytop.integrate.peers.double import Request, Solution, Solve, compiled_once, count, double_peer, fill, timed
 from heavytop.top.equations import System
 
 
@@ -19,10 +19,10 @@ def _machine_code(system: System, width: int) -> Any:
 @compiled_once
 def _warm(system: System, width: int, method: str) -> None:
     """Compiles what a first call would compile."""
-    _call(Given(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
+    _call(Request(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
 
 
-def _call(given: Given, method: str) -> Any:
+def _call(given: Request, method: str) -> Any:
     return nbsolve2_ivp(
         _machine_code(given.system, given.width).address,
         (0.0, float(given.times[-1])),
@@ -36,12 +36,12 @@ def _call(given: Given, method: str) -> Any:
 
 
 def _solver(method: str) -> Solve:
-    def solve(given: Given) -> Solved:
+    def solve(given: Request) -> Solution:
         _, seconds = timed(_warm, given.system, given.width, method)
         run = _call(given, method)
         try:
             states = run.y.T.copy()
-            return Solved(states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds)
+            return Solution(states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds)
         finally:
             run.free()
 

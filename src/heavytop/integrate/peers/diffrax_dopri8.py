@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy
 
-from heavytop.integrate.peers.double import Given, Solved, compiled_once, count, double_peer, reader, timed
+from heavytop.integrate.peers.double import Request, Solution, compiled_once, count, double_peer, reader, timed
 from heavytop.integrate.trajectory import Outcome
 from heavytop.top.equations import System
 
@@ -48,7 +48,7 @@ def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
     return jax.jit(integrate).lower(*shapes).compile()
 
 
-def _solve(given: Given) -> Solved:
+def _solve(given: Request) -> Solution:
     # settings of this thread and this block alone: the user's jax stays what it is
     with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
         code, seconds = timed(_compiled, given.system, given.width, len(given.times))
@@ -60,7 +60,7 @@ def _solve(given: Given) -> Solved:
         states = states[: int(numpy.argmax(unreached))]
     limit = bool(run.result == diffrax.RESULTS.max_steps_reached)
     outcome = Outcome.STEP_LIMIT if limit else Outcome.STEP_TOO_SMALL
-    return Solved(states, 0.0, int(run.stats["num_steps"]), None, seconds, outcome)
+    return Solution(states, 0.0, int(run.stats["num_steps"]), None, seconds, outcome)
 
 
 dopri8 = double_peer("diffrax:Dopri8", 8, _solve, attitude=True)

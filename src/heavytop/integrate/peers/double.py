@@ -26,7 +26,7 @@ FINEST = Fraction(1, 10**15)
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class Request:
     """A problem in double.
 
     start: shape (6,), or (9,) with ξ behind where the attitude is asked for.  times: shape (n,), strictly monotone away
@@ -60,7 +60,7 @@ class Given:
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class Solution:
     """What a library gave back.
 
     states: shape (m, 6), or (m, 9) from a start of nine numbers, one for each of the first m <= n times.  reached: the
@@ -76,7 +76,9 @@ class Solved:
     outcome: Outcome = Outcome.STEP_TOO_SMALL
 
 
-Solve = Callable[[Given], Solved]
+Solve = Callable[[Request], Solution]
+Given, Solved = Request, Solution
+"""The names under which packages of others import them."""
 
 
 def double_peer(
@@ -95,7 +97,7 @@ def double_peer(
     Arguments:
         name: in rows and messages.
         order: of the method; 0 where it has none to declare.
-        solve: takes a :class:`Given` and returns a :class:`Solved`.
+        solve: takes a :class:`Request` and returns a :class:`Solution`.
         knob: "tolerance", or "step" for a method with fixed steps.
         systems, directions, precisions: what it declares that it can do, such as ["heavy_top"], ["forward"],
             ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
@@ -145,7 +147,7 @@ def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(names)
 
 
-def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:
+def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Request:
     if problem.precision != DOUBLE:
         raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
     if setting <= 0 or (knob == "tolerance" and setting > 1):
@@ -154,17 +156,17 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
     numbers = numpy.array(problem.native(problem.parameters.numbers), dtype=float)
     start = numpy.array(problem.native((*problem.start.flat, *(problem.xi or ()))))
-    return Given(problem.system, start, grid, numbers, float(setting))
+    return Request(problem.system, start, grid, numbers, float(setting))
 
 
-def _from_start(name: str, given: Given, solve: Solve) -> Solved:
+def _from_start(name: str, given: Request, solve: Solve) -> Solution:
     """What ``solve`` gives for the times after 0, which most libraries refuse, behind the start itself."""
     at_start = int(given.times[0] == 0)
     # the times are judged by as they were, whatever is done to those that are given
     later = replace(given, times=given.times[at_start:].copy())
-    solved = solve(later) if len(later.times) else Solved(numpy.empty((0, given.width)), 0.0, 0, 0)
-    if not isinstance(solved, Solved):
-        raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
+    solved = solve(later) if len(later.times) else Solution(numpy.empty((0, given.width)), 0.0, 0, 0)
+    if not isinstance(solved, Solution):
+        raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solution")
     if not at_start:
         return solved
     states = _states(name, solved.states, len(later.times), given.width)
@@ -175,8 +177,8 @@ def _judged(
     problem: Problem,
     name: str,
     order: int,
-    given: Given,
-    solved: Solved,
+    given: Request,
+    solved: Solution,
     seconds: dict[str, float],
     flags: dict[str, str],
 ) -> Trajectory:
@@ -257,12 +259,12 @@ def _with_rotor(n: Any) -> Parameters:
 
 
 def reader(system: System) -> Callable[[Any], Parameters]:
-    """What takes the numbers of :class:`Given`, of any kind, as the parameters of the field; numba compiles it too."""
+    """A function from the numbers of :class:`Request` to the parameters of the field, which numba compiles."""
     return _with_rotor if system is HEAVY_GYROSTAT else _with_rate
 
 
 def count(system: System) -> int:
-    """How many numbers of :class:`Given` a system has."""
+    """How many numbers of :class:`Request` a system has."""
     return 9 if system is HEAVY_GYROSTAT else 7
 
 

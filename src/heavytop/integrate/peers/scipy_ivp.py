@@ -5,14 +5,14 @@ A relative tolerance below 100 eps is raised to that, as SciPy would do with a w
 
 from __future__ import annotations
 
-from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, rates, timed
+from heavytop.integrate.peers.double import Request, Solution, Solve, double_peer, rates, timed
 from heavytop.integrate.trajectory import Outcome
 
 _FINEST = 100 * 2.0**-52
 
 
 def _solver(method: str) -> Solve:
-    def solve(given: Given) -> Solved:
+    def solve(given: Request) -> Solution:
         from scipy.integrate import solve_ivp
 
         field, seconds = timed(rates, given.system, given.width)
@@ -31,10 +31,10 @@ def _solver(method: str) -> Solve:
         except ValueError as error:
             if "infs or NaNs" not in str(error):
                 raise
-            return Solved([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
+            return Solution([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
         covered = given.times[abs(given.times) <= abs(run.t[-1])]
         states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
-        return Solved(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)
+        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)
 
     return solve
 

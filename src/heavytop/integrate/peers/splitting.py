@@ -15,9 +15,9 @@ from collections.abc import Callable
 import numpy
 
 from heavytop.integrate.peers.double import (
-    Given,
+    Request,
+    Solution,
     Solve,
-    Solved,
     compiled_once,
     compiler,
     count,
@@ -87,7 +87,7 @@ def _stepper(system: System) -> Callable[..., None]:
 
 
 def _solver(order: int) -> Solve:
-    def solve(given: Given) -> Solved:
+    def solve(given: Request) -> Solution:
         advance, seconds = timed(_stepper, given.system)
         stages = numpy.array(STAGES[order])
         inertia = given.numbers[:3]
@@ -100,7 +100,7 @@ def _solver(order: int) -> Solve:
                 advance(v, given.numbers, k, (end - time) / more, more, stages)
             time, steps = end, steps + more
             states.append(numpy.concatenate([(v[:3] - k) / inertia, v[3:]]))
-        return Solved(states, time, steps, None, seconds)
+        return Solution(states, time, steps, None, seconds)
 
     return solve
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy
 from sksundae.cvode import CVODE
 
-from heavytop.integrate.peers.double import Given, Solved, compiled_once, compiler, count, double_peer, fill, timed
+from heavytop.integrate.peers.double import Request, Solution, compiled_once, compiler, count, double_peer, fill, timed
 from heavytop.top.equations import System
 
 _MOST_STEPS = 10**8
@@ -23,7 +23,7 @@ def _machine_code(system: System, width: int) -> Any:
     return write
 
 
-def _solve(given: Given) -> Solved:
+def _solve(given: Request) -> Solution:
     write, seconds = timed(_machine_code, given.system, given.width)
 
     def rates(time: float, y: Any, result: Any) -> None:
@@ -33,9 +33,9 @@ def _solve(given: Given) -> Solved:
     run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
     if len(given.times) == 1:
         # two times are a span: CVODE gives every step in between
-        return Solved(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
+        return Solution(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
     reached = abs(given.times) <= abs(run.t[-1])
-    return Solved(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
+    return Solution(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
 
 
 cvode = double_peer("sundials:CVODE", 12, _solve, attitude=True)

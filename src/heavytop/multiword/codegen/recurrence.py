@@ -76,12 +76,12 @@ _BESIDE: dict[str, tuple[tuple[int, ...], ...]] = {
 }
 
 
-def beside(system: System) -> tuple[tuple[tuple[int, ...], ...], bool]:
+def paired_permutations(system: System) -> tuple[tuple[tuple[int, ...], ...], bool]:
     """The permutations of y in the linear part, two as one; whether lanes 3 to 5, the second, are added to 0 to 2."""
     return _BESIDE[system.name], len(_TURNED[system.name]) > 1
 
 
-def turned(system: System) -> tuple[tuple[int, ...], ...]:
+def permutations(system: System) -> tuple[tuple[int, ...], ...]:
     """The permutations of y in the linear part, one, two or four."""
     return _TURNED[system.name]
 
@@ -105,8 +105,8 @@ class Coefficients:
         return max(abs(c) for vector in self.vectors for row in vector for c in row)
 
     @property
-    def beside(self) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
-        """A and one B of each vector for each permutation of :func:`beside`."""
+    def paired(self) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
+        """A and one B of each vector for each permutation of :func:`paired_permutations`."""
         return tuple(
             (first, *linear)
             if len(linear) == 1
@@ -150,7 +150,7 @@ def coefficients_of(system: System, rates: Callable[[Sequence[Any]], Sequence[An
     at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
     products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
-    permuted = [[mpq(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
+    permuted = [[mpq(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in permutations(system)]
     rows = [_eight(row) for row in ([*products, turning, turning, turning], *permuted)]
     torques = _TORQUES[system.name]
     sizes = [[abs(c) for row in part for c in row] for part in (rows[1 : 1 + torques], rows[1 + torques :])]
@@ -177,7 +177,7 @@ def series_rates(system: System, given: Coefficients, series: Sequence[Sequence[
         products = [sum(a[k] * b[k] for a, b in zip(left, right, strict=True)) for k in range(8)]
         gathered = [sum(sign * products[lane] for lane, sign in column) for column in zip(*GATHERED, strict=True)]
         derivative = [a * s for a, s in zip(first, gathered, strict=False)]
-        for row, permutation in zip(linear, turned(system), strict=True):
+        for row, permutation in zip(linear, permutations(system), strict=True):
             derivative = [d + b * state[lane] for d, b, lane in zip(derivative, row, permutation, strict=False)]
         found += derivative[3 * vector :]
     return found
@@ -362,7 +362,7 @@ class Recurrence:
         result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
         result = by_constant(code, self.constant(vector, 0), result)
         linear: Pair | None = None
-        for k, lanes in enumerate(turned(self.system), 1):
+        for k, lanes in enumerate(permutations(self.system), 1):
             moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
             term = by_constant(code, self.constant(vector, k), (moved[0], moved[1]))
             linear = term if linear is None else add(code, linear, term)
@@ -374,7 +374,7 @@ class Recurrence:
     def _next(self, n: Index, vector: int, total: Operand, y: Operand) -> Operand:
         code = self.code
         linear = code.zero
-        for k, lanes in enumerate(turned(self.system), 1):
+        for k, lanes in enumerate(permutations(self.system), 1):
             linear = code.fma(self._over(n, vector, k), code.shuffle(y, code.zero, lanes), linear)
         a = self._over(n, vector, 0)
         # two sums side by side, the signs in the factors

@@ -23,7 +23,7 @@ from heavytop.multiword.codegen.machine_code import (
     once,
     pointer,
 )
-from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER, MOST_ORDER, ZERO, Layout, turned
+from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER, MOST_ORDER, ZERO, Layout, permutations
 from heavytop.multiword.double_double import steps as dd
 from heavytop.multiword.double_double.arithmetic import (
     Constant,
@@ -189,16 +189,16 @@ class Floating(ResumableRun):
             times = [words[first : first + _SAMPLES_AT_ONCE] for words in (highs, lows)]
             arrays, count = [*own, *map(pointer, times), pointer(progress)], len(times[0])
             progress[:] = 0
-            while progress[0] < count and self.status is Status.FINE:
+            while progress[0] < count and self.status is Status.OK:
                 done, taken = progress
                 self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, pointer(found))
-                if self.status is Status.FINE and tuple(progress) == (done, taken):  # a time that takes exact numbers
+                if self.status is Status.OK and tuple(progress) == (done, taken):  # a time that takes exact numbers
                     time = Fraction(times[0][done]) + Fraction(times[1][done])
                     found[row * done : row * (done + 1)] = self.words_at(time)
                     progress[0] += 1
             self.steps += int(progress[1])
             yield found[: row * progress[0]].reshape(-1, row)
-            if self.status is not Status.FINE:
+            if self.status is not Status.OK:
                 return
 
     def derivatives(self, n: int) -> tuple[Fraction, ...]:
@@ -279,7 +279,7 @@ def _after(order: int) -> Doubles:
 
 ROW = 6 * LANES
 """Doubles of one order in each of four tables."""
-LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
+LOW, COARSE, OK, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
 """Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
 of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
 
@@ -294,7 +294,7 @@ def terms(system: System) -> list[tuple[int, int, int]]:
     """(row of the coefficients, component, component that it multiplies) of the linear part."""
     return [
         (row, lane, source)
-        for row, lanes in enumerate(turned(system), 1)
+        for row, lanes in enumerate(permutations(system), 1)
         for lane, source in enumerate(lanes[:6])
         if source != ZERO
     ]
@@ -417,7 +417,7 @@ class LaneOrders:
                 coarse, fine = parts(y[i], big)
                 largest = code.larger(code.absolute(y[i][0]), largest)
                 code.store(coarse, row, COARSE + LANES * i)
-                code.store(fine, row, FINE + LANES * i)
+                code.store(fine, row, OK + LANES * i)
             found.append(code.larger(largest * down, peaks[k]))
         return found
 
@@ -448,8 +448,8 @@ class LaneOrders:
         code, left, right = self.code, self.row(m), self.row(n - m)
         found = list(sums)
         for first, second, component, sign in group:
-            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, FINE))
-            coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, FINE))
+            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, OK))
+            coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, OK))
             if sign < 0:
                 a, rest = -a, -rest
             at = 3 * (component % 3)

@@ -75,7 +75,7 @@ from heavytop.top.equations import System
 # again.
 
 
-FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
+OK, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
 """Flags of a lane."""
 TIME, TARGET, SIGN, LEFT, ROOM, REACH, DEPTH, UNITS, SLOPE, TRIES, CLOCK = 0, 2, 4, 5, 6, 7, 8, 9, 11, 12, 13
 """Vectors of the clock: |time| and its target, two words each; direction, steps left, room, reach and depth; units of
@@ -310,7 +310,7 @@ class Eight:
         given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
         for k, value in enumerate(given):
             self.constants[24 * k + lane : 24 * (k + 1) : LANES] = split_constant(value)
-        self.flags[lane] = FINE
+        self.flags[lane] = OK
         self.signs[lane] = 1 if forwards else -1
         values = {TIME: 0.0, TIME + 1: 0.0, SIGN: float(self.signs[lane])}
         values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
@@ -320,7 +320,7 @@ class Eight:
     def put_all(self, words: Any, constants: Any, most: int) -> None:
         """Eight motions at their beginning, forwards: their words (12, 8), and those of each constant (k, 3, 8)."""
         self.words[:], self.constants[:] = words.reshape(-1), constants.reshape(-1)
-        self.flags[:], self.signs[:] = FINE, [1] * LANES
+        self.flags[:], self.signs[:] = OK, [1] * LANES
         values = {TIME: 0.0, TIME + 1: 0.0, SIGN: 1.0, LEFT: float(most)}
         values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
         for vector, value in values.items():
@@ -388,7 +388,7 @@ class Eight:
             return Status.NON_FINITE
         if flags & TOO_SMALL:
             return Status.TOO_SMALL
-        return None if flags & LARGER_N0 else Status.FINE
+        return None if flags & LARGER_N0 else Status.OK
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
@@ -450,7 +450,7 @@ class OneOfEight(Steps):
                 self.eight.advance(1)
         self.steps += 1
         same = all(self.eight.state(lane) == self.state and self.eight.time(lane) == self.time for lane in range(LANES))
-        return Status.FINE if same and self.time > 0 else Status.NON_FINITE
+        return Status.OK if same and self.time > 0 else Status.NON_FINITE
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
         # the scratch holds the series at the beginning of the step, time 0

@@ -35,7 +35,7 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     function,
 )
-from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Layout, Recurrence, turned
+from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Layout, Recurrence, permutations
 from heavytop.multiword.double_double.arithmetic import (
     Constant,
     add,
@@ -310,7 +310,7 @@ class SplitOrders:
         """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
         code, series = self.series.code, self.series
         factors = [(series.constant(vector, 0), (series.gathered(sums[0]), series.gathered(sums[1])))]
-        for k, lanes in enumerate(turned(series.system), 1):
+        for k, lanes in enumerate(permutations(series.system), 1):
             moved = [code.shuffle(word, code.zero, lanes) for word in y]
             factors.append((series.constant(vector, k), (moved[0], moved[1])))
         return quotient(code, None, factors, series.divisor(n))
@@ -323,7 +323,7 @@ of split coefficients may be beside the state."""
 ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOPE, COUNTS = range(11)
 """Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step
 was tried in split coefficients, and the slope of their units; the same of the last step."""
-FINE, NON_FINITE, TOO_SMALL = range(3)
+OK, NON_FINITE, TOO_SMALL = range(3)
 AT_ONCE = 4
 """Samples that are taken side by side: the operations of one wait for each other."""
 _HYSTERESIS = 3.0
@@ -342,7 +342,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
     numbers.
     """
     module = ir.Module("double_double")
-    layout = Layout(2 if attitude else 1, len(turned(system)))
+    layout = Layout(2 if attitude else 1, len(permutations(system)))
     advance = _Step(module, layout, system)
     advance.write()
     _write_sample(module, layout, system)
@@ -570,7 +570,7 @@ class _Step(Stepping):
         for pair in result:
             finite &= code.finite(pair[0]) & code.finite(pair[1])
         moves = time + length > time
-        status = code.select(finite, code.select(moves, FINE, TOO_SMALL), NON_FINITE)
+        status = code.select(finite, code.select(moves, OK, TOO_SMALL), NON_FINITE)
         self.set_count(status, STATUS)
         above = self._rounding(low_order + 1, length, start)
         below = self._rounding(low_order, length, start)
@@ -581,7 +581,7 @@ class _Step(Stepping):
         following = code.select(rise, low_order + 1, code.select(fall, low_order - 1, low_order))
         self.set_count(following, LOW_ORDER)
         again = (above > room + _TOLERATED) & can_rise
-        return ~again & (status == FINE)
+        return ~again & (status == OK)
 
     def _follow(self, good: Operand, fits: Operand, units: list[Operand], slope: Operand) -> None:
         """What split coefficients the step was done with, if it stands, and how often the next was tried."""

@@ -59,7 +59,7 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.multiword.codegen.machine_code import Doubles, Integers, Processor, doubles, pointer
-from heavytop.multiword.codegen.recurrence import turned
+from heavytop.multiword.codegen.recurrence import permutations
 from heavytop.multiword.fixed_point import arithmetic, fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, words_of
 from heavytop.multiword.fixed_point.steps import UNSETTLED, most_orders, raises_of, size_of
@@ -82,7 +82,7 @@ class Total(Sequence[int]):
     @cached_property
     def _values(self) -> list[int]:
         grid, places = self._carrier.grid, self._carrier.places
-        return list(whole(self.words[places], grid))
+        return list(in_ulps(self.words[places], grid))
 
     def __len__(self) -> int:
         return len(self._carrier.places)
@@ -157,7 +157,7 @@ class CertifiedSeries:
             fixed_point_run.inverses(grid),
         )
         self._own = (problem, grid, forwards, processor)
-        self._sources = 1 + len(turned(problem.system))
+        self._sources = 1 + len(permutations(problem.system))
         self._of_constants = [self._error_of_constants(count * self._sources) for count in (1, 2)]
         self._units = numpy.array([grid.unit(k) for k in range(grid.words)])[:, None]
         self._threads = local()
@@ -197,7 +197,7 @@ class CertifiedSeries:
         found = components(table[:, 1])
         if self.vectors == 2:
             found += components(table[:, 2])[3:]
-        return [whole(component, grid).tolist() for component in found]
+        return [in_ulps(component, grid).tolist() for component in found]
 
     def computed(self, centre: Sequence[int], halvings: int) -> int:
         """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
@@ -322,7 +322,7 @@ def components(left: Doubles) -> list[Doubles]:
     return [*(left[..., lane] for lane in (2, 0, 1)), left[..., 4] - middle, middle, left[..., 3] - middle]
 
 
-def whole(words: Doubles, grid: Grid) -> Any:
+def in_ulps(words: Doubles, grid: Grid) -> Any:
     """What words add to along the last axis, in ulps: an array of integers."""
     units = [grid.unit(k) for k in range(grid.words)]
     digits = (words / units).astype(numpy.int64).astype(object)

@@ -51,9 +51,9 @@ from heavytop.multiword.codegen.machine_code import (
     once,
     pointer,
 )
-from heavytop.multiword.codegen.recurrence import Coefficients, turned
+from heavytop.multiword.codegen.recurrence import Coefficients, permutations
 from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, carried, component
-from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, components, whole
+from heavytop.multiword.fixed_point.certified_series import CertifiedSeries, components, in_ulps
 from heavytop.multiword.fixed_point.fixed_point_run import words_of_rows
 from heavytop.multiword.fixed_point.products import WordRows
 from heavytop.multiword.fixed_point.steps import FIRED, SeriesCode, most_orders, raises_of
@@ -228,7 +228,7 @@ class CertifiedColumns:
         self.machine = machine(grid, problem.system, self.data)
         rows = [row for given in slopes for row in given.vectors[0]]
         words = words_of_rows(rows, grid, Fraction(1, 2**certified.excess)) if rows else doubles(0)
-        size = 8 * grid.words * (1 + len(turned(problem.system)))
+        size = 8 * grid.words * (1 + len(permutations(problem.system)))
         self._words = words
         self._slopes = [pointer(words[size * k : size * (k + 1)]) for k in range(len(slopes))]
         self._threads = local()
@@ -272,7 +272,7 @@ class CertifiedColumns:
             rounding[group] = bound
         sizes = own.sizes[:count, : order + 1].max(axis=2) * _UP
         ends = own.results[:count].reshape(count, words, 8).transpose(0, 2, 1)[:, :6]
-        total = whole(ends, certified.grid).tolist()
+        total = in_ulps(ends, certified.grid).tolist()
         return WordColumns(total, tables if values else None, sizes, (rounding[0], rounding[1]))
 
     def _scratch(self) -> _Scratch:
@@ -330,4 +330,4 @@ class _Scratch:
         """Every v_n of each component."""
         grid = certified.grid
         left = self.rows[: 16 * grid.words * (order + 1)].reshape(order + 1, 2, grid.words, 8)[:, 1]
-        return [whole(each, grid).tolist() for each in components(left)]
+        return [in_ulps(each, grid).tolist() for each in components(left)]

@@ -46,7 +46,7 @@ def excess(problem: Scaled) -> int:
 def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fraction(1)) -> Doubles:
     """The words of the coefficients times ``factor``, over 2^over."""
     given = problem.coefficients
-    flat = [row for vector in (given.beside if grid.bounded else given.vectors) for row in vector]
+    flat = [row for vector in (given.paired if grid.bounded else given.vectors) for row in vector]
     return words_of_rows(flat, grid, factor / 2**over)
 
 
@@ -183,16 +183,16 @@ class Fixed(ResumableRun):
         """
         are_doubles = isinstance(times, numpy.ndarray)
         ceilings = times if isinstance(times, numpy.ndarray) else numpy.array([_not_before(time) for time in times])
-        count, status, limit, words = len(times), Status.FINE, most_of(self.grid), self.grid.words
+        count, status, limit, words = len(times), Status.OK, most_of(self.grid), self.grid.words
         at, found = doubles(words * count), doubles(sample_row(self.grid, self.vectors) * count)
         pointers = pointer(self.rows), pointer(at), pointer(found)
         table, others = found.reshape(count, -1), dict[int, tuple[Fraction, ...] | None]()
         progress = numpy.zeros(2, numpy.int64)
-        while progress[0] < count and status is Status.FINE:
+        while progress[0] < count and status is Status.OK:
             done, taken = map(int, progress)
             if are_doubles:
                 status = self._follow(ceilings, at, progress, found)
-                if [*map(int, progress)] != [done, taken] or status is not Status.FINE:
+                if [*map(int, progress)] != [done, taken] or status is not Status.OK:
                     continue
             covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
             if covered <= done:

@@ -32,7 +32,7 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     function,
 )
-from heavytop.multiword.codegen.recurrence import GATHERED, beside, turned
+from heavytop.multiword.codegen.recurrence import GATHERED, paired_permutations, permutations
 from heavytop.multiword.fixed_point.arithmetic import (
     EXPONENT_BITS,
     WIDEST,
@@ -78,7 +78,7 @@ class SeriesCode:
     """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
 
     state, result: K words of each vector.  constants: K words of A and each B (or of those of
-    :attr:`heavytop.multiword.codegen.recurrence.Coefficients.beside`, where the grid is bounded), for each vector.
+    :attr:`heavytop.multiword.codegen.recurrence.Coefficients.paired`, where the grid is bounded), for each vector.
     inverses: 1/(n + 1).
     rows, sums, places, seen: scratch, see :class:`heavytop.multiword.fixed_point.products.Rows`.
     factor, raises: from one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of
@@ -183,12 +183,12 @@ class SeriesCode:
         return [self.code.load(self.code.arguments[1], 8 * (words * row + i)) for i in range(words)]
 
     def _bounded_rates(self, vector: int, gathered: list[Operand], y: list[Operand]) -> list[Operand]:
-        code, grid, (permutations, second) = self.code, self.grid, beside(self.system)
-        place = (1 + len(permutations)) * vector
+        code, grid, (pairs, second) = self.code, self.grid, paired_permutations(self.system)
+        place = (1 + len(pairs)) * vector
         found = bounded_product(code, grid, self._constants(place), gathered)
         if vector and second:
             return found  # neither weight nor rotor turns an attitude
-        for k, lanes in enumerate(permutations, 1):
+        for k, lanes in enumerate(pairs, 1):
             moved = [code.shuffle(word, code.zero, lanes) for word in y]
             linear = bounded_product(code, grid, self._constants(place + k), moved)
             if second:
@@ -213,7 +213,7 @@ class SeriesCode:
         self, vector: int, gathered: list[Operand], y: list[Operand]
     ) -> list[tuple[list[Operand], list[Operand]]]:
         """The words of A and each B, and what they are multiplied by."""
-        linear = turned(self.system)
+        linear = permutations(self.system)
         sources = [gathered, *([self.code.shuffle(word, self.code.zero, lanes) for word in y] for lanes in linear)]
         return [(self._constants((1 + len(linear)) * vector + k), source) for k, source in enumerate(sources)]
 
@@ -365,7 +365,7 @@ TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
 HALVINGS, FEWEST, MOST, STATUS, ORDERS, REDONE, EXCESS, COUNTS = range(8)
 """Places of the counts: −log2 h of the next step and its bounds, how the last one ended, its orders, steps redone;
 log2 of what the constants were divided by."""
-FINE, TOO_SMALL, CAPACITY = 0, 2, 3
+OK, TOO_SMALL, CAPACITY = 0, 2, 3
 _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
@@ -439,7 +439,7 @@ class _Advance(Stepping):
         with b.if_then(~good):
             self.set_count(self.count(REDONE) + 1, REDONE)
             exhausted = halvings >= self.count(MOST)
-            status = code.select(exhausted, CAPACITY, FINE)
+            status = code.select(exhausted, CAPACITY, OK)
             self.set_count(code.select(moves, status, TOO_SMALL), STATUS)
         self._set_length(good, orders, halvings, length)
         return good
@@ -473,7 +473,7 @@ class _Follow:
         b.branch(head)
         b.position_at_end(head)
         done, taken = (code.load_one(self.progress, place) for place in range(2))
-        running = code.load_one(self.arrays[9], STATUS) == FINE
+        running = code.load_one(self.arrays[9], STATUS) == OK
         left = (done < self.count) & (taken < self.most)
         b.cbranch(running & left, inside, out)
         b.position_at_end(inside)

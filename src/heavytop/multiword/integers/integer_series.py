@@ -18,7 +18,7 @@ from typing import Protocol
 from flint import fmpz_poly
 from gmpy2 import mpz
 
-from heavytop.multiword.codegen.recurrence import ZERO, turned
+from heavytop.multiword.codegen.recurrence import ZERO, permutations
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
 
 _BLOCK = 64
@@ -182,7 +182,7 @@ def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
     lane, own = (component, 0) if first else (component - 3, 3)
     found: dict[int, Fraction] = {}
     table = problem.coefficients.vectors[0 if first else 1][1:]
-    for row, permutation in zip(table, turned(problem.system), strict=True):
+    for row, permutation in zip(table, permutations(problem.system), strict=True):
         source, c = permutation[lane], row[lane]
         if c and source != ZERO:
             found[source + own] = found.get(source + own, Fraction(0)) + c
@@ -231,7 +231,7 @@ class IntegerMotion(ResumableRun):
                 break
             if not self._step():
                 return Status.TOO_SMALL
-        return Status.FINE
+        return Status.OK
 
     def _step(self) -> bool:
         """One step; False where no length will do."""

@@ -276,6 +276,8 @@ def compare(
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
             found.append(changes.add(None, row, [new]))
+    if changes.take_yardstick():
+        found = [[each.as_same() if each.of_yardstick else each for each in findings] for findings in found]
     findings = [finding for each in found for finding in each]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")

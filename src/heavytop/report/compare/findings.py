@@ -15,8 +15,10 @@ from typing import NamedTuple
 
 import msgspec
 
+from heavytop.display import plural
 from heavytop.features.local_error.measurement import ORDER
 from heavytop.features.work_precision.curves import ERRORS
+from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
@@ -149,13 +151,20 @@ class SettingPoint(NamedTuple):
 
 @dataclass(slots=True)
 class Changes:
-    """Gathers what a comparison finds, pair by pair."""
+    """Gathers what a comparison finds, pair by pair.
+
+    yardstick: what changed of heyoka where the baseline measures it beside a third-party integrator, which it is no
+    verdict on.
+    """
 
     rows: list[Change] = field(default_factory=list)
     points: dict[tuple[str, str, str], list[SettingPoint]] = field(default_factory=dict)
+    yardstick: list[Change] = field(default_factory=list)
+    _third_party: bool = False
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
+        self._third_party = self._third_party or (old is not None and _is_third_party(old))
         changed = [each for each in findings if each.verdict is not Verdict.SAME]
         if changed:
             changed.sort(key=lambda each: RANK.index(each.verdict))
@@ -191,6 +200,13 @@ class Changes:
             self.rows = [change for change in left if change.findings]
         return found
 
+    def take_yardstick(self) -> bool:
+        """Sets apart what changed of heyoka beside a third-party integrator; whether anything did."""
+        if self._third_party:
+            self.yardstick = [change for change in self.rows if change.findings[0].of_yardstick]
+            self.rows = [change for change in self.rows if not change.findings[0].of_yardstick]
+        return bool(self.yardstick)
+
     def coarser(self, change: Change) -> str:
         """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
         steps; else empty.
@@ -206,7 +222,9 @@ class Changes:
         if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
             return ""
         most = lost.pop(finest)
-        return "" if any(each > _LESS * most for each in lost.values()) else "lost less" if lost else "are the same"
+        if not most or any(each > _LESS * most for each in lost.values()):
+            return ""
+        return "lost less" if lost else "are the same"
 
     @property
     def worst_first(self) -> list[Change]:
@@ -229,8 +247,8 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     """
     if not changes.rows:
         counted = same - sum(row.outcome in UNMEASURED for row in failed)
-        numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
-        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
+        numbers = f"{plural(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     found = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
@@ -240,14 +258,27 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
             found += make(rows, verdicts)
     found += [sentence for moved, sentence in orders if moved > 0]
-    still = _still_failed(failed)
-    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still)]
+    still, beside = _still_failed(failed), _yardstick(changes)
+    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
     told = frozenset[Identity]().union(*(each.rows for each in found))
     rest = [change for change in changes.rows if change.identity not in told]
-    end = f"{_count(len(rest), 'other row')} changed." if rest else "Nothing else changed."
+    end = f"{plural(len(rest), 'other row')} changed." if rest else "Nothing else changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
-    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end)]
+    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end, *beside)]
+
+
+def _yardstick(changes: Changes) -> list[str]:
+    """A sentence that heyoka changed, which stands beside for scale; none where it did not."""
+    if not changes.yardstick:
+        return []
+    first = min(changes.yardstick, key=lambda change: RANK.index(change.verdict))
+    rows = plural(len(changes.yardstick), "row")
+    return [f"heyoka, measured for scale and not judged, changed in {rows}{_on([first.identity])}: {line(first)}."]
+
+
+def _is_third_party(row: Row) -> bool:
+    return row.key.subject.what == "computed" and is_third_party(row.key.subject.name)
 
 
 def _still_failed(rows: Sequence[Row]) -> list[str]:
@@ -255,7 +286,7 @@ def _still_failed(rows: Sequence[Row]) -> list[str]:
     if not rows:
         return []
     whose, on = _whose([row.identity for row in rows]), _on([row.identity for row in rows])
-    return [f"{_count(len(rows), 'row')}{whose} failed in both reports{on}: {clip(_why(rows[0]), 160)}."]
+    return [f"{plural(len(rows), 'row')}{whose} failed in both reports{on}: {clip(_why(rows[0]), 160)}."]
 
 
 def _why(row: Row) -> str:
@@ -272,7 +303,7 @@ def line(change: Change) -> str:
     if not worst.metric:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
     digits, count = change.digits, len(list(folded(change)))
-    more = f"; {_count(count, 'quantity', 'quantities')} changed" if count > 1 else ""
+    more = f"; {plural(count, 'quantity', 'quantities')} changed" if count > 1 else ""
     better = change.verdict is Verdict.BETTER
     if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
@@ -307,10 +338,6 @@ def _without_samples(row: Row | None) -> Row | None:
         return row
     series = {name: Series([], [], each.quantity) for name, each in row.series.items()}
     return msgspec.structs.replace(row, series=series)
-
-
-def _count(number: int, one: str, many: str = "") -> str:
-    return f"{number} {one if number == 1 else many or one + 's'}"
 
 
 def _digits(row: Row | None) -> float | None:
@@ -400,7 +427,7 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
     for kinds in found.values():
         cases = max(kinds.values(), key=len)
         (text, first), also = cases[0], len(cases) - 1
-        more = f" and {_count(also, 'other row')}" if also else ""
+        more = f" and {plural(also, 'other row')}" if also else ""
         seen = f" Seen on {_where(first)}{more}."
         if len(text) + len(seen) > _LONGEST:
             text = clip(text, _LONGEST - len(seen) - _CLIPPED)
@@ -421,7 +448,7 @@ def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence
         cases.sort(key=lambda case: case[0] != reason)
         named = [change.identity for _, change in cases]
         whose, on = _whose(named), _on(named) if became in _NAMED else ""
-        said = f"{_count(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}{on}"
+        said = f"{plural(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}{on}"
         yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
 
 
@@ -462,7 +489,7 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         assert worst.digits is not None
         old, new = map(digits_text, worst.digits)
         also = len(changes) - 1
-        more = f", {'fewer' if sign > 0 else 'more'} on {_count(also, 'other row')} too" if also else ""
+        more = f", {'fewer' if sign > 0 else 'more'} on {plural(also, 'other row')} too" if also else ""
         if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
             more += "; the last state is as it was: errors are between steps, of the dense output"
         yield Sentence(
@@ -515,7 +542,7 @@ def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sent
                     (change.identity.key.subject.name, _quantity(old.quantity, finding.name), said), []
                 ).append(change)
     for (_, what, said), changes in found.items():
-        also = f" and {_count(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
+        also = f" and {plural(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
         text = f"The {what} {said} on {_where(changes[0].identity, at=False)}{also}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
@@ -555,8 +582,9 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
             values = " at its samples"
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
-        also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        coarser = {changes.coarser(c) for _, c, _ in cases} if Verdict.WORSE in verdicts else {""}
+        also = f"; also on {plural(len(together) - 1, 'other row')}" if len(together) > 1 else ""
+        error = Verdict.WORSE in verdicts and change.decades(finding) is not None
+        coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)
 

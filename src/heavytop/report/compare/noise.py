@@ -5,7 +5,7 @@ band: reruns that part by more than rounding makes of them excuse nothing.
 
 A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
 wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
-everything) in 175,000 pairs: `benchmarks/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
+everything) in 175,000 pairs: `validation/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
 """
 
 from __future__ import annotations

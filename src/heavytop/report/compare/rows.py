@@ -10,11 +10,24 @@ from typing import Any, Literal
 
 import msgspec
 
+from heavytop.integrate.registry import is_third_party
 from heavytop.measure.growth import BENT, CLASSES, Interval
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import NOISE, NOT_MEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.records import (
+    NOISE,
+    NOT_MEASURED,
+    UNRESOLVED_SECONDS,
+    UNSUPPORTED,
+    Identity,
+    Law,
+    Metric,
+    Quantity,
+    Row,
+    Series,
+)
 from heavytop.report.compare.noise import (
     BITS,
     Limits,
@@ -46,7 +59,15 @@ from heavytop.report.compare.verdicts import (
     weaker,
 )
 from heavytop.report.document.kind import Kinds, kind_of
-from heavytop.report.store.checks import contradictions, inconsistent, interval_of, law_text, log_size, other_data
+from heavytop.report.store.checks import (
+    contradictions,
+    inconsistent,
+    interval_of,
+    law_text,
+    log_size,
+    other_data,
+    other_request,
+)
 
 # Laws of growth in a comparison: whether one can be, and one against another.
 
@@ -246,9 +267,17 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
         """The finding; where it is slight and its integrator gained more than that, the same."""
-        if not self.slight or self.method not in mended:
-            return self
+        return self.as_same() if self.slight and self.method in mended else self
+
+    def as_same(self) -> Finding:
+        """The finding, but that it is none."""
         return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
+
+    @property
+    def of_yardstick(self) -> bool:
+        """Whether it is about heyoka, which is measured beside an integrator for scale."""
+        name, _ = self.method
+        return name.partition(":")[0] == HEYOKA and not is_third_party(name)
 
     @property
     def timing(self) -> bool:
@@ -343,7 +372,7 @@ class RowComparison:
         """The verdict of rows of one motion of which one, or both, did not reach the horizon; None else."""
         if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
             return None
-        if None not in (old.data, new.data) and other_data(old.data, new.data):
+        if other_request(old, new) or (None not in (old.data, new.data) and other_data(old.data, new.data)):
             return None
         judged = judge_outcomes(old, new, self.lookup.metric((), "").duration)
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
@@ -497,11 +526,16 @@ class RowComparison:
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
 
     def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
-        for name in sorted(old.seconds.keys() & new.seconds.keys()):
-            if not self.lookup.metric(rules, f"seconds {name}").ignore:
-                verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
-                before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                yield Finding(key, name, verdict, before, after, why, "seconds")
+        """The seconds of the integrator alone: of its fastest run where there are several, since other work only adds.
+
+        What compiling took, which caches decide, and a reference, counts and what a program says are not judged.
+        """
+        name = next((each for each in ("least", "run") if each in old.seconds and each in new.seconds), "")
+        if name and not self.lookup.metric(rules, "seconds run").ignore:
+            spent = [max(row.seconds[name], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
+            verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
+            before, after = (f"{seconds:.3g} s" for seconds in spent)
+            yield Finding(key, "run", verdict, before, after, why, "seconds")
 
     def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
@@ -521,7 +555,7 @@ class RowComparison:
             return f"{old.bits} bits against {new.bits}"
         if old.starts != new.starts:
             return f"{old.starts} starts against {new.starts}"
-        if reason := other_data(old.data, new.data):
+        if reason := other_data(old.data, new.data) or other_request(old, new):
             return reason
         if (old.steps == 0) != (new.steps == 0):
             return f"{old.steps} steps against {new.steps}"

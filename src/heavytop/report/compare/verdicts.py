@@ -14,9 +14,11 @@ from heavytop.precision import exact, log10
 from heavytop.records import (
     CONTRADICTION,
     FAILED,
+    NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
     UNMEASURED,
+    UNRESOLVED_SECONDS,
     UNSUPPORTED,
     Against,
     Metric,
@@ -201,7 +203,7 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
-    """Seconds by their own rule."""
+    """Seconds of an integrator by the ratio that is allowed, above the floor."""
     if not (math.isfinite(old) and math.isfinite(new)):
         return Verdict.INCOMPARABLE, "no finite time"
     ratio = max(new, timings.floor) / max(old, timings.floor)
@@ -235,13 +237,16 @@ def judge_repeated(
     if not all(math.isfinite(seconds) for each in (old, new) for seconds in each.values()):
         yield "run", (Verdict.INCOMPARABLE, "no finite time")
         return
-    if old[BAND] > _WIDEST:
+    resolved = old.get(UNRESOLVED_SECONDS, 0.0), new.get(UNRESOLVED_SECONDS, 0.0)
+    if all(resolved):
+        return
+    if old[BAND] > _WIDEST and not resolved[0]:
         yield BAND, (Verdict.INCOMPARABLE, f"runs of the baseline scatter by a factor of {10 ** (2 * old[BAND]):.2g}")
         return
-    allowed = max(math.log10(ratio), noise * math.sqrt(2) * old[BAND])
+    allowed = max(math.log10(ratio), noise * math.sqrt(2) * (0.0 if resolved[0] else old[BAND]))
     for name in ("run", "least"):
-        yield name, _apart(old.get(name, 0.0), new[name], allowed)
-    if new[BAND] > _WIDEST:
+        yield name, _apart(max(old.get(name, 0.0), resolved[0]), max(new[name], resolved[1]), allowed)
+    if new[BAND] > _WIDEST and not resolved[1]:
         yield BAND, (Verdict.INCOMPARABLE, f"its runs scatter by a factor of {10 ** (2 * new[BAND]):.2g}")
 
 
@@ -262,6 +267,8 @@ def _apart(old: float, new: float, allowed: float) -> Judged:
 SUCCESS = "success"
 _NO_INTEGRATORS = (OUT_OF_REACH, CONTRADICTION, UNSUPPORTED)
 """Outcomes that say nothing of what is measured: of its reference, or of what it declares that it cannot do."""
+_TOO_LONG = {OUT_OF_TIME, NOT_ASKED}
+"""Outcomes of an integrator that does not end; how many workers there are decides which of its rows are asked."""
 
 
 def ended(row: Row, which: str) -> str:
@@ -284,12 +291,14 @@ def judge_outcomes(old: Row, new: Row, duration: float) -> Judged | None:
         if row.outcome in _NO_INTEGRATORS:
             return Verdict.INCOMPARABLE, ended(row, which)
     if before == SUCCESS:
-        return Verdict.WORSE, ended(new, "candidate")
+        return (Verdict.INCOMPARABLE if after == NOT_ASKED else Verdict.WORSE), ended(new, "candidate")
     if after == SUCCESS:
         return Verdict.BETTER, f"it reaches its horizon, and {ended(old, 'baseline')}"
+    if {before, after} <= _TOO_LONG:
+        return Verdict.SAME, "out of time in both reports"
     if before != after:
         return Verdict.INCOMPARABLE, f"{ended(old, 'baseline')}, {ended(new, 'candidate')}"
-    if before in (FAILED, OUT_OF_TIME):
+    if before == FAILED:
         return Verdict.SAME, "failed in both reports"
     return _reached(old, new, duration)
 

@@ -17,7 +17,7 @@ class ReportedKind(Protocol):
     noise_factor: by how much the noise band of a rerun may be wider by chance; None where its rows carry none.
     largest_amplification: of rounding, within the times at which its errors count.
     samples_are_steps: so these may be fewer as the steps may.
-    may_give_up: what its runs are called, where that one does not reach its horizon is what the rows are there to show.
+    may_end_early: what its runs are called, where the rows are there to show that one does not reach its horizon.
     may_overflow: the same of values that are not finite.
     place: the headlines stand in the order of their places.
     """
@@ -27,7 +27,7 @@ class ReportedKind(Protocol):
     noise_factor: float | None = None
     largest_amplification: float = math.inf
     samples_are_steps: bool = False
-    may_give_up: str = ""
+    may_end_early: str = ""
     may_overflow: bool = False
     place: int = 0
 

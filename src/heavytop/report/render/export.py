@@ -18,10 +18,10 @@ from pkgutil import resolve_name
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from heavytop.display import printable
+from heavytop.display import plural, printable
 from heavytop.errors import InputError, quoted
 from heavytop.measure.scalar import digits_kept
-from heavytop.records import UNSUPPORTED, Quantity, Report, Row
+from heavytop.records import UNRESOLVED_SECONDS, UNSUPPORTED, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import folded, line, statistics
 from heavytop.report.compare.verdicts import Verdict
@@ -83,7 +83,8 @@ def measures(row: Row) -> Iterator[Measure]:
         if law.exponent is not None:
             yield Measure(f"exponent of {name}", law.exponent, "exponent", law.low, law.high)
     if "run" in row.seconds:
-        yield Measure("seconds", row.seconds.get("least", row.seconds["run"]), "s")
+        seconds = max(row.seconds.get("least", row.seconds["run"]), row.seconds.get(UNRESOLVED_SECONDS, 0.0))
+        yield Measure("seconds", seconds, "s")
 
 
 def export(report: Report, to: str, kinds: Kinds) -> str:
@@ -342,7 +343,7 @@ def _cell(cell: Cell) -> Any:
 def to_markdown(report: Report, kinds: Kinds) -> str:
     """GitHub-flavoured Markdown: the headlines, then the notes, tables and cards of each kind."""
     found = document(report, kinds, In.FULL)
-    plan = f"### Plan {escaped(report.plan.get('name', '?'))}: {len(report.rows)} measurements"
+    plan = f"### Plan {escaped(report.plan.get('name', '?'))}: {plural(len(report.rows), 'measurement')}"
     lines = [plan, "", *(f"- {_said(each)}" for each in headlines(found, kinds)), ""]
     for blocks in found.values():
         lines += [line for block in blocks if not isinstance(block, Headline) for line in _markdown(block)]

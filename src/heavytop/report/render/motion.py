@@ -277,6 +277,8 @@ def events_text(found: Sequence[Events | ReferenceEvents]) -> RenderableType:
         if isinstance(each, Events) and each.outcome is not Outcome.SUCCESS:
             parts.append(Text(f"Looked up to t = {decimal_text(each.time_reached, 6)} only: {each.outcome.message}."))
         if isinstance(each, Events):
+            if discontinuities := each.discontinuity_text():
+                parts.append(Text(f"{discontinuities[:1].upper()}{discontinuities[1:]}."))
             times, states = each.time_texts(), each.texts()
         else:
             times = [f"{ball.value} ± {ball.radius}" for ball in each.times]

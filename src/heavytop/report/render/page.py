@@ -13,7 +13,8 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.features.work_precision.curves import ERRORS, leads, panels, seconds_text
+from heavytop.display import plural
+from heavytop.features.work_precision.curves import ERRORS, leads, panels
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
@@ -74,14 +75,14 @@ def report_page(report: Report, kinds: Kinds) -> str:
         "report.html.j2",
         report=report,
         headlines=_headlines(found, kinds)
-        or [Headline(f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
+        or [Headline(f"{plural(len(report.rows), 'measurement')}, {len(failures)} of which failed.")],
         notes=[block for block in blocks if isinstance(block, Note)],
         cards=[block for block in blocks if isinstance(block, Card)],
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
         not_supported=unsupported(report.rows),
         lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
-        gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
+        gave_up=Counter(kind_of(row, kinds).may_end_early for row in report.rows if _gave_up(row, kinds)),
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
@@ -102,7 +103,7 @@ def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:
     """Whether a run ended early that may: a finding about its integrator, in its chart."""
-    return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
+    return bool(kind_of(row, kinds).may_end_early) and row.outcome not in ("success", *UNMEASURED)
 
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Differences, kinds: Kinds) -> str:
@@ -246,6 +247,7 @@ def render(template: str, **context: Any) -> str:
         "metric_cells": metric_cells,
         "change": line,
         "folded": quantities,
+        "plural": plural,
     }
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)
@@ -437,7 +439,7 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
         return None
     point, case, label = min(best, key=lambda each: each[0].log10)
     said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {seconds_text(point.seconds)}.")
+    return Headline(f"{said}, in {point.takes()}.")
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
-from heavytop.display import printable
+from heavytop.display import plural, printable
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
@@ -38,7 +38,7 @@ _STYLES = {"soft": "dim", "big": "bold"}
 
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
-    """What every kind of measurement says of its rows, then what did not reach its horizon."""
+    """What every kind of measurement says of its rows, then those that failed."""
     found = document(report, kinds, In.FULL)
     parts: list[RenderableType] = [head(report, len(report.rows))]
     parts += [_Sentence(each.text, each.word) for each in headlines(found, kinds)]
@@ -52,7 +52,7 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
     for sentence in filter(None, [*said, unsupported(report.rows)]):
         parts += [Text(), Text(printable(sentence))]
     if failures := [row for row in report.rows if failed(row, kinds)]:
-        parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
+        parts += [Text(), Text("Failed measurements", style="bold red")]
         parts += [Text(printable(failure(row))) for row in failures]
     return Group(*parts)
 
@@ -99,7 +99,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
 def _lines(parts: Iterable[RenderableType]) -> list[str]:
     """What a terminal of 80 columns shows, without colours."""
     console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
-    console.print(*parts, sep="\n", end="", highlight=False, markup=False)
+    console.print(Group(*parts), highlight=False, markup=False)
     assert isinstance(console.file, StringIO)
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
@@ -128,8 +128,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
         parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
     else:
         parts = [_counted(seen(chain(first, stream)))]
-    head = f"Plan {report.plan.get('name', '?')}: {number} measurements, "
-    head += f"{bad} did not reach {'its' if bad == 1 else 'their'} horizon:" if bad else "all finished."
+    head = f"Plan {report.plan.get('name', '?')}: {plural(number, 'measurement')}, "
+    head += f"{bad} failed:" if bad else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]

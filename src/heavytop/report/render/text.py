@@ -14,10 +14,10 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.display import printable
+from heavytop.display import plural, printable
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT
-from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
+from heavytop.records import FAILED, NOT_ASKED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
 from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
 from heavytop.report.document.kind import Kinds, kind_of
 from heavytop.report.store.store import AnyReport
@@ -36,26 +36,25 @@ NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
-    """Whether a run did not reach its horizon; that one aborts may be what its rows are there to show.
+    """Whether a measurement did not succeed; that a run aborts may be what its rows are there to show.
 
     What an integrator declares that it cannot do is no failure.
     """
     if row.outcome == UNSUPPORTED:
         return False
-    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
+    return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_end_early)
 
 
 def unsupported(rows: Iterable[Row]) -> str:
     """What integrators declare that they cannot do, in one line; empty where there is no such row."""
     lacking = [row for row in rows if row.outcome == UNSUPPORTED]
     why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
-    count = f"{len(lacking)} row{'s' if len(lacking) > 1 else ''}"
-    return f"Not supported, and not measured: {count}; {'; '.join(why)}." if lacking else ""
+    return f"Not supported, and not measured: {plural(len(lacking), 'row')}; {'; '.join(why)}." if lacking else ""
 
 
 def failure(row: Row) -> str:
-    """A run that did not reach its horizon, and why."""
-    if row.outcome in (FAILED, OUT_OF_TIME):
+    """How a measurement that did not succeed ended, and why."""
+    if row.outcome in (FAILED, OUT_OF_TIME, NOT_ASKED):
         return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
@@ -66,7 +65,7 @@ def head(report: AnyReport, rows: int) -> Text:
     """The plan, how many measurements, and with which versions."""
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
-    return Text(printable(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})"))
+    return Text(printable(f"Plan {report.plan.get('name', '?')}: {plural(rows, 'measurement')} ({versions})"))
 
 
 WORD_STYLES = {"refuted": "bold red", "holds": "bold green"}

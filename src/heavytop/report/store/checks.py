@@ -47,6 +47,21 @@ def other_data(old: Data | None, new: Data | None) -> str:
     return ""
 
 
+def other_request(old: Row, new: Row) -> str:
+    """Why a candidate answers another request than its baseline; "" where it is the same.
+
+    A baseline of before that rows said so is compared, but for a survey, whose data are its request.
+    """
+    if not old.request:
+        return "the baseline does not say which tops it surveys" if old.spread else ""
+    before, after = old.request, new.request or {}
+    for name in sorted(before.keys() | after.keys()):
+        one, other = (part.get(name) or "none" for part in (before, after))
+        if one != other:
+            return f"another request: {name} {one[:60]} against {other[:60]}"
+    return ""
+
+
 def impossible(data: Data, starts: int) -> str:
     """What in the data of a row of so many starts no run writes; empty where nothing is."""
     for name in _VECTORS:

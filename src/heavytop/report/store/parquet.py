@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.files import whole
+from heavytop.files import atomic_write
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Row
 
@@ -87,7 +87,7 @@ def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
     about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
     stream = lines(rows)
-    with whole(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
+    with atomic_write(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
         while group := list(islice(stream, _GROUP)):
             columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
             writer.write_batch(pyarrow.record_batch(columns, schema=schema))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import platform
 import re
+import zlib
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -116,7 +118,7 @@ _Content = TypeVar("_Content", Report, _Parts)
 
 
 def read(path: Path, kinds: Kinds) -> Report:
-    """The report at ``path``, a file or a directory with a report.json.
+    """The report at ``path``, a file or a directory with a report.json, or with a report.json.gz.
 
     Raises InputError for a file that is missing, truncated, of another program or schema, edited since it was written
     (where its checksum lies beside it), or inconsistent in itself.
@@ -133,7 +135,7 @@ def read_brief(path: Path, kinds: Kinds) -> Brief:
     return Brief(*_read(path, _Parts), kinds)
 
 
-def whole(report: AnyReport) -> Report:
+def full_report(report: AnyReport) -> Report:
     """The report with all of its rows."""
     if isinstance(report, Report):
         return report
@@ -144,9 +146,14 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     file = path
     try:
         file = path / FILE if path.is_dir() else path
+        if file != path and not file.exists() and (packed := path / f"{FILE}.gz").exists():
+            file = packed
         content = read_whole(file)
-    except OSError as error:
-        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror or error}.", REMEDY) from None
+        if file.suffix == ".gz":
+            content = gzip.decompress(content)
+    except (OSError, EOFError, zlib.error) as error:
+        cause = (error.strerror if isinstance(error, OSError) else "") or error
+        raise InputError(f"There is no report at {str(file)[:_NAME]}: {cause}.", REMEDY) from None
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:
@@ -184,7 +191,7 @@ def _check_repeats(file: Path, content: bytes) -> None:
 
 def _has_its_digest(file: Path, content: bytes) -> bool:
     """Whether the file's checksum lies beside it; raises InputError where that of another content does."""
-    beside = file.with_name(file.name + ".sha256")
+    beside = file.with_name(file.name.removesuffix(".gz") + ".sha256")
     if not beside.exists():
         return False
     expected = beside.read_text("utf-8", errors="replace").split()

@@ -13,7 +13,7 @@ import sympy
 from flint import arb, fmpq_mpoly
 
 from heavytop.features.claims.algebra.evaluate import evaluate, wpinverse
-from heavytop.features.claims.algebra.fields import Assumptions, Field, Solution
+from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.signs import Sign, Unprovable, used
 from heavytop.features.claims.algebra.structure import NAMES, Defined, at_values, sign_of
 
@@ -321,9 +321,9 @@ _MAX_DEGREE = 12
 
 def solve_relations(
     relations: Collection[sympy.Expr], known: Assumptions, parameters: Collection[sympy.Symbol]
-) -> tuple[Solution, ...]:
+) -> tuple[SolvedRelation, ...]:
     """Solutions of those relations that can be solved for one of the ``parameters``, each using those before it."""
-    solutions: list[Solution] = []
+    solutions: list[SolvedRelation] = []
     for relation in relations:
         if relation.free_symbols <= set(parameters):
             try:
@@ -335,7 +335,7 @@ def solve_relations(
     return tuple(solutions)
 
 
-def _solve(relation: sympy.Expr, known: Assumptions, parameters: Collection[sympy.Symbol]) -> Solution | None:
+def _solve(relation: sympy.Expr, known: Assumptions, parameters: Collection[sympy.Symbol]) -> SolvedRelation | None:
     field = Field(known, [relation])
     factors = _factors_with_zeros(field, field.enter(relation).numerator)
     if len(factors) != 1:
@@ -375,7 +375,7 @@ def _is_zero_at_origin_alone(p: fmpq_mpoly) -> bool:
 
 def _solutions(
     field: Field, p: fmpq_mpoly, relation: sympy.Expr, parameters: Collection[sympy.Symbol]
-) -> Iterator[Solution]:
+) -> Iterator[SolvedRelation]:
     """The solutions of p = 0 for each of the parameters in it."""
     tower = field.tower
     zero = tower.context.constant(0)
@@ -388,12 +388,12 @@ def _solutions(
         if not tower.signs.of(leading).strict:
             continue
         if max(parts) == 1:
-            yield Solution(symbol, field.expression(tower.quotient(-parts.get(0, zero), leading)), relation)
+            yield SolvedRelation(symbol, field.expression(tower.quotient(-parts.get(0, zero), leading)), relation)
         elif parts.keys() == {0, 2}:
             sign = tower.signs.of(tower.gens[index])
             if sign.value and sign.strict:
                 square = field.expression(tower.quotient(-parts[0], leading))
-                yield Solution(symbol, sign.value * sympy.sqrt(square, evaluate=False), relation, square)
+                yield SolvedRelation(symbol, sign.value * sympy.sqrt(square, evaluate=False), relation, square)
 
 
 def _occurs_inside(field: Field, index: int, p: fmpq_mpoly) -> bool:

@@ -30,7 +30,7 @@ _WEIERSTRASS = ("wp", "wpprime", "wp3", "wp3prime", "wpinverse")
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
+class SolvedRelation:
     """A relation between parameters, solved: symbol = value holds at exactly the points where ``relation`` is 0.
 
     radicand: where the value is a root ±√radicand, what is under it; it is > 0.
@@ -63,7 +63,7 @@ class Assumptions:
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
     weak: tuple[sympy.Expr, ...] = ()
-    solved: tuple[Solution, ...] = ()
+    solved: tuple[SolvedRelation, ...] = ()
     parameters: frozenset[sympy.Symbol] = frozenset()
 
     def bounds(self) -> list[sympy.Expr]:

@@ -9,7 +9,7 @@ from fractions import Fraction
 import sympy
 
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, is_exactly_zero
-from heavytop.features.claims.algebra.fields import Assumptions, Solution
+from heavytop.features.claims.algebra.fields import Assumptions, SolvedRelation
 
 Place = dict[sympy.Symbol, Fraction]
 
@@ -126,8 +126,8 @@ class Setting:
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
     bodies: tuple[Need, ...] = ()
-    solutions: tuple[Solution, ...] = ()
-    solved: tuple[Solution, ...] = ()
+    solutions: tuple[SolvedRelation, ...] = ()
+    solved: tuple[SolvedRelation, ...] = ()
     parameters: frozenset[sympy.Symbol] = frozenset()
 
     def with_solutions(self) -> Setting:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from math import log10
 
+from heavytop.display import plural
 from heavytop.errors import InputError, quoted
 from heavytop.features.claims.library.entry import library
 from heavytop.harness.checkpoint import Saved
@@ -191,14 +192,14 @@ def _of_library(rows: Sequence[Row]) -> list[str]:
     said = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
     off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
     expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
-    return [f"Library of {len(rows)} claims: {', '.join(said)}; {expected}."]
+    return [f"Library of {plural(len(rows), 'claim')}: {', '.join(said)}; {expected}."]
 
 
 def _of_verdicts(rows: Sequence[Row]) -> Headline:
     wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
     undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
-    word = "refuted" if wrong else "undecided" if undecided else "holds"
-    return Headline(" ".join(_of_library(rows)), Word(word))
+    word = Word("failed") if wrong else Word("undecided") if undecided else None
+    return Headline(" ".join(_of_library(rows)), word)
 
 
 def _value(holds: bool | None) -> Metric:

@@ -226,7 +226,8 @@ class ClaimModelTable(PlanTable, tag=NAME):
                     subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
                     end = time_text(signs[1][-1])
                     key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
-                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs))
+                    asked = {"grid": str(self.grid)}
+                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs, request=asked))
         return tasks
 
 

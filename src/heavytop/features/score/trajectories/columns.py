@@ -294,7 +294,7 @@ def cell(text: str, where: str) -> Fraction | None:
 
 CONVENTIONS = ("quaternion_order", "quaternion", "matrix", "sequence", "angles", "frame", "up", "pivot", "point")
 STARTS = ("start_quaternion", "start_matrix", "start_euler", "omega_space")
-BODIES = ("mass", "gravity", "about", "rotor")
+BODIES = ("file", "link", "mass", "gravity", "about", "rotor")
 _ARRAYS = {
     "quaternions": "quaternion",
     "quaternion": "quaternion",

@@ -34,7 +34,7 @@ from heavytop.files import read_whole, without_repeats
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact_text, parse, real, shown
 from heavytop.top.attitude import SHAPES, key_of
-from heavytop.top.bodies import CENTRE, Body
+from heavytop.top.bodies import BODY, CENTRE, Body, body_of
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, check_times, require_physical
 
@@ -398,7 +398,9 @@ def _raw_start(
 
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
-    """The body of a file with its mass, or a top by its weight."""
+    """The body of a file of a robot, a body with its mass, or a top by its weight."""
+    if "file" in document:
+        return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
     given = [key for key in ("mass", "gravity") if key in document]
     if not given:
         return _top(document, case)

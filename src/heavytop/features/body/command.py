@@ -1,0 +1,40 @@
+"""`body`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, command, numbers, print_json
+
+
+@command
+def body(
+    file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD as text, or TOML with a body.")],
+    link: Annotated[str | None, typer.Option(help="Which link or body, where the file has several.")] = None,
+    pivot: Annotated[
+        str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; without it a ball joint, or 0,0,0.")
+    ] = None,
+    gravity: Annotated[str, typer.Option(help="Acceleration of gravity, of the table that is printed.")] = "9.81",
+    json: Json = False,
+) -> int:
+    """Check the inertia tensor in a URDF, MJCF or SDF.
+
+    Says whether a body has it, and if not, which slip makes it one.
+
+    Exit 0 for a body, 1 where there is none with this tensor or the tensor is suspect, 2 for a file that cannot be
+    read.  Prints the body as a table for a plan.
+    """
+    from heavytop.features.body.document import assess
+    from heavytop.precision import vector
+    from heavytop.top.body_files import read_body
+
+    where = None if pivot is None else vector(numbers(pivot), "pivot")
+    assessment = assess(read_body(file, link), where, gravity)
+    if json:
+        print_json(assessment.document())
+    else:
+        print("\n".join(assessment.lines()))
+    return 0 if assessment.sound else 1

@@ -1,0 +1,138 @@
+"""What `heavytop body` says of the mass properties in a file: as JSON, as text, as the table of a plan."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop.precision import Vector, decimal_text
+from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
+from heavytop.top.body_files import BodyInFile
+from heavytop.top.inertia_slips import MassProperties, Slip, realisable, six_of, slips
+
+GRAVITY = "9.81"
+_NAMES = ("I11", "I22", "I33", "I12", "I13", "I23")
+_DIGITS, _PRINTED = 17, 6
+_BITS = 64
+
+
+@dataclass(frozen=True)
+class BodyAssessment:
+    """A body in a file, judged.
+
+    name: of the link.  given: its mass properties about the pivot.  realisable: whether a body has them.
+    slips: of which one makes it a body, or explains what is suspect.  gravity: text, of the table for a plan.
+    """
+
+    name: str
+    given: MassProperties
+    realisable: bool
+    slips: tuple[Slip, ...]
+    gravity: str = GRAVITY
+
+    @property
+    def principal(self) -> PrincipalAxes:
+        """Principal axes and moments about the centre of mass, to 64 bits."""
+        return principal_axes(self.given.central, _BITS)
+
+    @property
+    def sound(self) -> bool:
+        """Whether it is a body and nothing about it is suspect."""
+        return self.realisable and not self.slips
+
+    def data(self, free: bool = False) -> dict[str, str | list[str]]:
+        """The keys of a body in a plan; ``free``: turning about its centre of mass, without gravity."""
+        centre = (Fraction(0),) * 3 if free else self.given.centre
+        return {
+            "mass": _decimal(self.given.mass),
+            "gravity": "0" if free else self.gravity,
+            "centre": [*map(_decimal, centre)],
+            "inertia": [*map(_decimal, six_of(self.given.central))],
+            "about": CENTRE,
+        }
+
+    @property
+    def toml(self) -> str:
+        """The table of a plan, with a start at rest in the axes of the file."""
+        start = {"omega": ["0", "0", "0"], "quaternion": ["1", "0", "0", "0"]}
+        values = {"name": self.name, **self.data(), **start}
+        return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in values.items())]) + "\n"
+
+    @property
+    def command(self) -> str:
+        """The command for a free tumble about its centre of mass."""
+        data = {key: value if isinstance(value, str) else ",".join(value) for key, value in self.data(True).items()}
+        options = " ".join(f'--{key} "{value}"' if " " in value else f"--{key} {value}" for key, value in data.items())
+        return f"heavytop propagate {options} --omega 1,0.01,0.01 --quaternion 1,0,0,0 --times 1,5,10"
+
+    def document(self) -> dict[str, Any]:
+        """The JSON of `heavytop body`."""
+        return {
+            "name": self.name,
+            "mass": _decimal(self.given.mass),
+            "centre": [*map(_decimal, self.given.centre)],
+            "inertia": [*map(_decimal, self.given.six)],
+            "about": "pivot" if self.given.at_pivot else CENTRE,
+            "principal": [decimal_text(value, _DIGITS) for value in self.principal.moments],
+            "realisable": self.realisable,
+            "slips": [
+                {"name": slip.name, "sentence": slip.sentence, "inertia": _mended(slip.inertia)} for slip in self.slips
+            ],
+            "toml": self.toml,
+        }
+
+    def lines(self) -> Iterator[str]:
+        """The same in lines for the terminal."""
+        principal = self.principal
+        moments = ", ".join(decimal_text(value, _PRINTED) for value in principal.moments)
+        if self.sound:
+            yield f"{self.name}: a rigid body."
+        elif self.realisable:
+            yield f"{self.name}: a body has this tensor, but it is suspect."
+        else:
+            yield f"{self.name}: no rigid body has this tensor: {_reason(principal.moments)}"
+        for slip in self.slips:
+            yield f"  {slip.name}: {slip.sentence}"
+            if slip.inertia != self.given.six:
+                yield f"    mended: inertia = {json.dumps(_mended(slip.inertia))}"
+        yield ""
+        yield f"mass                {_decimal(self.given.mass)}"
+        yield f"centre of mass      {', '.join(map(_decimal, self.given.centre))}   from the pivot"
+        numbers = zip(_NAMES, self.given.six, strict=True)
+        about = "the pivot" if self.given.at_pivot else "the centre of mass"
+        yield f"inertia             {', '.join(f'{n} {decimal_text(v, _PRINTED)}' for n, v in numbers)}"
+        yield f"                    about {about}"
+        yield f"principal moments   {moments}"
+        for axis, direction in enumerate(zip(*principal.axes, strict=True)):
+            label = "principal axes" if not axis else ""
+            yield f"{label:<20}{', '.join(decimal_text(value, _PRINTED) for value in direction)}"
+        if self.realisable:
+            yield from ("", self.toml, f"Its free tumble:\n  {self.command}")
+
+
+def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> BodyAssessment:
+    """The assessment of a body about a pivot in the axes of its link; None: its ball joint, or the origin."""
+    given = body.about(pivot)
+    return BodyAssessment(body.name, given, realisable(given.central, given.slack), tuple(slips(given)), gravity)
+
+
+def _reason(moments: Vector) -> str:
+    """Which condition the principal moments break."""
+    low, middle, high = sorted(moments)
+    if low <= 0:
+        return f"its smallest principal moment is {decimal_text(low, _PRINTED)}, and must be positive."
+    total = decimal_text(low + middle, _PRINTED)
+    return f"its largest principal moment, {decimal_text(high, _PRINTED)}, exceeds the sum of the others, {total}."
+
+
+def _decimal(value: Fraction) -> str:
+    """An exact decimal where at most 20 digits do, else 17 digits."""
+    text = decimal_text(value, 20)
+    return text if Fraction(text) == value else decimal_text(value, _DIGITS)
+
+
+def _mended(inertia: Sequence[Fraction | None]) -> list[str | None]:
+    return [None if value is None else _decimal(value) for value in inertia]

@@ -1,0 +1,289 @@
+"""Inertia tensors that no body has, or that are implausible, and the slip in writing them down that makes them right.
+
+A tensor J about the centre of mass is that of a body where ∫ x xᵀ dm = ½ tr J − J is positive semidefinite (the
+triangle inequality of the principal moments) and J itself is positive definite.  Everything is exact; what rounding of
+the printed numbers leaves open is a slack that is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import combinations
+
+from heavytop.precision import Vector, cross, dot, round_to
+from heavytop.top.attitude import multiplied, transposed
+
+Tensor = tuple[Vector, Vector, Vector]
+Six = tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]
+"""I11, I22, I33, I12, I13, I23."""
+
+_DENSEST = 25_000
+"""kg/m³; osmium has 22,590."""
+_THINNEST = Fraction(1, 10_000)
+"""kg/m³ of the cube around a body; a rod of 1 kg and 10 m has 1e-3."""
+_PLAUSIBLE = (0.05, _DENSEST)
+_FAR_CENTRE = 100
+"""Sizes of the body between its axes and its centre of mass."""
+_ROUND = 10
+"""By so much the products of inertia shrink without Steiner's part where the tensor was meant about the pivot."""
+_NEAR, _APART = Fraction(1, 50), Fraction(1, 5)
+"""Relative distance of a tensor from that of the geometry in the file: it agrees; it is another."""
+_SMALL = Fraction(1, 10**9)
+_SHOWN_BITS = 56
+
+
+@dataclass(frozen=True, slots=True)
+class MassProperties:
+    """Mass properties as they were written down.
+
+    six: the tensor in the order of :data:`Six`, about the centre of mass, or about the pivot where ``at_pivot``.
+    centre: of mass, from the pivot.  slack: rounding of the printed numbers, of any entry.  si: kg and metres.
+    geometry: the tensor of the shapes in the same file, about the centre of mass, as a uniform body; and the rotation
+    of their axes.
+    """
+
+    six: Six
+    mass: Fraction
+    centre: Vector
+    at_pivot: bool = False
+    slack: Fraction = Fraction(0)
+    si: bool = False
+    geometry: Tensor | None = None
+    geometry_axes: Tensor | None = None
+
+    @property
+    def central(self) -> Tensor:
+        """The tensor about the centre of mass."""
+        tensor = rows(self.six)
+        return minus(tensor, steiner(self.mass, self.centre)) if self.at_pivot else tensor
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A mistake in writing a tensor down that makes this one right.
+
+    inertia: the mended six numbers, None for one that the file does not hold.  scale: of lengths and of masses.
+    """
+
+    name: str
+    sentence: str
+    inertia: tuple[Fraction | None, ...]
+
+
+def rows(six: Sequence[Fraction]) -> Tensor:
+    """The symmetric tensor of six numbers."""
+    a, b, c, d, e, f = six
+    return (a, d, e), (d, b, f), (e, f, c)
+
+
+def six_of(tensor: Tensor) -> Six:
+    """The six numbers of a symmetric tensor."""
+    return tensor[0][0], tensor[1][1], tensor[2][2], tensor[0][1], tensor[0][2], tensor[1][2]
+
+
+def steiner(mass: Fraction, centre: Vector) -> Tensor:
+    """m (|c|² 1 − c cᵀ), what the tensor about the pivot has more than the one about the centre of mass."""
+    square = dot(centre, centre)
+    x, y, z = (mass * (square - value * value) for value in centre)
+    a, b, c = centre
+    return rows((x, y, z, -mass * a * b, -mass * a * c, -mass * b * c))
+
+
+def minus(left: Tensor, right: Tensor) -> Tensor:
+    """The difference of two symmetric tensors."""
+    return rows([a - b for a, b in zip(six_of(left), six_of(right), strict=True)])
+
+
+def second_moments(central: Tensor) -> Tensor:
+    """∫ x xᵀ dm = ½ tr J − J about the centre of mass."""
+    half = (central[0][0] + central[1][1] + central[2][2]) / 2
+    return minus(rows((half, half, half, *[Fraction(0)] * 3)), central)
+
+
+def _semidefinite(tensor: Tensor, slack: Fraction) -> bool:
+    """Whether tensor + slack is positive semidefinite: all principal minors are 0 or positive."""
+    t = minus(tensor, rows((-slack, -slack, -slack, *[Fraction(0)] * 3)))
+    minors = [t[i][i] for i in range(3)] + [t[i][i] * t[j][j] - t[i][j] ** 2 for i, j in combinations(range(3), 2)]
+    return min(*minors, determinant(t)) >= 0
+
+
+def determinant(tensor: Tensor) -> Fraction:
+    """det J."""
+    return dot(tensor[0], cross(tensor[1], tensor[2]))
+
+
+def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
+    """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
+    return _semidefinite(second_moments(central), slack) and not _is_rod(central, slack)
+
+
+def _is_rod(central: Tensor, slack: Fraction) -> bool:
+    """Whether a principal moment is 0 within rounding, or below it: all mass lies on a line, or there is none."""
+    least = max(slack, _SMALL * max(abs(value) for value in six_of(central)))
+    return not _semidefinite(central, -least)
+
+
+def slips(given: MassProperties) -> list[Slip]:
+    """The slips of which one makes the tensor that of a body, the likeliest first; [] where nothing is suspect.
+
+    A realisable tensor is suspect where no material is so dense or so thin, where the centre of mass lies a hundred
+    sizes away, where Steiner's part explains its products of inertia, or where the geometry of the file has another.
+    """
+    central = given.central
+    if not realisable(central, given.slack):
+        if _semidefinite(second_moments(central), given.slack):
+            return [_rod(given)]
+        return [slip for slip, mended in _mends(given) if realisable(mended.central, given.slack)]
+    return [*_against_geometry(given), *_of_units(given), *_of_products(given)][:3]
+
+
+def _rod(given: MassProperties) -> Slip:
+    return Slip(
+        "rod",
+        "A principal moment is 0, as of a rod without thickness: the rotation about it has no equation. "
+        "Give the rod its radius r, so that the moment is m r^2/2.",
+        given.six,
+    )
+
+
+def _mends(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    """Each slip, with the mass properties that it would mean."""
+    n = given.six
+    for six, which in (
+        ((n[0], n[3], n[5], n[1], n[2], n[4]), "ixx ixy ixz iyy iyz izz, and was read as I11 I22 I33 I12 I13 I23"),
+        ((n[0], n[3], n[4], n[1], n[5], n[2]), "I11 I22 I33 I12 I13 I23, and was read as ixx ixy ixz iyy iyz izz"),
+    ):
+        yield _mend(given, "order_urdf", f"The six numbers are in the order {which}.", six)
+    yield from _row_major(given)
+    absolute = (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:])
+    if absolute != n:
+        yield _mend(given, "negative_moment", "A moment of inertia is negative: its sign is wrong.", absolute)
+    flipped = (*n[:3], -n[3], -n[4], -n[5])
+    sentence = "The products of inertia have the other sign: I12 is minus the integral of x y dm."
+    if flipped != n:
+        yield _mend(given, "signs_of_products", sentence, flipped)
+    if given.at_pivot:
+        slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
+        yield slip, replace(given, at_pivot=False)
+        shrunk = [value / 1000 for value in given.centre]
+        slip = Slip("millimetres", "The centre of mass is in millimetres, and the tensor in metres.", n)
+        yield slip, replace(given, centre=(shrunk[0], shrunk[1], shrunk[2]))
+
+
+def _mend(given: MassProperties, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, MassProperties]:
+    a, b, c, d, e, f = six
+    return Slip(name, sentence, (a, b, c, d, e, f)), replace(given, six=(a, b, c, d, e, f))
+
+
+def _row_major(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    """The first six of the nine numbers of a matrix in the six places; its last one is not there."""
+    n = given.six
+    if n[1] != n[3]:
+        return
+    for first, second, products in ((n[0], n[4], (n[1], n[2], n[5])), (n[0], n[5], (n[3], n[4], n[2]))):
+        if first <= 0 or second <= 0:
+            continue
+        sentence = "These are the first six numbers of the matrix row by row; I33 is not among them."
+        for part in (1, Fraction(1, 2), Fraction(9, 10)):  # of what the triangle inequality allows
+            mended = replace(given, six=(first, second, part * (first + second), *products))
+            if realisable(mended.central, given.slack):
+                yield Slip("row_major", sentence, (first, second, None, *products)), mended
+                break
+
+
+def _size(given: MassProperties) -> float:
+    """Diagonal of the uniform box with these moments, √(12 tr S/m)."""
+    trace = sum(second_moments(given.central)[i][i] for i in range(3))
+    return math.sqrt(12 * trace / given.mass)
+
+
+def _scaled(given: MassProperties, length: int, mass: int) -> MassProperties:
+    """With lengths of the tensor and masses divided."""
+    a, b, c, d, e, f = (value / mass / length**2 for value in given.six)
+    return replace(given, six=(a, b, c, d, e, f), mass=given.mass / mass, slack=given.slack / mass / length**2)
+
+
+_UNITS = (
+    ("grams", 1, 1000, "Mass and tensor are in grams: no material is as dense as this body."),
+    ("millimetres", 1000, 1, "The tensor is in kg mm^2: a body of this mass and so large is thinner than air."),
+    ("grams", 1000, 1000, "Mass and tensor are in grams and millimetres: a body this large is thinner than air."),
+)
+
+
+def _of_units(given: MassProperties) -> Iterator[Slip]:
+    if not given.si or given.mass <= 0:
+        return
+    size = _size(given)
+    if not size:
+        return
+    if dot(given.centre, given.centre) > (_FAR_CENTRE * size) ** 2:
+        sentence = "The centre of mass is in millimetres: it lies more than a hundred sizes of the body away."
+        yield Slip("millimetres", sentence, given.six)
+    density = float(given.mass) / size**3
+    if 5 * density > _DENSEST:  # the box of this diagonal has at most its cube / 3√3
+        only_mass = replace(given, mass=given.mass / 1000)
+        if _PLAUSIBLE[0] < 5 * float(only_mass.mass) / _size(only_mass) ** 3 < _PLAUSIBLE[1]:
+            yield Slip("grams", "The mass is in grams: no material is as dense as this body.", given.six)
+            return
+    for name, length, mass, sentence in _UNITS:
+        mended = _scaled(given, length, mass)
+        wrong = 5 * density > _DENSEST if length == 1 else density < _THINNEST
+        if wrong and _PLAUSIBLE[0] < 5 * float(mended.mass) / _size(mended) ** 3 < _PLAUSIBLE[1]:
+            yield Slip(name, sentence, mended.six)
+
+
+def _of_products(given: MassProperties) -> Iterator[Slip]:
+    """Whether the tensor without Steiner's part is that of a body, and all but diagonal where it was not."""
+    if given.at_pivot or given.geometry is not None:
+        return
+    less = six_of(minus(rows(given.six), steiner(given.mass, given.centre)))
+    with_part, without = (max(map(abs, six[3:])) for six in (given.six, less))
+    if with_part > given.slack and without * _ROUND <= with_part and realisable(rows(less), given.slack):
+        sentence = (
+            "The tensor is about the pivot, and was read as about the centre of mass: its products are Steiner's."
+        )
+        yield Slip("about_pivot", sentence, less)
+
+
+def _against_geometry(given: MassProperties) -> Iterator[Slip]:
+    """The slip by which the tensor becomes that of the shapes in the file."""
+    shape = given.geometry
+    if shape is None or _distance(given.central, shape) < _APART:
+        return
+    for slip, mended in (*_conjugated(given), *_mends(given), *_about_pivot(given), *_of_scale(given)):
+        if _distance(mended.central, shape) < _NEAR:
+            yield slip
+            return
+
+
+def _conjugated(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    """The tensor of principal axes V written as Vᵀ D V."""
+    if given.geometry_axes is None:
+        return
+    axes = given.geometry_axes
+    twice = multiplied(multiplied(axes, multiplied(axes, rows(given.six))), transposed(multiplied(axes, axes)))
+    six = [round_to(value, _SHOWN_BITS) for value in six_of(twice)]
+    yield _mend(given, "conjugate_axes", "The rotation of the principal axes is the inverse of what was meant.", six)
+
+
+def _about_pivot(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    less = six_of(minus(rows(given.six), steiner(given.mass, given.centre)))
+    yield _mend(given, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
+
+
+def _of_scale(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    for name, scale, unit in (
+        ("millimetres", 10**6, "kg mm^2"),
+        ("grams", 10**3, "g m^2"),
+        ("grams", 10**9, "g mm^2"),
+    ):
+        yield _mend(given, name, f"The tensor is in {unit}.", [value / scale for value in given.six])
+
+
+def _distance(one: Tensor, other: Tensor) -> Fraction:
+    """Largest difference of two tensors, relative to the largest entry of the second."""
+    apart = max(map(abs, six_of(minus(one, other))))
+    return apart / max(map(abs, six_of(other)))

@@ -1,0 +1,245 @@
+"""Bodies out of files of robots: every format, every slip, and bodies that are right."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import heavytop as ht
+from heavytop.top.body_files import read_body
+from heavytop.top.inertia_slips import MassProperties, minus, realisable, rows, second_moments, six_of, slips, steiner
+from support.in_process import heavytop
+
+SIX = ("0.31", "0.28", "0.19", "0.05", "-0.02", "0.04")
+"""I11, I22, I33, I12, I13, I23 of a body of 2.5 kg."""
+URDF_ORDER = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def urdf(six: Sequence[str], mass: str = "2.5", centre: str = "0.1 0 0.2", extra: str = "", rpy: str = "0 0 0") -> str:
+    values = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), six, strict=True))
+    tensor = " ".join(f'{key}="{values[key]}"' for key in URDF_ORDER)
+    return (
+        f'<robot name="r"><link name="base"/><link name="arm"><inertial><origin xyz="{centre}" rpy="{rpy}"/>'
+        f'<mass value="{mass}"/><inertia {tensor}/></inertial>{extra}</link></robot>'
+    )
+
+
+def mjcf(six: Sequence[str], mass: str = "2.5", centre: str = "0.1 0 0.2", extra: str = "", rpy: str = "0 0 0") -> str:
+    return (
+        f'<mujoco><worldbody><body name="arm"><inertial pos="{centre}" mass="{mass}" fullinertia="{" ".join(six)}"/>'
+        f"{extra}</body></worldbody></mujoco>"
+    )
+
+
+def sdf(six: Sequence[str], mass: str = "2.5", centre: str = "0.1 0 0.2", extra: str = "", rpy: str = "0 0 0") -> str:
+    tensor = "".join(
+        f"<{key}>{value}</{key}>" for key, value in zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), six, strict=True)
+    )
+    return (
+        f'<sdf version="1.9"><model name="m"><link name="arm"><inertial><pose>{centre} {rpy}</pose>'
+        f"<mass>{mass}</mass><inertia>{tensor}</inertia></inertial>{extra}</link></model></sdf>"
+    )
+
+
+def toml(six: Sequence[str], mass: str = "2.5", centre: str = "0.1 0 0.2", extra: str = "", rpy: str = "0 0 0") -> str:
+    about = extra or "centre of mass"
+    return (
+        f'mass = "{mass}"\ncentre = {json.dumps(centre.split())}\ninertia = {json.dumps(list(six))}\nabout = "{about}"'
+    )
+
+
+FORMATS: dict[str, Callable[..., str]] = {"urdf": urdf, "xml": mjcf, "sdf": sdf, "toml": toml}
+
+
+def judged(path: Path, text: str, *options: str) -> tuple[int, dict[str, object]]:
+    path.write_text(text)
+    run = heavytop("body", path, "--json", *options)
+    return run.returncode, json.loads(run.stdout)
+
+
+def in_order(six: Sequence[str], places: Sequence[int]) -> list[str]:
+    return [six[place] for place in places]
+
+
+# The place of each number of D order (I11 I22 I33 I12 I13 I23) where the numbers were written in the other order.
+SLIPS: dict[str, tuple[list[str], str]] = {
+    "order_urdf": (in_order(SIX, (0, 3, 4, 1, 5, 2)), "mended"),
+    "order_of_slots": (in_order(SIX, (0, 3, 5, 1, 2, 4)), "mended"),
+    "row_major": (in_order(SIX, (0, 3, 4, 3, 1, 5)), "open"),
+    "negative_moment": (["0.31", "-0.28", *SIX[2:]], "mended"),
+    "rod": (["0", "0.28", "0.28", "0", "0", "0"], "same"),
+    "millimetres": ([str(float(value) * 1e6) for value in SIX], "mended"),
+}
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("slip", SLIPS)
+def test_each_slip_is_named_in_each_format(tmp_path: Path, suffix: str, slip: str) -> None:
+    six, mend = SLIPS[slip]
+    if (slip, suffix) == ("millimetres", "toml"):
+        pytest.skip("a TOML file has units of its own")
+    code, document = judged(tmp_path / f"a.{suffix}", FORMATS[suffix](six))
+    assert code == 1
+    names = [each["name"] for each in document["slips"]]  # type: ignore[attr-defined, index]
+    assert names[0] == {"order_of_slots": "order_urdf"}.get(slip, slip)
+    mended = document["slips"][0]["inertia"]  # type: ignore[index]
+    if mend == "mended":
+        assert [float(value) for value in mended] == pytest.approx([float(value) for value in SIX], rel=1e-12)
+    if mend == "open":
+        assert mended[2] is None
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_right_body_is_one_and_its_numbers_are_exact(tmp_path: Path, suffix: str) -> None:
+    code, document = judged(tmp_path / f"a.{suffix}", FORMATS[suffix](SIX))
+    assert (code, document["realisable"], document["slips"]) == (0, True, [])
+    assert document["mass"] == "2.5"
+    assert document["centre"] == ["0.1", "0", "0.2"]
+    assert document["inertia"] == list(SIX)
+
+
+def test_signs_of_products_about_centre_and_about_pivot(tmp_path: Path) -> None:
+    # all products p, moments d: d + 2p, d − p, d − p; with p = 0.07 the largest exceeds the sum, with −0.07 it does not
+    assert judged(tmp_path / "a.urdf", urdf(["0.2"] * 3 + ["-0.07"] * 3))[0] == 0
+    code, document = judged(tmp_path / "b.urdf", urdf(["0.2"] * 3 + ["0.07"] * 3))
+    assert code == 1
+    assert document["slips"][0]["name"] == "signs_of_products"  # type: ignore[index]
+    central = judged(tmp_path / "c.toml", toml(SIX, centre="1 0 0.5", extra="pivot"))
+    assert central[0] == 1
+    assert central[1]["slips"][0]["name"] == "about_centre"  # type: ignore[index]
+    diagonal = (Fraction("0.31"), Fraction("0.28"), Fraction("0.19"), Fraction(0), Fraction(0), Fraction(0))
+    part = steiner(Fraction("2.5"), (Fraction("0.1"), Fraction(0), Fraction("0.2")))
+    at_pivot = [str(float(a + b)) for a, b in zip(diagonal, six_of(part), strict=True)]
+    code, document = judged(tmp_path / "d.urdf", urdf(at_pivot))
+    assert code == 1
+    assert document["slips"][0]["name"] == "about_pivot"  # type: ignore[index]
+
+
+BOX = '<collision><origin xyz="0.1 0 0.2" rpy="0 0 0.7"/><geometry><box size="0.1 0.4 0.8"/></geometry></collision>'
+
+
+def test_the_geometry_of_a_file_tells_conjugate_axes_grams_and_the_pivot(tmp_path: Path) -> None:
+    mass, (a, b, c) = 2.5, (0.1, 0.4, 0.8)
+    diagonal = [mass / 12 * (b * b + c * c), mass / 12 * (a * a + c * c), mass / 12 * (a * a + b * b), 0, 0, 0]
+    texts = [f"{value:.12g}" for value in diagonal]
+    right = judged(tmp_path / "right.urdf", urdf(texts, extra=BOX, rpy="0 0 0.7"))
+    assert (right[0], right[1]["slips"]) == (0, [])
+    cases = {
+        "conjugate_axes": urdf(texts, extra=BOX, rpy="0 0 -0.7"),
+        "grams": urdf([f"{value * 1000:.12g}" for value in diagonal], extra=BOX, rpy="0 0 0.7"),
+        "millimetres": urdf([f"{value * 1e6:.12g}" for value in diagonal], extra=BOX, rpy="0 0 0.7"),
+    }
+    for name, text in cases.items():
+        code, document = judged(tmp_path / f"{name}.urdf", text)
+        assert (code, document["slips"][0]["name"]) == (1, name)  # type: ignore[index]
+        mended = [float(value) for value in document["slips"][0]["inertia"]]  # type: ignore[index]
+        assert mended == pytest.approx([float(value) for value in right[1]["inertia"]], rel=1e-9)  # type: ignore[union-attr]
+
+
+def test_no_body_of_random_points_is_refused_and_no_material_is_too_dense() -> None:
+    """Second moments of points are those of a body by construction; no slip is told of one of an ordinary density."""
+    source = random.Random(4)
+    for _ in range(200):
+        points = [[Fraction(source.randint(-500, 500), 1000) for _ in range(3)] for _ in range(6)]
+        middle = [sum(point[i] for point in points) / 6 for i in range(3)]
+        s = [[sum((p[i] - middle[i]) * (p[j] - middle[j]) for p in points) for j in range(3)] for i in range(3)]
+        trace = s[0][0] + s[1][1] + s[2][2]
+        tensor = rows((trace - s[0][0], trace - s[1][1], trace - s[2][2], -s[0][1], -s[0][2], -s[1][2]))
+        assert second_moments(tensor)[1][2] == s[1][2]
+        assert realisable(tensor)
+        assert (
+            slips(MassProperties(six_of(tensor), Fraction(6), (Fraction(0), Fraction(0), Fraction(0)), si=True)) == []
+        )
+        largest = max(trace - s[i][i] for i in range(3))
+        assert not realisable(minus(tensor, rows((largest, *[Fraction(0)] * 5))))
+
+
+def test_a_plate_in_printed_digits_is_a_body(tmp_path: Path) -> None:
+    code, _ = judged(tmp_path / "plate.urdf", urdf(["0.000833", "0.000833", "0.001667", "0", "0", "0"], mass="1"))
+    assert code == 0
+    code, document = judged(tmp_path / "no.urdf", urdf(["0.000833", "0.000833", "0.001671", "0", "0", "0"], mass="1"))
+    assert (code, document["realisable"]) == (1, False)
+
+
+def test_usd_and_the_ball_joint_of_mjcf(tmp_path: Path) -> None:
+    text = """#usda 1.0
+(
+    metersPerUnit = 0.01
+)
+def Xform "arm" (prepend apiSchemas = ["PhysicsMassAPI"])
+{
+    float physics:mass = 2
+    point3f physics:centerOfMass = (10, 0, 20)
+    float3 physics:diagonalInertia = (300, 200, 400)
+    quatf physics:principalAxes = (0, 1, 0, 0)
+}
+"""
+    code, document = judged(tmp_path / "a.usda", text)
+    assert (code, document["centre"], document["inertia"][:3]) == (0, ["0.1", "0", "0.2"], ["0.03", "0.02", "0.04"])  # type: ignore[index]
+    joint = '<joint type="ball" pos="0 0 0.2"/>'
+    code, document = judged(tmp_path / "b.xml", mjcf(SIX, extra=joint))
+    assert document["centre"] == ["0.1", "0", "0"]
+    code, document = judged(tmp_path / "b.xml", mjcf(SIX, extra=joint), "--pivot", "0.1,0,0.1")
+    assert document["centre"] == ["0", "0", "0.1"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("a.urdf", '<!DOCTYPE r [<!ENTITY x "y">]><robot name="&x;"/>', "declares entities"),
+        ("a.urdf", "<robot", "is not XML"),
+        ("a.urdf", "<html/>", "root <html>"),
+        ("a.urdf", '<robot name="r"><link name="a"/></robot>', "holds no mass properties"),
+        ("a.txt", "1 2 3", "in no format that is known"),
+        ("a.urdf", urdf(["a", *SIX[1:]]), "ixx = 'a'"),
+        ("a.xml", mjcf([*SIX, "1", "2", "3"]), "fullinertia has 9 numbers"),
+        ("a.toml", "mass = [", "is not TOML"),
+        ("a.usd", "PXR-USDC....", "binary USD"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(tmp_path: Path, name: str, text: str, says: str) -> None:
+    (tmp_path / name).write_text(text)
+    run = heavytop("body", tmp_path / name)
+    assert run.returncode == 2
+    assert says in run.stderr
+    assert not run.stdout
+
+
+def test_several_links_want_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.urdf"
+    path.write_text(urdf(SIX).replace("</robot>", urdf(SIX).partition('<link name="base"/>')[2].replace("arm", "hand")))
+    assert "holds 2 bodies: arm, hand" in heavytop("body", path).stderr
+    assert heavytop("body", path, "--link", "hand").returncode == 0
+    assert heavytop("body", path, "--link", "foot").returncode == 2
+
+
+def test_a_file_stands_where_a_body_may(tmp_path: Path) -> None:
+    path = tmp_path / "a.urdf"
+    path.write_text(urdf(SIX))
+    body = ht.Body.from_file(path)
+    assert body == ht.Body("2.5", "9.81", ("0.1", "0", "0.2"), SIX, "centre of mass")
+    assert read_body(path).mass == Fraction(5, 2)
+    table = heavytop("body", path, "--json").stdout
+    plan = tmp_path / "plan.toml"
+    start = 'omega = ["1", "2", "3"]\nquaternion = ["1", "0", "0", "0"]\n'
+    drift = '[[measure]]\nkind = "drift"\ncases = ["mine"]\nruns = [{ precision = "double", horizon = "1" }]\n'
+    plan.write_text(f'name = "own"\n[[top]]\nname = "mine"\nfile = "{path}"\n{start}{drift}')
+    run = heavytop("run", "--plan", plan, "--out", tmp_path / "report", "--workers", "1")
+    assert run.returncode == 0, run.stderr
+    own = tmp_path / "own.toml"
+    own.write_text(json.loads(table)["toml"])
+    assert read_body(own).six == read_body(path).six
+
+
+def test_the_command_that_it_prints_runs(tmp_path: Path) -> None:
+    import shlex
+
+    path = tmp_path / "a.urdf"
+    path.write_text(urdf(SIX))
+    printed = heavytop("body", path).stdout.strip().splitlines()[-1].strip()
+    assert heavytop(*shlex.split(printed)[1:]).returncode == 0

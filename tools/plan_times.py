@@ -1,0 +1,112 @@
+"""Where does the processor time of a plan go: compiling, integrating, the truth, scoring, rounding noise, the rest?
+
+Run: python tools/plan_times.py [PLAN]     (default; one process, processor seconds, by kind and row)
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from functools import wraps
+from importlib import import_module
+from time import process_time
+from typing import Any
+
+from heavytop.features.kinds import KINDS
+from heavytop.harness import rows
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
+
+PARTS = {
+    "compiling": (
+        "integrate.heyoka.engines:compiled",
+        "integrate.heyoka.motions:compiled",
+        "integrate.ensemble:compiled",
+        "integrate.multiword.motions:compiled",
+        "integrate.multiword.lanes:compiled_lanes",
+    ),
+    "integrating": (
+        "measure.integrator:ChosenIntegrator.propagate",
+        "measure.integrator:ChosenIntegrator.propagate_many",
+        "integrate.heyoka.motions:propagate",
+    ),
+    "truth": (
+        "measure.truth:certified",
+        "kinds.homoclinic:certified",
+        "kinds.claim_model:true_motion",
+        "kinds.drift:truth",
+        "kinds.work_precision:truth",
+        "kinds.growth:reference",
+    ),
+    "scoring": ("measure.scorer:Scorer.__call__",),
+    "noise": ("measure.rounding_noise:Reruns._of", "measure.rounding_noise:uncertified"),
+}
+WHOLE = ("noise",)
+"""Parts of which everything inside counts as that part."""
+
+
+class Clock:
+    """Processor seconds of each part, without what is inside another."""
+
+    def __init__(self) -> None:
+        self.spent: Counter[str] = Counter()
+        self.stack = ["rest"]
+        self.last = process_time()
+
+    def switch(self) -> None:
+        now = process_time()
+        self.spent[self.stack[-1]] += now - self.last
+        self.last = now
+
+    def around(self, function: Any, part: str) -> Any:
+        @wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            self.switch()
+            self.stack.append(self.stack[-1] if self.stack[-1] in WHOLE else part)
+            try:
+                return function(*arguments, **named)
+            finally:
+                self.switch()
+                self.stack.pop()
+
+        return call
+
+
+def watch(clock: Clock) -> None:
+    for part, places in PARTS.items():
+        for place in places:
+            module, _, name = place.partition(":")
+            owner: Any = import_module(f"heavytop.{module}")
+            *classes, attribute = name.split(".")
+            for each in classes:
+                owner = getattr(owner, each, None)
+            if hasattr(owner, attribute):
+                setattr(owner, attribute, clock.around(getattr(owner, attribute), part))
+
+
+def main() -> None:
+    plan = sys.argv[1] if len(sys.argv) > 1 else "default"
+    only = sys.argv[2] if len(sys.argv) > 2 else ""
+    _, _, tasks = read(plan, KINDS)
+    clock = Clock()
+    watch(clock)
+    kinds: dict[str, Counter[str]] = {}
+    whole: Counter[str] = Counter()
+    for task in tasks:
+        if only not in task.label:
+            continue
+        before = clock.spent.copy()
+        row = rows.measure(KINDS[task.key.kind], task, Saved())
+        clock.switch()
+        spent = clock.spent - before
+        kinds.setdefault(task.key.kind, Counter()).update(spent)
+        whole.update(spent)
+        parts = "  ".join(f"{part} {seconds:.2f}" for part, seconds in spent.most_common() if seconds > 0.005)
+        print(f"{sum(spent.values()):7.2f}  {task.label:50} {row.reference.how:8} {parts}", flush=True)
+    for kind, spent in [*kinds.items(), ("all", whole)]:
+        parts = "  ".join(f"{part} {seconds:.1f}" for part, seconds in spent.most_common())
+        print(f"{sum(spent.values()):7.1f}  {kind:20} {parts}")
+
+
+if __name__ == "__main__":
+    main()
