@@ -4,13 +4,13 @@ The public names; each is imported when it is first used, so that ``import heavy
 """
 
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api import plot
     from heavytop.api.motions import Integrator, Propagated, ensemble, propagate, reference
     from heavytop.api.reports import Comparison, History, Report, compare, history, read_report, run
-    from heavytop.api.run_folder import read_survey
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
     from heavytop.features.claims.api import ClaimLibrary, audit, claim_library
     from heavytop.features.claims.audit.judge import Audit
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from heavytop.features.events.functions import Events, ReferenceEvents, Section
     from heavytop.features.hunt.api import Hunt, hunt
     from heavytop.features.score.api import Score, Summary, drift, score
+    from heavytop.features.survey.api import read_survey
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
@@ -29,17 +30,10 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_PLACES = {
-    "features.claims.api": ("Audit", "ClaimLibrary", "audit", "claim_library"),
-    "features.derivatives.api": ("DerivativeScore", "score_derivatives"),
-    "features.events.api": ("events", "poincare"),
-    "features.hunt.api": ("Hunt", "hunt"),
+_MODULES = {
     "api.motions": ("Integrator", "Propagated", "ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "History", "Report", "compare", "history", "read_report", "run"),
-    "api.run_folder": ("read_survey",),
-    "features.score.api": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
-    "features.events.functions": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
@@ -48,7 +42,21 @@ _PLACES = {
     "top.equations": ("GYROSTAT", "HEAVY_GYROSTAT", "HEAVY_TOP", "System", "holding"),
     "top.heavy_top": ("HeavyTop", "State"),
 }
-_ROOM = {name: room for room, names in _PLACES.items() for name in names}
+
+
+def _module(name: str) -> ModuleType:
+    """The module of a public name; raises AttributeError."""
+    for module, names in _MODULES.items():
+        if name in names:
+            return import_module(f"heavytop.{module}")
+    from heavytop.features import FEATURES
+
+    for feature in FEATURES:
+        for module, names in feature.python.items():
+            if name in names:
+                return import_module(f"{feature.package}.{module}")
+    raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
+
 
 __all__ = [
     "DOUBLE",
@@ -118,9 +126,7 @@ if not TYPE_CHECKING:  # it would tell a type checker that every name is there
             return version()
         if name == "plot":
             return import_module("heavytop.api.plot")
-        if name not in _ROOM:
-            raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
-        found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)
+        found = getattr(_module(name), name)
         globals()[name] = found
         return found
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
+from heavytop import written_numbers
 from heavytop.errors import ImpossibleBody, InputError, quoted
 from heavytop.precision import (
     DOUBLE,
+    EXTENDED,
+    QUAD,
     Given,
     Precision,
     as_integer,
@@ -201,3 +205,38 @@ def bodies(values: object, what: str) -> Sequence[HeavyTop | Body]:
         return [values]
     listed = ordered(values, what, _TYPES)
     return [v if isinstance(v, Body) else is_a(v, HeavyTop, f"{what}[{i}]") for i, v in enumerate(listed)]
+
+
+MOST_STATES = 100_000
+"""States, or Jacobians, that are scored."""
+
+
+def required(digits: Any) -> Fraction:
+    """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
+    asked = physical(exact(digits), "require")
+    if asked <= 0:
+        raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
+    return asked
+
+
+def component(value: Any) -> Fraction | None:
+    """An exact number out of a number of any format or text; None for NaN and infinities."""
+    if isinstance(value, str):
+        return written_numbers.component(value)
+    try:
+        return exact(value)
+    except InputError:
+        import numpy
+
+        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
+            return None
+        raise
+
+
+def bits_of(value: Any) -> int:
+    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
+    kind = type(value).__name__
+    if kind in ("real128", "longdouble", "real"):
+        return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
+    exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
+    return written_numbers.bits_of(str(value)) if exactly else DOUBLE.bits

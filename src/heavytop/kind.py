@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import msgspec
 
-from heavytop.features.score.diagnose.diagnosis import diagnose
-from heavytop.features.score.text import diagnosis_text
+from heavytop.features import FEATURES
 from heavytop.harness import rows as run
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Task
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.measure.scorer import Scorer
-from heavytop.precision import exact
-from heavytop.records import Explained, Row
+from heavytop.records import Row
 from heavytop.report.document import kind as reported
 
 
@@ -50,10 +48,6 @@ def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> R
     error = max((float(part) for part in parts if part.is_finite()), default=0.0)
     if error <= _FAR:
         return row
-    case, problem = task.given, run.problem
-    states = [tuple(map(exact, state[:6])) for state in run.states]
-    found = diagnose(case.top, case.start, case.system, run.times, states, problem.precision, error)
-    if not found:
-        return row
-    explained = Explained(found[0].kind, diagnosis_text(found[0], case.system.name))
+    explanations = (feature.load(feature.explain)(task.given, run, error) for feature in FEATURES if feature.explain)
+    explained = next((explanation for explanation in explanations if explanation is not None), msgspec.UNSET)
     return msgspec.structs.replace(row, explained=explained)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from heavytop.features.score.api import Score
+    from heavytop import Score
 
 _COMPARISONS = ("<", "<=", "==", "!=", ">", ">=")
 

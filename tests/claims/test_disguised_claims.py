@@ -11,9 +11,9 @@ import pytest
 import sympy
 
 from heavytop.errors import InputError
+from heavytop.features.claims.algebra.combinations import nonnegative_combination
 from heavytop.features.claims.algebra.conditions import solve_relations
 from heavytop.features.claims.algebra.fields import Assumptions, Field
-from heavytop.features.claims.algebra.signs import nonnegative_combination
 from heavytop.features.claims.algebra.structure import Defined, at_values, rate_along
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP

@@ -7,12 +7,12 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.features.claims.algebra.arcs import Arcs
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Prover, Region
 from heavytop.features.claims.algebra.reader import assume
-from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.ring import used
+from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.context import STATE
@@ -135,7 +135,7 @@ def test_a_sum_of_arcs_is_told_from_one_that_is_off_by_pi(turns, expected):
     e = sympy.atan(A) - sympy.asin(A / sympy.sqrt(1 + A**2))
     region = region_of(e)
     first, second = (used(region.field.enter(part).numerator).pop() for part in (sympy.atan(A), -e + sympy.atan(A)))
-    arcs = Arcs(region)
+    arcs = region._arcs
     assert arcs._is_small_somewhere({first: 1, second: -1}, Fraction(turns)) is expected
 
 
@@ -152,7 +152,7 @@ def test_a_sum_of_arcs_is_told_from_one_that_is_off_by_pi(turns, expected):
 def test_a_range_with_the_end_pi_is_small_where_an_open_range_takes_part(terms, expected):
     region = region_of(sympy.Add(*terms))
     weights = {used(region.field.enter(arc).numerator).pop(): weight for arc, weight in terms.items()}
-    assert Arcs(region)._is_small_by_ranges(weights, Fraction(0)) is expected
+    assert region._arcs._is_small_by_ranges(weights, Fraction(0)) is expected
 
 
 # --- relations --------------------------------------------------------------------------------------------------------

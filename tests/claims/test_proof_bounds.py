@@ -19,7 +19,8 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.fields import Assumptions, Field, Regularity
 from heavytop.features.claims.algebra.prover import Prover, Region
-from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.ring import used
+from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of as sign_by_structure
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table

@@ -8,7 +8,8 @@ import sympy
 from heavytop.features.claims.algebra.conditions import solve_relations
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Region
-from heavytop.features.claims.algebra.signs import Sign, used
+from heavytop.features.claims.algebra.ring import used
+from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import ALL, Flow, Setting, Statement
 from heavytop.features.claims.audit.context import STATE
 

@@ -10,11 +10,17 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.features.work_precision.charts import work_precision
-from heavytop.features.work_precision.curves import WorkPrecisionLine, WorkPrecisionPoint, beside_ours, leads, panels
+from heavytop.features.work_precision.curves import (
+    WorkPrecisionLine,
+    WorkPrecisionPoint,
+    beside_ours,
+    fastest,
+    leads,
+    panels,
+)
 from heavytop.records import SCHEMA, Metric, Report, Series
 from heavytop.report.document.document import Headline
 from heavytop.report.document.svg import quiet_style
-from heavytop.report.render.page import fastest
 from heavytop.report.render.plots import draw_report
 from support.reports import Row, summary
 

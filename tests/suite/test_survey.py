@@ -15,6 +15,7 @@ import pytest
 import heavytop as ht
 from heavytop.errors import Contradiction, InputError
 from heavytop.features.kinds import KINDS
+from heavytop.features.survey import joined as comparing
 from heavytop.features.survey import measured as records
 from heavytop.features.survey.gathered import gathered, read_chunk
 from heavytop.features.survey.measured import chunks, drawn
@@ -30,7 +31,6 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Row
-from heavytop.report.compare import compare as comparing
 from heavytop.report.compare.noise import Policy
 from support.in_process import heavytop
 from support.reports import compare

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from heavytop import arguments
 from heavytop.api.plot_data import (
+    Crossings,
     Motion,
+    PoincareSection,
     Samples,
     axes_of,
     compared,
@@ -29,12 +31,11 @@ from heavytop.api.plot_data import (
     samples,
 )
 from heavytop.errors import InputError, quoted
-from heavytop.features.events.functions import Events, ReferenceEvents, Section, component
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
 from heavytop.report.document.svg import COLOURS, decades, new_figure
-from heavytop.top.equations import NAMES
+from heavytop.top.equations import NAMES, component
 from heavytop.top.heavy_top import HeavyTop
 
 if TYPE_CHECKING:
@@ -217,7 +218,7 @@ def phase(
 
 
 def poincare(
-    section: Section | Events | ReferenceEvents | Iterable[Events | ReferenceEvents],
+    section: PoincareSection | Crossings | Iterable[Crossings],
     x: str = "gamma3",
     y: str = "omega3",
     axes: Axes | None = None,
@@ -238,12 +239,12 @@ def poincare(
     Raises:
         InputError: for another name, and for a section without a point.
     """
-    if isinstance(section, Section):
-        listed: list[Events | ReferenceEvents] = list(section.events)
+    if isinstance(section, PoincareSection):
+        listed: list[Crossings] = list(section.events)
     else:
-        listed = [section] if isinstance(section, Events | ReferenceEvents) else list(section)
+        listed = [section] if isinstance(section, Crossings) else list(section)
     for each in listed:
-        if not isinstance(each, Events | ReferenceEvents):
+        if not isinstance(each, Crossings):
             raise InputError(
                 f"{quoted(each)} is no section.", "Give what heavytop.poincare or heavytop.events returns."
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,24 @@ AXES = {"axis1": (1.0, 0.0, 0.0), "axis2": (0.0, 1.0, 0.0), "axis3": (0.0, 0.0, 
 OF = (*AXES, "centre", "vertical")
 MOST_EXACT = 400
 """Samples whose exact errors or integrals are drawn; of more every nth is."""
+
+
+@runtime_checkable
+class Crossings(Protocol):
+    """States of one motion at which a function changes sign: :func:`heavytop.events` returns such."""
+
+    @property
+    def function(self) -> str: ...
+    def __len__(self) -> int: ...
+    def to_numpy(self) -> NDArray[np.float64]: ...
+
+
+@runtime_checkable
+class PoincareSection(Protocol):
+    """Those of several motions: :func:`heavytop.poincare` returns such."""
+
+    @property
+    def events(self) -> Sequence[Crossings]: ...
 
 
 @dataclass(frozen=True, slots=True)

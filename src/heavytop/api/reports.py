@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heavytop import arguments, records
@@ -18,7 +19,6 @@ from heavytop.measure.scalar import digits_kept
 from heavytop.precision import as_integer, ordered
 from heavytop.report.compare import compare as comparing
 from heavytop.report.compare import noise as policies
-from heavytop.report.compare.compare import beside
 from heavytop.report.document.document import row_name, short
 from heavytop.report.render import export as exports
 from heavytop.report.render import history as over
@@ -271,13 +271,18 @@ def compared(
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
     old, new = _report(baseline, "baseline", read), _report(candidate, "candidate", read)
-    surveys = None
+    folders = None
     if not isinstance(baseline, records.Report) and not isinstance(candidate, records.Report):
-        surveys = beside(arguments.path(baseline, "baseline")), beside(arguments.path(candidate, "candidate"))
-    found = comparing.compare(old, new, rules, KINDS, list_same=list_same, surveys=surveys)
+        folders = _folder(arguments.path(baseline, "baseline")), _folder(arguments.path(candidate, "candidate"))
+    found = comparing.compare(old, new, rules, KINDS, list_same=list_same, folders=folders)
     return Comparison(
         **{each.name: getattr(found, each.name) for each in fields(found) if each.init}, reports=(old, new)
     )
+
+
+def _folder(report: Path) -> Path:
+    """The folder of a report, which is it or its file."""
+    return report if report.is_dir() else report.parent
 
 
 def history(

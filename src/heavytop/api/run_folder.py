@@ -15,10 +15,8 @@ from msgspec.structs import replace
 
 from heavytop import arguments
 from heavytop.display import printable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
-from heavytop.features.survey import gathered as survey
-from heavytop.features.survey.gathered import COLUMNS, FILE, contents, gathered
 from heavytop.harness import checkpoint
 from heavytop.harness.checkpoint import Checkpoint, identity_of
 from heavytop.harness.plan import read, warnings
@@ -27,7 +25,6 @@ from heavytop.harness.run import Progress, unheard
 from heavytop.harness.run import run as run_tasks
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.registry import name_of, named, seconds_of
-from heavytop.precision import ordered
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.document.document import row_name
 from heavytop.report.render import page, text
@@ -115,20 +112,25 @@ class PlannedRun:
             check_rows(rows.path, [row], KINDS)
 
     def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterable[Row]]:
-        """The report's rows at each call, read from the disk once unless they are too many; surveys become a row
-        each, and their file is written.
+        """The report's rows at each call, read from the disk once unless they are too many; those
+        of kinds that gather them become fewer, and the files of these are written.
         """
         indices = range(len(self.tasks))
-        parts = [i for i in indices if KINDS[self.tasks[i].key.kind].gathers]
-        found: Sequence[Row] = []
-        if parts:
-            survey.write(self.directory / survey.FILE, contents(rows.rows(parts)))
-            found = gathered(zip(map(self.tasks.__getitem__, parts), rows.rows(parts), strict=True))
-        others = sorted(set(indices).difference(parts))
+        parts: dict[str, list[int]] = {}
+        for index in indices:
+            if KINDS[kind := self.tasks[index].key.kind].gathers:
+                parts.setdefault(kind, []).append(index)
+        found = [row for kind, places in parts.items() for row in self._gathered(kind, rows, places)]
+        others = sorted(set(indices).difference(*parts.values()))
         if len(self.tasks) > MOST_ON_A_PAGE:
             return lambda: chain(rows.rows(others), found, laws)
         held = [*rows.rows(others), *found, *laws]
         return lambda: held
+
+    def _gathered(self, kind: str, rows: Checkpoint, places: list[int]) -> list[Row]:
+        """What the rows in these places come to, of a kind that gathers them."""
+        tasks = [self.tasks[place] for place in places]
+        return KINDS[kind].gather(lambda: zip(tasks, rows.rows(places), strict=True), self.directory)
 
     def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:
         """Write all that a finished run leaves.  rows: all rows at each call."""
@@ -202,55 +204,8 @@ def require_fit(directory: Path, resume: bool) -> None:
     begun = checkpoint.FILE in content
     content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
     if resume and begun:
-        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE, survey.FILE}  # written, but not yet cleared up after
+        gathered = {file for kind in KINDS.values() for file in kind.gathers}
+        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered}  # written, but not yet cleared up after
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
-
-
-# Records of surveys, one row a motion, from Python.
-
-
-def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None = None, lazy: bool = False) -> Any:
-    """The records of a survey.
-
-    Arguments:
-        path: the folder of a run, or its survey.parquet.
-        columns: read only these; None for all.
-        lazy: a polars LazyFrame, which reads what is asked of it.
-
-    Returns:
-        A pandas DataFrame with one row a motion.  Its columns are ``sweep``, ``index`` in it, ``class``, ``outcome``,
-        ``digits_right``, ``error_max``, ``steps``, ``drift_*``, the rounded top and start.  What could not be measured
-        is missing.
-
-    Raises:
-        InputError: where there is no survey, for a column that is not there, and where pandas (of a lazy one, polars)
-            is not installed.
-    """
-    where = arguments.path(path, "path")
-    file = where / FILE if where.is_dir() else where
-    known = f"Use {', '.join(COLUMNS)}."
-    wanted = None if columns is None else [columns] if isinstance(columns, str) else ordered(columns, "columns", known)
-    for name in wanted or ():
-        if not isinstance(name, str) or name not in COLUMNS:
-            raise InputError(f"There is no column {quoted(name)} in a survey.", known)
-    if not file.is_file():
-        raise InputError(f"There is no survey at {where}.", f"Give the folder of a run that holds {FILE}.")
-    if arguments.flag(lazy, "lazy"):
-        try:
-            import polars
-        except ImportError:
-            raise InputError("A lazy survey needs polars.", "Install it with: pip install polars") from None
-        frame = polars.scan_parquet(file)
-        return frame if wanted is None else frame.select(wanted)
-    try:
-        import pandas
-    except ImportError:
-        raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
-    import pyarrow
-
-    try:
-        return pandas.read_parquet(file, columns=wanted, engine="pyarrow")
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{file} cannot be read: {error}.", "Give the folder of a finished run.") from None

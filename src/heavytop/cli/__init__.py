@@ -9,20 +9,22 @@ from __future__ import annotations
 import os
 import sys
 
-from heavytop.cli import integrators, motions, output, reports  # noqa: F401  # each adds its commands
+from heavytop.cli import docs, integrators, motions, output, reports  # noqa: F401  # each adds its commands
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
-from heavytop.features.body import command as body  # noqa: F401
-from heavytop.features.claims import command as claims  # noqa: F401
+from heavytop.features import FEATURES
 
 _ORDER = (
     *("run", "compare", "history", "show", "export"),
     *("propagate", "reference", "score", "audit", "claims", "figures", "body"),
     *("selftest", "check-integrator", "new", "hunt", "list", "docs"),
 )
-"""The commands in the order of ``heavytop --help``."""
-app.registered_commands.sort(key=lambda command: _ORDER.index(str(command.name)))
+"""The commands in the order of ``heavytop --help``; others come last."""
+for feature in FEATURES:
+    for commands in feature.commands:
+        feature.load(commands)
+app.registered_commands.sort(key=lambda command: (*_ORDER, command.name).index(command.name))
 
 _COMPLETE = "_HEAVYTOP_COMPLETE"
 """Set by the scripts of `heavytop --completion SHELL`."""

@@ -171,38 +171,3 @@ def writing() -> Iterator[None]:
 def numbers(text: str) -> list[str]:
     """The parts of ``a,b,c``, still text."""
     return [part.strip() for part in text.split(",")]
-
-
-# `docs`.
-
-
-def _begun(text: str) -> list[str]:
-    from heavytop.api.pages import topics
-
-    return [name for name in topics() if name.startswith(text)]
-
-
-@command
-def docs(
-    topic: Annotated[
-        str | None, typer.Argument(help="The name of a page; without it, the topics.", autocompletion=_begun)
-    ] = None,
-) -> int:
-    """Print a page of the documentation, or its topics.
-
-    On a terminal the page is laid out; elsewhere it is Markdown, as it was written.
-    """
-    from heavytop.api.pages import page, topics
-
-    if topic is None:
-        titles = topics()
-        width = max(map(len, titles))
-        for name, title in titles.items():
-            print(f"{name:{width}}  {title}")
-    elif sys.stdout.isatty():
-        from rich.markdown import Markdown
-
-        show_on_terminal(Markdown(page(topic)))
-    else:
-        print(page(topic), end="")
-    return 0

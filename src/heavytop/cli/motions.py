@@ -6,16 +6,18 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import wraps
+from functools import reduce, wraps
 from inspect import Parameter, Signature, signature
+from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, get_type_hints
 
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
 from heavytop.errors import InputError
+from heavytop.features import FEATURES
 from heavytop.files import replace
 
 if TYPE_CHECKING:
@@ -92,33 +94,6 @@ def write_motion(
         show_on_terminal(text(table))
 
 
-# The options of `propagate` and `reference` for events.
-
-
-Events = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--events",
-        metavar="FUNCTION",
-        help="Also the times, up to the last, at which omega1=0 or the like changes sign.",
-    ),
-]
-EventDirection = Annotated[
-    int, typer.Option("--event-direction", help="1: where it rises with time; -1: where it falls; 0: both.")
-]
-
-
-def requested(texts: Sequence[str] | None, direction: int) -> list[str]:
-    """The functions asked for, read before anything is computed; raises InputError for what is none."""
-    from heavytop.features.events.api import require_direction
-    from heavytop.features.events.functions import event_function
-
-    require_direction(direction)
-    for text in texts or ():
-        event_function(text)
-    return list(texts or ())
-
-
 def farthest(times: Sequence[str]) -> Fraction:
     """The time farthest from 0."""
     from heavytop.precision import exact
@@ -187,8 +162,6 @@ class _Options(NamedTuple):
     case: CaseName = None
     system: SystemName = None
     normalize: Normalize = False
-    events: Events = None
-    event_direction: EventDirection = 0
     show: Show = None
     point: Point = None
     pivot: Pivot = None
@@ -197,6 +170,19 @@ class _Options(NamedTuple):
     json: Json = False
 
 
+class MotionOptions(Protocol):
+    """Options by which a feature measures more of a motion; a NamedTuple of options of typer."""
+
+    _fields: ClassVar[tuple[str, ...]]
+
+    def require(self) -> str:
+        """What is measured, said while it is; "" for nothing.  Raises InputError for what cannot be read."""
+
+    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
+        """What has ``to_json()``, entries of the document of the motion, and ``text()``, shown behind it."""
+
+
+_FURTHER: list[Any] = [feature.load(feature.motion) for feature in FEATURES if feature.motion]
 _SHARED = list(_Options._fields)
 _DATA = _SHARED[: _SHARED.index("case")]
 """Options of body and start, by the keys of a plan."""
@@ -205,51 +191,44 @@ _DATA = _SHARED[: _SHARED.index("case")]
 class _Asked:
     """What is asked for, read before anything is computed; raises InputError for what cannot be read."""
 
-    def __init__(self, times: str, options: _Options) -> None:
+    def __init__(self, times: str, options: _Options, further: list[MotionOptions]) -> None:
         require_one_output(options.csv, options.latex, options.json)
         given = {name: getattr(options, name) for name in _DATA}
         self.options = options
         self.top, self.start, self.system = _motion(given, options.case, options.system, options.normalize)
         self.outputs, self.times = _outputs(options.show, options.point, options.pivot), numbers(times)
-        self.functions = requested(options.events, options.event_direction)
+        self.further = [(each, what) for each in further if (what := each.require())]
 
-    def events(self, expected: float, **settings: Any) -> list[Any]:
-        """The events of each function up to the time farthest from 0.
+    def beside(self, expected: float, **settings: Any) -> list[Any]:
+        """What features measure of the motion up to the time farthest from 0.
 
-        expected: seconds.  settings: of :func:`heavytop.features.events.api.events`.
+        expected: seconds.  settings: of :meth:`MotionOptions.measure`.
         """
-        if not self.functions:
-            return []
-        from heavytop.features.events.api import events
-
-        where, direction = (self.top, self.start, farthest(self.times)), self.options.event_direction
-        with reaching("events", expected) as reach:
-            settings |= {"system": self.system, "reached": _part_of(self.times, reach)}
-            return [events(*where, function, direction, **settings) for function in self.functions]
+        found = []
+        for options, what in self.further:
+            with reaching(what, expected) as reach:
+                settings |= {"system": self.system, "reached": _part_of(self.times, reach)}
+                found.append(options.measure(self.top, self.start, farthest(self.times), **settings))
+        return found
 
     def write(
         self,
         document: Callable[[], dict[str, Any]],
         table: Callable[[], MotionTable],
         text: Callable[[MotionTable], RenderableType],
-        events: Sequence[Any],
+        beside: Sequence[Any],
     ) -> None:
-        """The motion with its events behind, as asked for."""
+        """The motion, with what was measured of it behind, as asked for."""
 
-        def text_with_events(shown: MotionTable) -> RenderableType:
+        def whole_text(shown: MotionTable) -> RenderableType:
             from rich.console import Group
 
-            from heavytop.report.render.motion import events_text
+            return Group(text(shown), *(each.text() for each in beside)) if beside else text(shown)
 
-            return Group(text(shown), events_text(events))
+        def whole_document() -> dict[str, Any]:
+            return reduce(or_, (each.to_json() for each in beside), document())
 
-        def document_with_events() -> dict[str, Any]:
-            return {**document(), "events": [each.to_json() if hasattr(each, "to_json") else each for each in events]}
-
-        if events:
-            write_motion(document_with_events, table, text_with_events, self.options)
-        else:
-            write_motion(document, table, text, self.options)
+        write_motion(whole_document, table, whole_text, self.options)
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
@@ -258,16 +237,19 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
     @wraps(function)
     def with_options(times: str, **options: Any) -> int:
         shared = _Options(**{name: options.pop(name) for name in _SHARED})
-        return function(_Asked(times, shared), **options)
+        further = [kind(**{name: options.pop(name) for name in kind._fields}) for kind in _FURTHER]
+        return function(_Asked(times, shared, further), **options)
 
-    hints = get_type_hints(_Options, include_extras=True) | get_type_hints(function, include_extras=True)
+    sources = (function, _Options, *_FURTHER)
+    hints = {name: hint for each in sources for name, hint in get_type_hints(each, include_extras=True).items()}
     given = {
         each.name: each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
-        for source in (function, _Options)
+        for source in sources
         for each in signature(source).parameters.values()
     }
     own = [name for name in signature(function).parameters if name != "asked"]
-    which, where = _SHARED[: _SHARED.index("events")], _SHARED[_SHARED.index("events") :]
+    own += [name for kind in _FURTHER for name in kind._fields]
+    which, where = _SHARED[: _SHARED.index("show")], _SHARED[_SHARED.index("show") :]
     times = Parameter("times", Parameter.KEYWORD_ONLY, annotation=Times)
     vars(with_options)["__signature__"] = Signature([times, *(given[name] for name in (*which, *own, *where))])
     return with_options
@@ -318,7 +300,7 @@ def propagate(
 
         return motion_text(motion, shown)
 
-    asked.write(motion.to_json, table, text, asked.events(_PROPAGATE_SECONDS, precision=precision, **settings))
+    asked.write(motion.to_json, table, text, asked.beside(_PROPAGATE_SECONDS, precision=precision, **settings))
     return 0 if motion.complete else 3
 
 
@@ -359,7 +341,7 @@ def reference(
 
         return reference_text(found, shown)
 
-    asked.write(lambda: found.document(asked.outputs), table, text, asked.events(_REFERENCE_SECONDS, digits=digits))
+    asked.write(lambda: found.document(asked.outputs), table, text, asked.beside(_REFERENCE_SECONDS, digits=digits))
     return 0
 
 

@@ -12,11 +12,10 @@ from typing import Any
 from heavytop.cases import Case
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
-from heavytop.features.score.trajectories.files import COLUMNS
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.rounding_noise import FACTORS, factor, scaled
 from heavytop.precision import dot
-from heavytop.top.equations import GYROSTAT
+from heavytop.top.equations import GYROSTAT, VARIABLES
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 
 _TIMES = ("1", "5", "10")
@@ -76,7 +75,7 @@ def _joined(value: str | list[str]) -> str:
 
 def _csv(data: dict[str, Any]) -> str:
     """The comments above the columns of a table, and the header."""
-    return "\n".join([*(f"# {key}: {_joined(value)}" for key, value in data.items()), ",".join(COLUMNS)])
+    return "\n".join([*(f"# {key}: {_joined(value)}" for key, value in data.items()), ",".join(("t", *VARIABLES))])
 
 
 def _toml(data: dict[str, Any]) -> str:

@@ -17,7 +17,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import islice, product
-from time import monotonic
 from typing import Any
 
 from heavytop.errors import HeavyTopError, NotAsked, OutOfTime
@@ -25,7 +24,7 @@ from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import said
-from heavytop.processes import GuardedProcess
+from heavytop.processes import GuardedProcess, stopwatch
 from heavytop.records import FAILED, OUT_OF_TIME, Row
 
 _BASE, _BASE_LATER = 30.0, 10.0
@@ -117,7 +116,8 @@ class _Worker:
 
     It serves one third-party integrator at most, which may change whatever is around it.
 
-    rows: of its tasks, with their indices; the first is under way, since ``began``.  precision: of its last task.
+    rows: of its tasks, with their indices; the first is under way.  seconds: for how long, without what its process
+    waited for a processor.  precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
@@ -125,9 +125,10 @@ class _Worker:
         self._process: GuardedProcess | None = None
         self._guest = ""
         self._hello: Future[int] | None = None
+        self._pid: int | None = None
         self.rows: deque[tuple[int, Future[Row]]] = deque()
         self.precision = ""
-        self.began = 0.0
+        self.seconds = stopwatch()
         self.limit: float | None = None
 
     @property
@@ -135,7 +136,7 @@ class _Worker:
         """Seconds until its task is to be ended; None for no limit, or where the process is not yet there."""
         if self.limit is None or self._process is None or self._hello is not None:
             return None
-        return self.began + self.limit - monotonic()
+        return self.limit - self.seconds()
 
     def takes(self, task: Task, ahead: int, costs: Mapping[int, float]) -> bool:
         """Whether it may be given one more, with so many before it, which are short: no task waits for a long one."""
@@ -151,7 +152,7 @@ class _Worker:
             self.end()
         self._guest = guest
         if not self.rows:
-            self.limit, self.began = limit, monotonic()
+            self.limit, self.seconds = limit, stopwatch(self._pid)
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
             self._hello = self._process.submit(os.getpid)
@@ -170,7 +171,7 @@ class _Worker:
         """Its first task, unless it was ended with it, is done, and the next under way."""
         if self.rows:
             self.rows.popleft()
-        self.began = monotonic()
+        self.seconds = stopwatch(self._pid)
 
     @property
     def ending(self) -> str:
@@ -185,14 +186,15 @@ class _Worker:
         """Puts a guard into the group of a process that has just begun, and starts its clock."""
         if self._process is not None and self._hello is not None and self._hello.done():
             with suppress(BrokenProcessPool):  # a process that is gone is noticed with its row
-                self._process.guard(self._hello.result())
-            self._hello, self.began = None, monotonic()
+                self._pid = self._hello.result()
+                self._process.guard(self._pid)
+            self._hello, self.seconds = None, stopwatch(self._pid)
 
     def end(self) -> None:
         """Kills the process and whatever it started."""
         if self._process is not None:
             self._process.end()
-        self._process = self._hello = None
+        self._process = self._hello = self._pid = None
         self.rows.clear()
         self._guest = ""
 
@@ -303,7 +305,7 @@ def in_limited_process(kind: MeasuredKind, task: Task, limit: float) -> tuple[Ro
             while (row := _ended(worker, task, 1.0, limits)) is None:
                 _wait([worker])
                 worker.greet()
-            return row, monotonic() - worker.began
+            return row, worker.seconds()
         except BrokenProcessPool:
             how = worker.ending
             worker.end()
@@ -332,7 +334,7 @@ def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row |
         else:  # it changed what is around it, such as modules of this program
             row = failed(task, f"measuring {name} failed: {type(error).__name__}: {said(error)}")
             worker.end()
-        limits.took(task, cost, row, monotonic() - worker.began)
+        limits.took(task, cost, row, worker.seconds())
         worker.finish()
         return row
     if worker.left is None or worker.left > 0:

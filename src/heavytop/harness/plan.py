@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from fractions import Fraction
-from functools import partial, reduce
+from functools import reduce
 from importlib import resources
 from itertools import accumulate
 from operator import or_
@@ -268,6 +268,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     if not 0 <= seed <= MOST_SEEDS:
         raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
     own, swept = _own(plan), _swept(plan)
+    sweeps = list(zip(plan.sweep, swept.values(), strict=True))
     known = own | {name: cases[0] for name, cases in swept.items()}
     asked = {name for table in plan.measure for name in getattr(table, "cases", [])}
     if unused := known.keys() - asked:
@@ -278,7 +279,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
         for whole in plan.measure
-        for table, cases in _parts(whole, _chunked(plan, swept) if whole.chunked else swept)
+        for table, cases in _parts(whole, {name: whole.swept(*each) for name, each in zip(swept, sweeps, strict=True)})
     ]
     sources: dict[str, IntegratorSource | None] = {}
     seen: dict[RowKey, str] = {}
@@ -343,16 +344,6 @@ def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
                 raise InputError(f"The sweeps {other.name} and {sweep.name} are the same.", "Take one of them out.")
         swept[f"sweep:{sweep.name}"] = sweep.cases()
     return swept
-
-
-def _chunked(plan: Plan, swept: Mapping[str, Sequence[Case]]) -> dict[str, Sequence[Case]]:
-    """The chunks of each sweep, by the same names."""
-    from heavytop.features.survey.measured import chunks, number_of
-
-    return {
-        name: Lazy(number_of(cases), partial(chunks, sweep, cases))
-        for sweep, (name, cases) in zip(plan.sweep, swept.items(), strict=True)
-    }
 
 
 def _require_name(name: str, what: str) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import gc
 import math
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, ClassVar, Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import msgspec
 
@@ -24,6 +25,7 @@ from heavytop.errors import (
     Unsupported,
 )
 from heavytop.harness.checkpoint import Saved
+from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
@@ -299,16 +301,15 @@ Find = Callable[[str], Case]
 
 
 class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
-    """A table `[[measure]]` of a plan; unknown keys are errors.
-
-    chunked: whether its tasks are chunks of a sweep, not single motions.
-    """
-
-    chunked: ClassVar[bool] = False
+    """A table `[[measure]]` of a plan; unknown keys are errors."""
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
+
+    def swept(self, sweep: Sweep, cases: Sequence[Case]) -> Sequence[Case]:
+        """The cases that its tasks on a sweep are of: each, or others that hold many of them."""
+        return cases
 
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
@@ -322,13 +323,13 @@ class MeasuredKind(Protocol):
 
     name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
     concludes: whether all rows of the kind together come to more rows.
-    gathers: whether its rows are parts of one that :mod:`heavytop.features.survey` makes of them for the report.
+    gathers: the files that :meth:`gather` writes, where its rows are parts of those of the report.
     """
 
     name: str
     table: type[PlanTable] | None = None
     concludes: bool = False
-    gathers: bool = False
+    gathers: tuple[str, ...] = ()
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """The row of ``task``; a run that fails is a row with its outcome.
@@ -347,6 +348,10 @@ class MeasuredKind(Protocol):
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
         """What all rows of the kind together come to; called where it :attr:`concludes`."""
+        return []
+
+    def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:
+        """The rows of the report, of all measured ones; called where it :attr:`gathers`, which go into the folder."""
         return []
 
 

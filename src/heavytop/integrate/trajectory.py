@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from heavytop.top.stability import Stability
+
 
 # What a computed run tells of the attitude: in double at once for all samples, else from the exact native numbers.
 
@@ -526,6 +528,17 @@ class Trajectory(LazyStates, Tabular, InSpace):
         problem = self.problem
         return problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached
 
+    @property
+    def stability(self) -> Stability | None:
+        """Whether the motion from the exact start is stable, where it is an equilibrium, a permanent rotation or a
+        regular precession; else None.
+        """
+        from heavytop.top.stability import stability
+
+        problem = self.problem
+        top, start = problem.given or (problem.top, problem.start)
+        return stability(problem.system, problem.system.parameters(top, start), start.flat)
+
     def amplification_text(self) -> str:
         """What the amplification costs, in a sentence; "" where it costs fewer than three digits."""
         (lost, followed), precision = self.digits_lost, self.problem.precision
@@ -565,6 +578,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
             notes.append(f"{len(self.times)} states went to the observer")
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
+        if (steady := self.stability) is not None:
+            notes.append(steady.text(precision.bits))
         if lost := self.amplification_text():
             notes.append(lost)
         return TitledTable(title, ("t", *names), rows, notes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -229,6 +229,7 @@ class Motion:
             "seconds": run.seconds,
             "amplification": run.amplification if math.isfinite(run.amplification) else None,
             "digits_lost": dict(zip(("value", "followed"), run.digits_lost, strict=True)),
+            "stability": None if run.stability is None else asdict(run.stability),
             "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
         }
         if run.problem.xi is not None:

@@ -37,6 +37,7 @@ from heavytop.top.attitude import Output, document_of, euler_terms, first_sign, 
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, TimeText
+from heavytop.top.stability import Stability, stability
 
 if TYPE_CHECKING:
     import numpy as np
@@ -274,7 +275,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     the ξ(0) of `heavytop docs outputs`; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
-    derivatives: on request, with respect to the start and the data.
+    derivatives: on request, with respect to the start and the data.  stability: of a motion that is steady.
     """
 
     method: str
@@ -298,6 +299,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
     start_quaternion: list[str] | None = None
     start_matrix: list[str] | None = None
     start_attitude: str | None = None
+    stability: Stability | None = None
 
     @property
     def times(self) -> list[TimeText]:
@@ -412,7 +414,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
     def _table(self) -> TitledTable:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
         title = f"{self.system}, known to {self.digits} digits: {self.method}"
-        notes = [f"largest radius {radius_text(worst)}"]
+        notes = [f"largest radius {radius_text(worst)}", *([self.stability.text()] if self.stability else [])]
         if self.xi is not None:
             notes.append(f"xi(0) = ({', '.join(self.xi)})")
         if self.digits > _SHOWN:
@@ -469,7 +471,9 @@ def reference(
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)
-    derived = None
+    resolved, steady, derived = known.resolved, None, None
+    if resolved.uncertainty is None:
+        steady = stability(system, system.parameters(resolved.top, resolved.start), resolved.start.flat)
     if derivatives is not None:
         derived = known_derivatives(top, start, instants, digits, system, derivatives, effort)
     found = Reference(
@@ -480,6 +484,7 @@ def reference(
         system=system.name,
         **motion_texts(top, start, digits),
         derivatives=derived,
+        stability=steady,
     )
     if not attitude:
         states = [ball_texts(known.state, known.method, time, digits) for time in instants]

@@ -205,7 +205,12 @@ def _xi_dot_gamma(_: Parameters, y: Any) -> Any:
 # Distance of a computed motion from a known one that starts from the same rounded data.
 
 
-SOLUTION_ERROR = "solution_error"
+SOLUTION_ERROR, INTEGRATION_ERROR = "solution_error", "integration_error"
+"""Distance to the true motion; to the motion that the formulas of a claim do solve."""
+ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
+"""Distance in one number: the largest over the samples, and that at the end."""
+OBSERVED_ORDER = Quantity("observed_order")
+"""Of a method, by its errors of single steps."""
 COMPONENTS = ("omega", "gamma", "along", "across")
 
 Errors = tuple[list[Sums], bool]

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import permutations
 from typing import Any, NamedTuple, Protocol
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.precision import Scalar, Vector, cross, dot, shown
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -522,3 +522,13 @@ def square_of_rate(system: System, p: Parameters, y: tuple[Any, ...]) -> Any:
             across = [max(abs(vector[j]), abs(vector[k])) for vector in (p.moment, gamma)]
             found.append(across[0] * across[1] / inertia[i])
     return max(found)
+
+
+def component(name: str) -> int:
+    """The place of a component in the state, by a name such as omega1 or γ3; raises InputError for another."""
+    plain = str(name).strip()
+    for greek, latin in (("Ω", "omega"), ("\N{OHM SIGN}", "omega"), ("γ", "gamma")):
+        plain = plain.replace(greek, latin)
+    if plain not in VARIABLES:
+        raise InputError(f"{quoted(name)} is not a component of the state.", f"Use {', '.join(VARIABLES)}.")
+    return VARIABLES.index(plain)

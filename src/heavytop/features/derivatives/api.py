@@ -9,11 +9,9 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop import arguments
-from heavytop.arguments import Number, Numbers
+from heavytop.arguments import MOST_STATES, Number, Numbers, bits_of, component, required
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
-from heavytop.features.score.measurement import required
-from heavytop.features.score.trajectories.observed import MOST, bits_of, component
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.derivatives import PARAMETERS, STARTS, Derivatives, known_derivatives
 from heavytop.measure.scalar import digits_of, digits_text
@@ -132,8 +130,8 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
         found.append([list(row) for row in rows])
     if len(found) != count:
         raise InputError(f"There are {count} times and {len(found)} Jacobians.", "Give one Jacobian for each time.")
-    if count > MOST:
-        raise InputError(f"{count} Jacobians are too many to score.", f"Give at most {MOST}.")
+    if count > MOST_STATES:
+        raise InputError(f"{count} Jacobians are too many to score.", f"Give at most {MOST_STATES}.")
     return found
 
 

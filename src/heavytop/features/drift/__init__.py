@@ -1,1 +1,8 @@
-"""Drift of the first integrals and distance to the true motion, over one run."""
+"""Drift of the first integrals, and distance to the true motion."""
+
+from heavytop.feature import Feature
+
+FEATURE = Feature(
+    __name__,
+    kinds=("kind:DriftKind",),
+)

@@ -24,7 +24,7 @@ from heavytop.exact.flint.balls import radius_text
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
 from heavytop.precision import Array, decimal_text, exact, native_text
-from heavytop.top.equations import NAMES, VARIABLES, Parameters, System
+from heavytop.top.equations import NAMES, VARIABLES, Parameters, System, component
 
 if TYPE_CHECKING:
     import numpy as np
@@ -590,16 +590,6 @@ class Section(Tabular):
         title = f"Poincaré section {first.function} of {len(self)} motions, {sum(map(len, self.events))} points"
         notes = [] if self.on_one_level else ["the starts are on different levels of energy or M·γ"]
         return TitledTable(title, ("start", "points", "energy", "M·γ"), LazyLines(len(self), line), notes)
-
-
-def component(name: str) -> int:
-    """The place of a component in the state, by a name such as omega1 or γ3; raises InputError for another."""
-    plain = str(name).strip()
-    for greek, latin in (("Ω", "omega"), ("\N{OHM SIGN}", "omega"), ("γ", "gamma")):
-        plain = plain.replace(greek, latin)
-    if plain not in VARIABLES:
-        raise InputError(f"{quoted(name)} is not a component of the state.", f"Use {', '.join(VARIABLES)}.")
-    return VARIABLES.index(plain)
 
 
 _EXPLAINED = {

@@ -1,1 +1,8 @@
-"""How errors grow with the horizon."""
+"""How drift and error grow with the horizon."""
+
+from heavytop.feature import Feature
+
+FEATURE = Feature(
+    __name__,
+    kinds=("kind:Growth",),
+)

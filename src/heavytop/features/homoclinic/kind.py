@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from heavytop.cases import Case
 from heavytop.errors import OutOfReach
-from heavytop.features.claims.kinds.claim_model import INTEGRATION_ERROR, claim_error
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.features.homoclinic.break_away_law import ESCAPE, break_away_law, escape_times
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import samples, signed
@@ -21,7 +21,7 @@ from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
+from heavytop.measure.scorer import DRIFT, INTEGRATION_ERROR, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
@@ -151,7 +151,7 @@ class Homoclinic(Kind):
                 NOISE_BAND,
             ],
         )
-        yield from (Chart(claim_error), Chart(escape_times))
+        yield Chart(escape_times)
 
 
 def _headline(known: Sequence[Row]) -> Headline:
@@ -225,7 +225,7 @@ def _end(case: Case, bits: int) -> float:
 
 
 def _scorer(case: Case, problem: Problem, truth: Truth, keep: Sequence[Fraction] = ()) -> Scorer:
-    name = INTEGRATION_ERROR if case.claim else SOLUTION_ERROR
+    name = INTEGRATION_ERROR if isinstance(case.homoclinic, ErshkovPartial) else SOLUTION_ERROR
     until = WINDOW / case.rate
     return Scorer(problem, truth, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
 

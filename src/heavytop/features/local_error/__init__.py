@@ -1,1 +1,8 @@
-"""Error of single steps."""
+"""The errors of single steps, and the order that they show."""
+
+from heavytop.feature import Feature
+
+FEATURE = Feature(
+    __name__,
+    kinds=("kind:LocalErrorKind",),
+)

@@ -17,6 +17,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
 from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.scorer import OBSERVED_ORDER
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Beside, Row, RowKey
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
@@ -103,7 +104,7 @@ class LocalErrorKind(Kind):
 
 def _with_fault(row: Row, error: local_error.LocalError) -> Row:
     """The row with the fault of the field that explains its steps, where these show no order, or less than declared."""
-    seen = row.metrics.get(local_error.ORDER.text)
+    seen = row.metrics.get(OBSERVED_ORDER.text)
     if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
         return row
     found = field_fault(error.problem, error.calls, row.order or 0)
@@ -111,7 +112,7 @@ def _with_fault(row: Row, error: local_error.LocalError) -> Row:
 
 
 def _cells(row: Row) -> list[Cell]:
-    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
+    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), OBSERVED_ORDER)
     return [
         clip(row.case + computed_by(row)),
         row.precision,
@@ -132,7 +133,7 @@ def _said(row: Row) -> str:
     """The largest error of a step, and the order beside the one that the integrator declares."""
     what, largest = clip(row.case + computed_by(row)), short(row.metrics[_LARGEST].value)
     text = f"{what} in {row.precision}: a step is off by {largest} eps"
-    order = row.metrics.get(local_error.ORDER.text)
+    order = row.metrics.get(OBSERVED_ORDER.text)
     if order is None:
         return f"{text} at most.{_explained(row)}"
     if not row.order:

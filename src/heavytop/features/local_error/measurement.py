@@ -26,7 +26,7 @@ from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
-from heavytop.measure.scorer import Running, Sums
+from heavytop.measure.scorer import OBSERVED_ORDER, Running, Sums
 from heavytop.precision import Precision, decimal_text, exact, number
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.top.equations import System
@@ -35,7 +35,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 _NEAR, _FAR = 2, 3
 _ABOVE_ROUNDING = 1000
 """Times eps and the size of the state: an error from which the order of a rounded step is read."""
-LOCAL_ERROR, ORDER = Quantity("local_error_ulp"), Quantity("observed_order")
+LOCAL_ERROR = Quantity("local_error_ulp")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +108,9 @@ class LocalError:
         with working_precision(self.bits):
             found = self.running.metrics(LOCAL_ERROR)
             if self.orders:
-                found[ORDER] = metric(arb(round(median(self.orders))), "value")
+                found[OBSERVED_ORDER] = metric(arb(round(median(self.orders))), "value")
             elif not self.running.count:
-                found[ORDER] = Metric("missing", None, "value")
+                found[OBSERVED_ORDER] = Metric("missing", None, "value")
         found.pop(LOCAL_ERROR.over("final"))
         return by_name(found)
 

@@ -9,10 +9,10 @@ from fractions import Fraction
 from typing import Any, NamedTuple, cast
 
 from heavytop import arguments
-from heavytop.arguments import Number, Numbers
+from heavytop.arguments import Number, Numbers, required
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
-from heavytop.features.score.measurement import Assessment, assess, passed, required
+from heavytop.features.score.measurement import Assessment, assess, passed
 from heavytop.features.score.text import diagnosis_text, score_report, to_json
 from heavytop.features.score.trajectories.observed import (
     GivenTrajectory,

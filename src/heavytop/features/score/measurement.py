@@ -13,7 +13,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.errors import HeavyTopError, InputError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.diagnosis import Diagnosis, diagnose
 from heavytop.features.score.diagnose.readings import Seen, disagreement
@@ -38,7 +38,7 @@ from heavytop.measure.scalar import (
 )
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
 from heavytop.measure.truth import Truth, truth, truth_with_attitude
-from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, physical, round_to, shown, time_text
+from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, round_to, shown, time_text
 from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
 
 Progress = Callable[[], None]
@@ -451,14 +451,6 @@ def _peer(
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None
     return Peer(PEER, precision.name, digits, run.steps)
-
-
-def required(digits: Any) -> Fraction:
-    """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
-    asked = physical(exact(digits), "require")
-    if asked <= 0:
-        raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
-    return asked
 
 
 def passed(row: Row, needed: Fraction | None) -> bool | None:

@@ -1,1 +1,9 @@
-"""Surveys: many motions in arrays, from the draw to the disk."""
+"""Many motions of a sweep: a record each, and what they come to together."""
+
+from heavytop.feature import Feature
+
+FEATURE = Feature(
+    __name__,
+    kinds=("kind:Survey",),
+    python={"api": ("read_survey",)},
+)

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
 
 import msgspec
 import numpy
 
+from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features.survey.charts import survey_charts
-from heavytop.features.survey.gathered import DATA, chunk_bytes, of_motions
-from heavytop.features.survey.measured import Chunk, Drawn, drawn, measured
+from heavytop.features.survey.gathered import DATA, FILE, chunk_bytes, contents, gathered, of_motions, write
+from heavytop.features.survey.joined import METRIC, worse_motions
+from heavytop.features.survey.measured import Chunk, Drawn, chunks, drawn, measured, number_of
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
+from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
-from heavytop.records import Against, Beside, Metric, Row, RowKey
+from heavytop.records import Against, Beside, Metric, Row, RowKey, Spread
 from heavytop.report.document.document import Block, Card, Chart, In, Note
+from heavytop.report.document.motions import LossLimits, WorseMotions
 
 NAME = "survey"
 _SWEEP = "sweep:"
@@ -40,7 +45,10 @@ class SurveyTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
     tolerance: str = ""
     map: list[str] = msgspec.field(default_factory=list)
-    chunked: ClassVar[bool] = True
+
+    def swept(self, sweep: Sweep, cases: Sequence[Case]) -> Sequence[Case]:
+        """The chunks of the sweep."""
+        return Lazy(number_of(cases), partial(chunks, sweep, cases))
 
     def tasks(self, find: Find) -> list[Task]:
         """One for each sweep, of its first motion; a plan makes one of each chunk from it."""
@@ -78,7 +86,7 @@ class Survey(Kind):
 
     name = NAME
     table = SurveyTable
-    gathers = True
+    gathers = (FILE,)
     noise_factor = 5.0
     place = 33
 
@@ -104,6 +112,19 @@ class Survey(Kind):
         row = exact_row(task, f"{task.case.count} motions", Against("computed", _METHOD, f"{radius:.3g}"), {})
         everything = found | _names(task, motions) | _data(motions)
         return msgspec.structs.replace(row, bits=precision.bits, chunk=chunk_bytes(everything))
+
+    def join(
+        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
+    ) -> WorseMotions | None:
+        """By the records of survey.parquet, where both folders have it."""
+        if not isinstance(new.spread, Spread):
+            return None
+        return worse_motions(old, new, (folders[0] / FILE, folders[1] / FILE), limits(METRIC))
+
+    def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:
+        """One row for each sweep and integrator; the records of all motions go into survey.parquet."""
+        write(folder / FILE, contents(row for _, row in rows()))
+        return gathered(rows())
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """A line a row."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from heavytop.features.work_precision.curves import ERRORS, Lead, WorkPrecisionLine, leads, panels, seconds_text
+from heavytop.features.work_precision.curves import Lead, WorkPrecisionLine, leads, panels, seconds_text
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
+from heavytop.measure.scorer import ERRORS
 from heavytop.records import UNRESOLVED_SECONDS, Row, Series
 from heavytop.report.document.document import (
     DASHED,

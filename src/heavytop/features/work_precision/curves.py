@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from heavytop.integrate.registry import INTEGRATORS
+from heavytop.measure.scorer import ERRORS
 from heavytop.precision import parse
-from heavytop.records import UNMEASURED, UNRESOLVED_SECONDS, Quantity, Row
-from heavytop.report.document.document import In, Table
+from heavytop.records import UNMEASURED, UNRESOLVED_SECONDS, Row
+from heavytop.report.document.document import Headline, In, Table, clip, scientific
 
 _MOST_CASES = 2
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
-ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
-"""The largest over the samples, and that at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,3 +258,32 @@ def seconds_text(seconds: float, digits: int = 3) -> str:
     """1.5 s, or 15 ms."""
     value, unit = (seconds, "s") if seconds >= 1 else (1000 * seconds, "ms")
     return f"{value:.0f} {unit}" if value >= 100 else f"{value:.{digits}g} {unit}"
+
+
+def fastest(rows: Sequence[Row]) -> Headline | None:
+    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
+    error of all.
+    """
+    found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
+    if not found:
+        return _least_error(rows)
+    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in found]
+    (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
+    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, found, strict=True) if winner == first]
+    behind = {other for winner, other in ends if winner == first}
+    where = f"{count} of {len(found)} motions" if rest else f"all {len(found)} motions"
+    where = clip(found[0][0].case, 40) if len(found) == 1 else where
+    low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
+    times = low if low == high else f"{low} to {high}"
+    other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
+    said = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
+    return Headline("; ".join([said, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
+
+
+def _least_error(rows: Sequence[Row]) -> Headline | None:
+    best = [(line.best, case, line.label) for case, lines in panels(rows).items() for line in lines if line.best]
+    if not best:
+        return None
+    point, case, label = min(best, key=lambda each: each[0].log10)
+    said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
+    return Headline(f"{said}, in {point.takes()}.")

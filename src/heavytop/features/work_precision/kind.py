@@ -16,11 +16,11 @@ from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.features.work_precision.charts import method_growth, work_precision
 from heavytop.features.work_precision.curves import (
     CONSTANTS,
-    ERRORS,
     LANES,
     OURS,
     WorkPrecisionLine,
     beside_ours,
+    fastest,
     leads,
     panels,
 )
@@ -33,13 +33,12 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kind import Kind, with_explanation
 from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
-from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
+from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import FINEST, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import Block, Chart, In, Note
 from heavytop.report.document.document import Table as Cells
-from heavytop.report.render.page import fastest
 from heavytop.report.store.checks import CLOSE, bound, ended, size_of, sizes
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State

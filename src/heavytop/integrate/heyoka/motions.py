@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from time import perf_counter
@@ -13,7 +13,8 @@ import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, TaylorStep, Trajectory, sampled
-from heavytop.precision import OrderedRing, Precision, exact, number, numbers
+from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, exact_text, number, numbers
+from heavytop.top.amplification import rate
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
 
@@ -31,6 +32,8 @@ _FAR = 100
 """Longest steps: farther times are foreseen by the mean step."""
 _FORGETS = 0.98
 """The part of a miss, in steps, that still counts at the next far time."""
+_SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
+"""Rates within which no Taylor coefficient of double is 0 or infinite for its size alone."""
 
 
 @dataclass(slots=True)
@@ -308,6 +311,22 @@ def integrate_to_samples(
     mark: Callable[[ResumePoint], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
+    unit = _unit(problem)
+    if unit != 1 and place is None:
+        scaled, seen = _in_unit(problem, unit), observer and _seen_in(observer, unit)
+        factor = number(unit, problem.precision)
+        run = integrate_to_samples(
+            tool, engine, scaled, [t * factor for t in targets], step_limit, seen, between, stepping=stepping
+        )
+        times, states = tuple(time / unit for time in run.times), [_from_unit(state, unit) for state in run.states]
+        return replace(
+            run,
+            problem=problem,
+            times=times,
+            states=numpy.array(states).reshape(-1, len(engine.state)),
+            time_reached=run.time_reached / unit,
+            flags={**run.flags, "unit": exact_text(unit)},
+        )
     if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
         found = _in_one_call(tool, engine, problem, targets, step_limit)
         if found is not None:
@@ -320,6 +339,34 @@ def integrate_to_samples(
     return _trajectory(
         tool, engine, problem, stepper, *sampled(stepper, targets, tool.flags, perf_counter(), observer, place, mark)
     )
+
+
+def _unit(problem: Problem) -> Fraction:
+    """1/unit of time in which a motion is integrated: its own, a power of 2, where a Taylor coefficient of double of
+    the order that heyoka takes, rate^20, is 0 or infinite in the time given; else 1.
+    """
+    if problem.precision.family != "double" or problem.precision.bits != DOUBLE.bits:
+        return Fraction(1)
+    own = rate(problem.system, problem.parameters, problem.start.flat)
+    return Fraction(1) if not own or _SLOWEST < own < _FASTEST else own
+
+
+def _in_unit(problem: Problem, unit: Fraction) -> Problem:
+    """The same motion with the time times ``unit``; exact, but for what the format has no number."""
+    p, rotors = problem.parameters, tuple(Fraction(value) / unit for value in problem.parameters.rotors)
+    moment = tuple(Fraction(value) / unit**2 for value in p.moment)
+    slower = Parameters(p.inertia, moment, rotors if isinstance(p.rotor, tuple) else rotors[0])
+    start = State([value / unit for value in problem.start.omega], problem.start.gamma)
+    return Problem(problem.system, problem.precision, slower, start, problem.xi)
+
+
+def _from_unit(state: Any, unit: Fraction) -> Any:
+    """A native state in the time given."""
+    return numpy.concatenate([state[:3] * float(unit), state[3:]])
+
+
+def _seen_in(observer: Observer, unit: Fraction) -> Observer:
+    return lambda time, state: observer(time / unit, _from_unit(state, unit))
 
 
 def states_at(

@@ -16,11 +16,9 @@ from typing import NamedTuple
 import msgspec
 
 from heavytop.display import plural
-from heavytop.features.local_error.measurement import ORDER
-from heavytop.features.work_precision.curves import ERRORS
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
-from heavytop.measure.scorer import SOLUTION_ERROR
+from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
@@ -390,7 +388,7 @@ def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
 def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
     """Integrator, change and sentence, of the order that single steps show."""
     for change in changes.rows:
-        metrics = [change.metric(row, ORDER.text) for row in (change.old, change.new)]
+        metrics = [change.metric(row, OBSERVED_ORDER.text) for row in (change.old, change.new)]
         before, after = (math.nan if metric is None else float(metric) for metric in metrics)
         if abs(after - before) > 0:
             said = f"Order observed {before:g} → {after:g} in single steps on {_where(change.identity, at=False)}."
@@ -591,7 +589,7 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
 
 def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
     """Whether other sentences say it: whole rows, laws, orders, and what the digits right sum up."""
-    if not finding.metric or finding.of == "growth" or finding.metric == ORDER.text:
+    if not finding.metric or finding.of == "growth" or finding.metric == OBSERVED_ORDER.text:
         return True
     if change.digits is None or abs(change.lost) < _DIGITS_MOVED:
         return False

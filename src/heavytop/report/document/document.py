@@ -308,10 +308,11 @@ Make = Callable[[Sources, Iterable[str]], Section | None]
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """A section of the page with pictures."""
+    """A section of the page with pictures, made from the rows of the kinds that show it, or of all kinds."""
 
     make: Make
     shown: In = In.PAGE
+    of_all: bool = False
 
 
 Block = Headline | Note | Table | Card | Chart

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from heavytop.records import UNMEASURED, Beside, Metric, Quantity, Report, Row, Subject
 from heavytop.report.document.document import Block, Document, Headline, In
+from heavytop.report.document.motions import LossLimits, WorseMotions
 
 
 class ReportedKind(Protocol):
@@ -62,6 +64,15 @@ class ReportedKind(Protocol):
     def contradictions(self, row: Row) -> Iterator[str]:
         """What contradicts something else in a row of this kind that succeeded, as ``FIELD: REASON``."""
         return iter(())
+
+    def join(
+        self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
+    ) -> WorseMotions | None:
+        """The motions of a row of both reports that got worse, by records in their folders; None where it keeps none.
+
+        limits: what is allowed of a metric.
+        """
+        return None
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """What its measured rows, one at least, come to.  beside: what `score` wrote beside its row."""

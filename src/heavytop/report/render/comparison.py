@@ -8,11 +8,12 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from heavytop.display import printable
-from heavytop.report.compare.compare import Differences, WorseMotions
+from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import line
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
 from heavytop.report.document.document import row_name, short
+from heavytop.report.document.motions import WorseMotions
 from heavytop.report.render.text import table, wrapped
 
 _MOST = 200
@@ -53,7 +54,7 @@ def _rows(result: Differences) -> Iterator[RenderableType]:
 
 
 def _motions(found: WorseMotions) -> Iterator[RenderableType]:
-    """The motions of a survey that lost most, each with its command, to paste into a shell."""
+    """The motions of a row that lost most, each with its command, to paste into a shell."""
     if not found.first:
         return
     yield Text()

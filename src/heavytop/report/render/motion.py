@@ -13,13 +13,11 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.display import printable
-from heavytop.features.events.functions import Events, ReferenceEvents
-from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import PARAMETERS, STARTS, DerivativeBall, Derivatives
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
-from heavytop.precision import REAL_BITS, decimal_text, dot, exact, exact_text
+from heavytop.precision import REAL_BITS, dot, exact, exact_text
 from heavytop.report.document.document import short
 from heavytop.top.attitude import Output, perpendicular, rows_of
 from heavytop.top.equations import NAMES, VARIABLES
@@ -266,32 +264,6 @@ def _tex_parts(value: str, radius: str | None) -> list[str]:
     return [rf"$\num{{{first}}}$", *(rf"$\quad {part}$" for part in more)]
 
 
-# Events as tables for people.
-
-
-def events_text(found: Sequence[Events | ReferenceEvents]) -> RenderableType:
-    """Each function with its events: the time, the state, and whether the function rises."""
-    parts: list[RenderableType] = []
-    for each in found:
-        parts += [Text(), Text(f"Events {printable(each.function)}: {len(each)}, {each.guarantee}", style="bold")]
-        if isinstance(each, Events) and each.outcome is not Outcome.SUCCESS:
-            parts.append(Text(f"Looked up to t = {decimal_text(each.time_reached, 6)} only: {each.outcome.message}."))
-        if isinstance(each, Events):
-            if discontinuities := each.discontinuity_text():
-                parts.append(Text(f"{discontinuities[:1].upper()}{discontinuities[1:]}."))
-            times, states = each.time_texts(), each.texts()
-        else:
-            times = [f"{ball.value} ± {ball.radius}" for ball in each.times]
-            states = [[f"{ball.value} ± {ball.radius}" for ball in state] for state in each.states]
-        for time, direction, state in zip(times, each.directions, states, strict=True):
-            table = Table(box=None, show_header=False)
-            table.add_row("t", Text(f"{time}, {'rising' if direction > 0 else 'falling'}", overflow="fold"))
-            for name, value in zip(NAMES, state, strict=True):
-                table.add_row(name, Text(value, overflow="fold"))
-            parts.append(table)
-    return Group(*parts)
-
-
 # Proven derivatives of a motion as lines for people: one a derivative, so that nothing is cut at 80 columns.
 
 
@@ -334,6 +306,8 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
         drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
+    if (steady := run.stability) is not None:
+        parts += [Text(), Text(f"{steady.text(precision.bits).capitalize()}.")]
     if lost := run.amplification_text():
         parts += [Text(), Text(f"{lost[:1].upper()}{lost[1:]}.")]
     return Group(*parts, *_undefined(table))
@@ -344,6 +318,7 @@ def reference_text(found: Reference, table: MotionTable) -> RenderableType:
     parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
     if found.attitude_method not in (None, found.method):
         parts.append(Text(f"attitude: {found.attitude_method}"))
+    parts += [Text(found.stability.text())] if found.stability else []
     parts += _attitude_at_start(table)
     derivatives = [] if found.derivatives is None else derivative_lines(found.times, found.derivatives)
     return Group(*parts, *_at_each_time(table), *_undefined(table), *derivatives)

@@ -14,13 +14,12 @@ from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
 from heavytop.display import plural
-from heavytop.features.work_precision.curves import ERRORS, leads, panels
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
-from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
+from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR
 from heavytop.precision import exact
 from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
@@ -44,7 +43,6 @@ from heavytop.report.document.document import (
     computed_by,
     logarithm,
     row_name,
-    scientific,
     short,
     with_source,
 )
@@ -131,7 +129,7 @@ def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[
         for name, blocks in document(report, kinds, In.PAGE).items():
             for block in blocks:
                 if isinstance(block, Chart):
-                    asked.setdefault(block.make, set()).add(name)
+                    asked.setdefault(block.make, set()).update(kinds if block.of_all else {name})
                 elif isinstance(block, Table):
                     _add(tables, block, source)
     with quiet_style():
@@ -411,35 +409,6 @@ def _motion(row: Row) -> list[Cell]:
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
         "  ".join(f"{name} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
     ]
-
-
-def fastest(rows: Sequence[Row]) -> Headline | None:
-    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
-    error of all.
-    """
-    found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
-    if not found:
-        return _least_error(rows)
-    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in found]
-    (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
-    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, found, strict=True) if winner == first]
-    behind = {other for winner, other in ends if winner == first}
-    where = f"{count} of {len(found)} motions" if rest else f"all {len(found)} motions"
-    where = clip(found[0][0].case, 40) if len(found) == 1 else where
-    low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
-    times = low if low == high else f"{low} to {high}"
-    other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
-    said = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
-    return Headline("; ".join([said, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
-
-
-def _least_error(rows: Sequence[Row]) -> Headline | None:
-    best = [(line.best, case, line.label) for case, lines in panels(rows).items() for line in lines if line.best]
-    if not best:
-        return None
-    point, case, label = min(best, key=lambda each: each[0].log10)
-    said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {point.takes()}.")
 
 
 def laws_headline(rows: Sequence[Row]) -> Headline | None:

@@ -8,22 +8,19 @@ the functions, or where it is continuous on a connected domain and less than π 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import gcd
-from typing import TYPE_CHECKING
 
 import sympy
 from flint import arb, fmpq_mpoly, fmpz_mat
 
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.evaluate import evaluate
-from heavytop.features.claims.algebra.rational import Quotient
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, Unprovable, used
-
-if TYPE_CHECKING:
-    from heavytop.features.claims.algebra.fields import Field
-    from heavytop.features.claims.algebra.prover import Region
+from heavytop.features.claims.algebra.fields import Field, Regularity
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.signs import NUMBER_BITS
+from heavytop.features.claims.algebra.statement import Place
 
 _ARCS = ("asin", "acos", "atan", "atan2")
 _BITS = 192
@@ -36,24 +33,33 @@ Vector = tuple[Quotient, Quotient]
 
 
 class Arcs:
-    """The relations between the inverse functions in the field of ``region``, found as they are asked for."""
+    """The relations between the inverse functions in a field over a region, found as they are asked for.
 
-    def __init__(self, region: Region) -> None:
-        self._region = region
+    everywhere: what is regular all over the region.  places: some of it.  is_connected: whether it is, as far as the
+    symbols in these generators go.
+    """
+
+    def __init__(
+        self, field: Field, everywhere: Regularity, places: Sequence[Place], is_connected: Callable[[set[int]], bool]
+    ) -> None:
+        self._field = field
+        self._everywhere = everywhere
+        self._places = places
+        self._is_connected = is_connected
         self._known = 0
         self._free: list[int] = []
         self._forms: dict[int, fmpq_mpoly] = {}
 
     def without(self, p: fmpq_mpoly) -> fmpq_mpoly:
         """A polynomial that is ``p`` all over the region, in fewer inverse functions."""
-        tower = self._region.field.tower
+        tower = self._field.tower
         self._look_for_more()
         for index in used(p) & self._forms.keys():
             p = tower.reduce(tower.signs.substituted(p, index, self._forms[index]))
         return p
 
     def _look_for_more(self) -> None:
-        generators = self._region.field.tower.generators
+        generators = self._field.tower.generators
         known, self._known = self._known, len(generators)
         for index in range(known, self._known):
             if generators[index].kind in (*_ARCS, "log") and len(self._free) < _MOST_ARCS:
@@ -68,7 +74,7 @@ class Arcs:
 
     def _form_of(self, index: int) -> fmpq_mpoly | None:
         """Inverse function ``index`` through those before it and π; None where there is no such relation."""
-        field = self._region.field
+        field = self._field
         is_log = field.tower.generators[index].kind == "log"
         alike = [other for other in self._free if (field.tower.generators[other].kind == "log") is is_log]
         arcs = [*alike, index]
@@ -89,7 +95,7 @@ class Arcs:
 
     def _form_of_logarithm(self, logarithms: list[int]) -> fmpq_mpoly | None:
         """The last logarithm through the others: a product of powers of what they are taken of is 1."""
-        tower = self._region.field.tower
+        tower = self._field.tower
         factors = _integer_relation([self._values(index) for index in logarithms])
         if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
             return None
@@ -103,10 +109,10 @@ class Arcs:
 
     def _values(self, index: int) -> list[arb]:
         """Its values at a few places of the region; of a number, the number."""
-        field = self._region.field
+        field = self._field
         if index in field.tower.signs.numbers:
             return [field.tower.signs.numbers[index]] * _PLACES
-        places = self._region.places[:_PLACES]
+        places = self._places[:_PLACES]
         if not places:
             raise Unprovable("No place to look at.")
         try:
@@ -133,7 +139,7 @@ class Arcs:
 
     def _is_multiple_of_pi(self, weights: dict[int, int], angle: Fraction) -> bool:
         """Of π is Σ weight · arc − angle · π, at each point."""
-        field = self._region.field
+        field = self._field
         tower = field.tower
         numbers = tower.signs.numbers.keys()
         if sum(abs(weight) for arc, weight in weights.items() if arc not in numbers) > _MOST_TURNS:
@@ -151,7 +157,7 @@ class Arcs:
         low = high = -angle
         inside = False
         for arc, weight in weights.items():
-            g = self._region.field.tower.generators[arc]
+            g = self._field.tower.generators[arc]
             least, most = self._ends(arc)
             low, high = low + min(weight * least, weight * most), high + max(weight * least, weight * most)
             inside = inside or (g.kind == "atan" and g.strict)
@@ -160,7 +166,7 @@ class Arcs:
 
     def _ends(self, index: int) -> tuple[Fraction, Fraction]:
         """A closed interval of the values of an inverse function, over π."""
-        tower = self._region.field.tower
+        tower = self._field.tower
         g, half = tower.generators[index], Fraction(1, 2)
         if g.kind == "acos":
             sign = tower.sign(g.arguments[0]).value
@@ -170,9 +176,9 @@ class Arcs:
 
     def _is_small_somewhere(self, weights: dict[int, int], angle: Fraction) -> bool:
         """|Σ weight · arc − angle · π| < π: of numbers, or at a place where it is continuous on a connected domain."""
-        region, arcs = self._region, set(weights)
-        if not arcs <= region.field.tower.signs.numbers.keys() and (
-            not region.is_connected(arcs) or region.everywhere.obstacle_of_generators(arcs, analytic=False)
+        arcs = set(weights)
+        if not arcs <= self._field.tower.signs.numbers.keys() and (
+            not self._is_connected(arcs) or self._everywhere.obstacle_of_generators(arcs, analytic=False)
         ):
             return False
         values = {arc: self._values(arc)[0] for arc in weights}

@@ -14,7 +14,8 @@ from flint import arb, fmpq_mpoly
 
 from heavytop.features.claims.algebra.evaluate import evaluate, wpinverse
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
-from heavytop.features.claims.algebra.signs import Sign, Unprovable, used
+from heavytop.features.claims.algebra.ring import Unprovable, used
+from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.structure import NAMES, Defined, at_values, sign_of
 
 _LONGEST = 120

@@ -10,7 +10,7 @@ import sympy
 from flint import acb_poly, arb
 
 from heavytop.exact.flint.balls import ball, whole_evaluation, working_precision
-from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.structure import Defined
 
 # Weierstrass' ℘ of (u, g2, g3) as formulas of a claim, and their values as balls.

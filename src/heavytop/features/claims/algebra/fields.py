@@ -18,8 +18,9 @@ from flint import fmpq_mpoly
 
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import Refine, Transcendental
-from heavytop.features.claims.algebra.rational import Quotient, Tower, forces_zero
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign, Unprovable, used
+from heavytop.features.claims.algebra.rational import Tower, forces_zero
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, UNKNOWN, Sign
 from heavytop.features.claims.algebra.structure import NAMES, Defined
 
 _MAX_EXPONENT = 64

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import sympy
 from flint import fmpq_mpoly, fmpz
 
 from heavytop.features.claims.algebra import structure
 from heavytop.features.claims.algebra.evaluate import WEIERSTRASS, evaluate, wpinverse
-from heavytop.features.claims.algebra.rational import Quotient
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Unprovable, used
-
-if TYPE_CHECKING:
-    from heavytop.features.claims.algebra.fields import Field
-
+from heavytop.features.claims.algebra.rational import Tower
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign
 
 # Inverse functions that are one another: asin u + acos u = π/2, atan u + atan 1/u = ± π/2, acos(cos w) = w.
 
@@ -30,7 +27,18 @@ _QUARTER, _HALF = Fraction(3, 2), Fraction(3)
 Known = Callable[[str, Quotient], Quotient | None]
 
 
-def same_as(name: str, u: Quotient, field: Field, known: Known) -> Quotient | None:
+class Expressions(Protocol):
+    """What generators ask of their field, which :class:`heavytop.features.claims.algebra.fields.Field` is."""
+
+    tower: Tower
+
+    def enter(self, expression: sympy.Expr) -> Quotient: ...
+    def expression(self, value: Quotient) -> sympy.Expr: ...
+    def is_constant(self, value: Quotient) -> bool: ...
+    def means(self, index: int, meaning: sympy.Expr) -> None: ...
+
+
+def same_as(name: str, u: Quotient, field: Expressions, known: Known) -> Quotient | None:
     """asin, acos or atan of ``u`` through a function that the field has already, or through the angle in it.
 
     known: the generator of a function of an argument, None where there is none yet.
@@ -57,12 +65,12 @@ def same_as(name: str, u: Quotient, field: Field, known: Known) -> Quotient | No
     return _difference(field, t.product((t.number(quarter), field.enter(sympy.pi))), partner)
 
 
-def _difference(field: Field, a: Quotient, b: Quotient) -> Quotient:
+def _difference(field: Expressions, a: Quotient, b: Quotient) -> Quotient:
     t = field.tower
     return t.sum((a, t.product((t.number(-1), b))))
 
 
-def _angle_in(name: str, u: Quotient, field: Field) -> Quotient | None:
+def _angle_in(name: str, u: Quotient, field: Expressions) -> Quotient | None:
     """w of acos(cos w), asin(sin w), atan(tan w), where w lies in the range of the inverse function."""
     t = field.tower
     for sine, cosine, angle in _circles(field):
@@ -77,7 +85,7 @@ def _angle_in(name: str, u: Quotient, field: Field) -> Quotient | None:
     return None
 
 
-def _circles(field: Field) -> Iterator[tuple[int, int, Quotient]]:
+def _circles(field: Expressions) -> Iterator[tuple[int, int, Quotient]]:
     """(sine, cosine, angle) of the field."""
     for sine, cosine in field.tower.signs.circles.items():
         arguments = field.tower.generators[sine].arguments
@@ -85,12 +93,12 @@ def _circles(field: Field) -> Iterator[tuple[int, int, Quotient]]:
             yield sine, cosine, arguments[0]
 
 
-def is_below_quarter(field: Field, angle: Quotient) -> bool:
+def is_below_quarter(field: Expressions, angle: Quotient) -> bool:
     """|angle| ≤ 3/2, so that its cosine is > 0."""
     return is_between(field, angle, -_QUARTER, _QUARTER)
 
 
-def is_between(field: Field, angle: Quotient, low: Fraction, high: Fraction) -> bool:
+def is_between(field: Expressions, angle: Quotient, low: Fraction, high: Fraction) -> bool:
     """low ≤ angle ≤ high all over the domain, shown."""
     t = field.tower
     up = _difference(field, angle, t.number(low))
@@ -120,7 +128,7 @@ class Refine(Exception):
 class Transcendental:
     """The transcendental generators of ``field``.  ``divisors`` outlives it: what the bases have to be divided by."""
 
-    def __init__(self, field: Field, divisors: list[int]) -> None:
+    def __init__(self, field: Expressions, divisors: list[int]) -> None:
         self._field = field
         self._tower = field.tower
         self._divisors = divisors

@@ -25,8 +25,8 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
-from heavytop.features.claims.algebra.rational import Quotient
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, Unprovable, used
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS
 from heavytop.features.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
@@ -76,7 +76,7 @@ class Region:
         self.regularity = Regularity(field, self.is_nowhere_zero)
         # what is not 0 where the flow keeps it so may part the domain
         self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
-        self._arcs = Arcs(self)
+        self._arcs = Arcs(field, self.everywhere, self.places, self.is_connected)
 
     def _holds(self, place: Place) -> bool:
         a = self.field.assumptions

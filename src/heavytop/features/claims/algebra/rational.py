@@ -8,15 +8,15 @@ wherever none of the tower's ``divisors`` is 0.  The converse needs the roots to
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt, lcm
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
+from flint import Ordering, fmpq, fmpq_mpoly, fmpz, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from heavytop.exact.flint.balls import working_precision
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs, Unprovable, used
+from heavytop.features.claims.algebra.ring import PolynomialRing, Quotient, Unprovable, used
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign, Signs
 
 # Nested square roots that are sums of simpler ones: √(3 + 2√2) = 1 + √2, √(a + √(a² − b²)) = (√(a + b) + √(a − b))/√2.
 #
@@ -125,69 +125,22 @@ def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
     return None
 
 
-SLOTS = 64
-# terms of a product, and of numerator times denominator where a common factor is sought: the paper's claims need
-# 95 and 600, and what needs much more does not end
-_MAX_PRODUCT = 10_000
 _MAX_QUOTIENT = 1_500
+"""Terms of numerator times denominator where a common factor is sought: the paper's claims need 600."""
 _FACTORED_BITS = 64
 
 
-@dataclass(frozen=True, slots=True)
-class Quotient:
-    """numerator / denominator, reduced by its tower."""
-
-    numerator: fmpq_mpoly
-    denominator: Any
-
-
-@dataclass(frozen=True, slots=True)
-class Generator:
-    """One generator: what it stands for, whether it is constant in time, and what is known of its sign.
-
-    sign: 1 or -1 where it is so all over the domain, 0 allowed; else 0.  strict: it is never 0.
-    kind: ``symbol``, ``number``, ``root`` (√arguments[0]) or the name of a function of ``arguments``.
-    """
-
-    meaning: Any
-    constant: bool
-    sign: int
-    strict: bool = False
-    kind: str = "symbol"
-    arguments: tuple[Quotient, ...] = ()
-
-
-class Tower:
+class Tower(PolynomialRing):
     """Generators with their relations and signs, and the arithmetic of quotients modulo them."""
 
     def __init__(self) -> None:
-        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
-        self.gens = self.context.gens()
-        self.generators: list[Generator] = []
-        self._radicands: dict[int, fmpq_mpoly] = {}
+        super().__init__()
         self._roots: dict[str, int] = {}
-        self.one = self.context.constant(1)
         self.signs = Signs(self)
         # what has been divided by so far, by its text: nothing is proven where one of them is 0
         self.divisors: dict[str, fmpq_mpoly] = {}
 
     # --- generators -----------------------------------------------------------------------------------------------
-
-    def add(
-        self,
-        meaning: Any,
-        *,
-        constant: bool,
-        sign: int = 0,
-        strict: bool = False,
-        kind: str = "symbol",
-        arguments: tuple[Quotient, ...] = (),
-    ) -> int:
-        """The index of a new free generator."""
-        if len(self.generators) == SLOTS:
-            raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
-        self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
-        return len(self.generators) - 1
 
     def add_root(self, meaning: Any, square: fmpq_mpoly, *, sign: int, kind: str = "root") -> int:
         """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
@@ -195,24 +148,12 @@ class Tower:
         strict = kind == "root" and self.signs.of(square).strict
         argument = Quotient(square, self.one)
         index = self.add(meaning, constant=constant, sign=sign, strict=strict, kind=kind, arguments=(argument,))
-        self._radicands[index] = square
+        self.squares[index] = square
         number = self.signs.ball(square)
         if number is not None and kind == "root":
             with working_precision(NUMBER_BITS):
                 self.signs.numbers[index] = number.sqrt()
         return index
-
-    def radicand(self, index: int) -> fmpq_mpoly | None:
-        """q of a root R² = q; None for a free generator."""
-        return self._radicands.get(index)
-
-    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
-        """(R, q) of every root R² = q."""
-        return list(self._radicands.items())
-
-    def relations(self) -> list[fmpq_mpoly]:
-        """R² − q for every root R = √q."""
-        return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
 
     # --- arithmetic -----------------------------------------------------------------------------------------------
 
@@ -223,40 +164,6 @@ class Tower:
     def number(self, value: Fraction | int) -> Quotient:
         """A rational number as a quotient."""
         return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one)
-
-    def times(self, a: fmpq_mpoly, b: fmpq_mpoly) -> fmpq_mpoly:
-        """The product of two polynomials; raises Unprovable where it would be too large to hold."""
-        if len(a) * len(b) > _MAX_PRODUCT:
-            raise Unprovable("A product of polynomials is too large.", "Split the claim into smaller ones.")
-        return a * b
-
-    def reduce(self, p: fmpq_mpoly) -> fmpq_mpoly:
-        """``p`` with every root to a power below 2."""
-        degrees = p.degrees()
-        for index in sorted(self._radicands, reverse=True):
-            if degrees[index] > 1:
-                parts = self.by_power(p, index)
-                q, root = self._radicands[index], self.gens[index]
-                total = self.context.constant(0)
-                for power, part in parts.items():
-                    total += self.times(self.raised(q, power // 2), part * root ** (power % 2))
-                p, degrees = total, total.degrees()
-        return p
-
-    def raised(self, p: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
-        """A power of a polynomial; raises Unprovable where it would be too large to hold."""
-        result = self.one
-        for _ in range(exponent):
-            result = self.times(result, p)
-        return result
-
-    def by_power(self, p: fmpq_mpoly, index: int) -> dict[int, fmpq_mpoly]:
-        """The coefficients of the powers of one generator."""
-        parts: dict[int, dict[Any, Any]] = {}
-        for monomial, coefficient in p.to_dict().items():
-            rest = (*monomial[:index], 0, *monomial[index + 1 :])
-            parts.setdefault(int(monomial[index]), {})[rest] = coefficient
-        return {power: self.context.from_dict(terms) for power, terms in parts.items()}
 
     def summands(self, argument: Quotient) -> list[Quotient]:
         """The summands of the numerator, each over the denominator."""
@@ -269,7 +176,7 @@ class Tower:
         """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
         degrees = denominator.degrees()
-        for index in sorted(self._radicands, reverse=True):
+        for index in sorted(self.squares, reverse=True):
             if degrees[index] == 1:
                 parts = self.by_power(denominator, index)
                 conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]

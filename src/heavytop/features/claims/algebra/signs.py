@@ -1,109 +1,24 @@
-"""The sign of a polynomial in the generators of a tower, all over the domain of the claim.
+"""The sign of a polynomial in the generators of a ring, all over the domain of the claim.
 
 Every rule here is a proof.  What no rule decides is unknown, and a condition that needs it stays undischarged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import sympy
 from flint import arb, fmpq, fmpq_mpoly
 
-from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import working_precision
-
-if TYPE_CHECKING:
-    from heavytop.features.claims.algebra.rational import Tower
-
-
-# Combinations with factors that are not negative: the exact linear program behind inequalities.
-
-
-_MOST_STEPS = 150
-Row = list[Fraction]
-Monomial = TypeVar("Monomial", bound=Hashable)
-
-
-def nonnegative_combination(target: Mapping[Monomial, Any], columns: Sequence[Mapping[Monomial, Any]]) -> Row | None:
-    """Weights c ≥ 0 with Σ c column = target, exactly; None where there are none, or none was found in time.
-
-    target, columns: coefficients by monomial, those that are left out are 0.
-    """
-    wanted = {monomial: _fraction(value) for monomial, value in target.items()}
-    parts = [{monomial: _fraction(value) for monomial, value in column.items()} for column in columns]
-    kept = _useful(wanted, parts)
-    monomials = list(dict.fromkeys([*wanted, *(monomial for j in kept for monomial in parts[j])]))
-    rows = [[parts[j].get(m, Fraction(0)) for j in kept] + [wanted.get(m, Fraction(0))] for m in monomials]
-    rows = [row if row[-1] >= 0 else [-value for value in row] for row in rows]
-    found = _feasible(rows, len(kept))
-    if found is None:
-        return None
-    weights = [Fraction(0)] * len(columns)
-    for j, weight in zip(kept, found, strict=True):
-        weights[j] = weight
-    return weights
-
-
-def _fraction(value: Any) -> Fraction:
-    return Fraction(int(value.p), int(value.q)) if hasattr(value, "p") else Fraction(value)
-
-
-def _useful(wanted: Mapping[Monomial, Fraction], parts: Sequence[Mapping[Monomial, Fraction]]) -> list[int]:
-    """Columns that can have a weight: no monomial of theirs is left over with one sign."""
-    kept = list(range(len(parts)))
-    while True:
-        signs: dict[Monomial, set[bool]] = {}
-        for j in kept:
-            for monomial, value in parts[j].items():
-                signs.setdefault(monomial, set()).add(value > 0)
-        for monomial, value in wanted.items():
-            signs.setdefault(monomial, set()).add(value < 0)
-        left = [j for j in kept if all(len(signs[monomial]) == 2 for monomial in parts[j])]
-        if left == kept:
-            return kept
-        kept = left
-
-
-def _feasible(rows: list[Row], count: int) -> Row | None:
-    """A solution ≥ 0 of rows = (coefficients, right side ≥ 0) by the simplex method with Bland's rule."""
-    basis = [-1] * len(rows)
-    for _ in range(_MOST_STEPS):
-        # what the rows still without a basic column add up to has to become 0
-        short = [row for row, basic in zip(rows, basis, strict=True) if basic < 0]
-        if not any(row[-1] for row in short):
-            solution = [Fraction(0)] * count
-            for row, basic in zip(rows, basis, strict=True):
-                if basic >= 0:
-                    solution[basic] = row[-1]
-            return solution
-        entering = next((j for j in range(count) if j not in basis and sum(row[j] for row in short) > 0), None)
-        if entering is None:
-            return None
-        ratios = [(row[-1] / row[entering], basis[i], i) for i, row in enumerate(rows) if row[entering] > 0]
-        _, _, pivot = min(ratios)
-        scale = rows[pivot][entering]
-        rows[pivot] = [value / scale for value in rows[pivot]]
-        for i, row in enumerate(rows):
-            if i != pivot and row[entering]:
-                factor = row[entering]
-                rows[i] = [value - factor * other for value, other in zip(row, rows[pivot], strict=True)]
-        basis[pivot] = entering
-    return None
-
-
-# Signs of numbers as far as they are known, and what follows for products and sums.
-
+from heavytop.features.claims.algebra.combinations import nonnegative_combination
+from heavytop.features.claims.algebra.ring import PolynomialRing, Unprovable, used
 
 NUMBER_BITS = 512
 """Of the balls of generators that are numbers."""
-
-
-class Unprovable(HeavyTopError):
-    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
 
 
 class Sign(NamedTuple):
@@ -132,11 +47,6 @@ def sum_of(signs: Iterable[Sign]) -> Sign:
     return Sign(values.pop(), strict) if values else Sign(1, False)
 
 
-def used(p: fmpq_mpoly) -> set[int]:
-    """The generators that occur in a polynomial."""
-    return {index for index, degree in enumerate(p.degrees()) if degree > 0}
-
-
 _DEPTH = 4
 # calls a question: what takes more is abandoned
 _BUDGET = 120
@@ -152,14 +62,14 @@ _PROGRAMS = 30
 
 
 class Signs:
-    """What is known of the signs and ranges of the generators of ``tower``, and what follows for polynomials.
+    """What is known of the signs and ranges of the generators of ``ring``, and what follows for polynomials.
 
     ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
     is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.
     """
 
-    def __init__(self, tower: Tower) -> None:
-        self._tower = tower
+    def __init__(self, ring: PolynomialRing) -> None:
+        self._ring = ring
         self._forms: dict[int, fmpq_mpoly] = {}
         self._below_one: set[int] = set()
         self._facts: list[tuple[fmpq_mpoly, Sign]] = []
@@ -212,7 +122,7 @@ class Signs:
         if len(open_factors) == 1:
             self._facts.append((open_factors[0], known))
         elif open_factors:
-            product = self._tower.one
+            product = self._ring.one
             for factor in open_factors:
                 product = product * factor
             self._products.append((product, known))
@@ -233,7 +143,7 @@ class Signs:
         """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
         indices = set().union(*map(used, relations))
         found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
-        found += [self._tower.gens[index] for index in sorted(indices) if self._tower.generators[index].strict]
+        found += [self._ring.gens[index] for index in sorted(indices) if self._ring.generators[index].strict]
         factors = [factor for relation in relations for factor, _ in self.factors(relation)[1]]
         found += [factor for factor in factors if self.of(factor).strict]
         return list({str(p): p for p in found}.values())
@@ -346,14 +256,14 @@ class Signs:
         return signs[0] if len(signs) == 1 else sum_of(signs)
 
     def _of_term(self, monomial: Any, numbers: dict[Any, Any]) -> Sign:
-        coefficient = self._tower.context.from_dict(numbers)
+        coefficient = self._ring.context.from_dict(numbers)
         if coefficient.is_constant():
             sign = Sign(1 if coefficient.leading_coefficient() > 0 else -1, True)
         else:
             sign = self._by_number(coefficient)
         for index, power in enumerate(monomial):
             if power:
-                g = self._tower.generators[index]
+                g = self._ring.generators[index]
                 sign = sign.times(Sign(g.sign if power % 2 else 1, g.strict))
         return sign
 
@@ -367,7 +277,7 @@ class Signs:
                 (*monomial[:index], degree - monomial[index], *monomial[index + 1 :]): coefficient
                 for monomial, coefficient in p.to_dict().items()
             }
-            p = self._tower.context.from_dict(terms)
+            p = self._ring.context.from_dict(terms)
         if not self._forms.keys() & used(p):
             return UNKNOWN
         p = self._without_forms(p, turned)
@@ -389,9 +299,9 @@ class Signs:
 
     def substituted(self, p: fmpq_mpoly, index: int, form: fmpq_mpoly) -> fmpq_mpoly:
         """``p`` with a polynomial in the place of a generator."""
-        total = self._tower.context.constant(0)
-        for power, part in self._tower.by_power(p, index).items():
-            total += self._tower.times(part, self._tower.raised(form, power))
+        total = self._ring.context.constant(0)
+        for power, part in self._ring.by_power(p, index).items():
+            total += self._ring.times(part, self._ring.raised(form, power))
         return total
 
     def _by_roots_of_one_variable(self, p: fmpq_mpoly) -> Sign:
@@ -429,7 +339,7 @@ class Signs:
         high: Any = None
         if index in self.ranges:
             low, high = (sympy.Rational(end.numerator, end.denominator) for end in self.ranges[index])
-        sign = self._tower.generators[index].sign
+        sign = self._ring.generators[index].sign
         if sign > 0:
             low = sympy.Integer(0) if low is None else max(low, sympy.Integer(0))
         if sign < 0:
@@ -440,7 +350,7 @@ class Signs:
         """As a polynomial in one of its generators, with coefficients of known sign."""
         found = UNKNOWN
         for index in sorted(used(p), reverse=True):
-            parts = self._tower.by_power(p, index)
+            parts = self._ring.by_power(p, index)
             for one in self._as_polynomial_in(index, p, parts):
                 found = Sign(found.value or one.value, found.strict or one.strict)
                 if found.value and found.strict:
@@ -448,14 +358,14 @@ class Signs:
         return found
 
     def _as_polynomial_in(self, index: int, p: fmpq_mpoly, parts: dict[int, Any]) -> Iterator[Sign]:
-        g, degree = self._tower.generators[index], max(parts)
+        g, degree = self._ring.generators[index], max(parts)
         if len(parts) > 1:
             yield sum_of(
                 self.of(part).times(Sign(g.sign if power % 2 else 1, g.strict or not power))
                 for power, part in parts.items()
             )
-        zero = self._tower.context.constant(0)
-        radicand = self._tower.radicand(index)
+        zero = self._ring.context.constant(0)
+        radicand = self._ring.radicand(index)
         if degree == 1 and radicand is not None:
             yield self._of_root_sum(parts.get(0, zero), parts[1], radicand, g.sign)
         if degree == 2:
@@ -470,18 +380,18 @@ class Signs:
                 yield Sign(signs[0].value, signs[0].strict and signs[1].strict)
 
         if degree == 1 and index in self.turns and self.pi in used(p):
-            pi = self._tower.gens[self.pi]
+            pi = self._ring.gens[self.pi]
             ends = [self.substituted(p, index, self._constant(end) * pi) for end in self.turns[index]]
             first, second = (self.of(end) for end in ends)
             if first.value == second.value != 0:
                 yield Sign(first.value, first.strict or second.strict)
 
     def _constant(self, value: Fraction) -> fmpq_mpoly:
-        return self._tower.context.constant(fmpq(value.numerator, value.denominator))
+        return self._ring.context.constant(fmpq(value.numerator, value.denominator))
 
     def _of_root_sum(self, a: fmpq_mpoly, b: fmpq_mpoly, radicand: fmpq_mpoly, sign: int) -> Sign:
         """a + b R with R² = radicand >= 0: the larger of a² and b² R² decides."""
-        difference = self.of(self._tower.reduce(a * a - b * b * radicand))
+        difference = self.of(self._ring.reduce(a * a - b * b * radicand))
         if difference.value > 0:
             return Sign(self.of(a).value, difference.strict)
         if difference.value < 0:
@@ -493,17 +403,15 @@ class Signs:
         for sine, cosine in self.circles.items():
             if cosine not in used(p):
                 continue
-            tau = self._tower.gens[self._half_angle(sine)]
+            tau = self._ring.gens[self._half_angle(sine)]
             terms = [(int(m[sine]), int(m[cosine]), m, c) for m, c in p.to_dict().items()]
             degree = max(i + j for i, j, _, _ in terms)
-            total = self._tower.context.constant(0)
+            total = self._ring.context.constant(0)
             for i, j, monomial, coefficient in terms:
                 rest = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
                 factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
-                total += self._tower.context.from_dict({tuple(rest): coefficient}) * factor
-            straight = self.substituted(
-                self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
-            )
+                total += self._ring.context.from_dict({tuple(rest): coefficient}) * factor
+            straight = self.substituted(self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._ring.one)
             signs = self.of(total), self.of(straight)
             if signs[0].value == signs[1].value != 0:
                 return Sign(signs[0].value, signs[0].strict and signs[1].strict)
@@ -511,7 +419,7 @@ class Signs:
 
     def _half_angle(self, sine: int) -> int:
         if sine not in self._half_angles:
-            self._half_angles[sine] = self._tower.add(f"tangent of half the angle of x{sine}", constant=False)
+            self._half_angles[sine] = self._ring.add(f"tangent of half the angle of x{sine}", constant=False)
         return self._half_angles[sine]
 
     def _by_difference_from_facts(self, p: fmpq_mpoly) -> Sign:
@@ -533,12 +441,12 @@ class Signs:
 
     def _by_squares(self, p: fmpq_mpoly) -> Sign:
         """With a generator g ≥ 0 written as R², where there is a root R of g."""
-        for root, square in self._tower.radicands():
+        for root, square in self._ring.radicands():
             (index, *others) = used(square) or {-1}
             # that there is a root does not make it real
             is_real = self._at_once(square).value > 0
-            if is_real and not others and index in used(p) and square == self._tower.gens[index]:
-                return self.of(self.substituted(p, index, self._tower.gens[root] ** 2))
+            if is_real and not others and index in used(p) and square == self._ring.gens[index]:
+                return self.of(self.substituted(p, index, self._ring.gens[root] ** 2))
         return UNKNOWN
 
     # --- combinations of products -----------------------------------------------------------------------------------
@@ -546,11 +454,11 @@ class Signs:
     def _by_products_of_facts(self, p: fmpq_mpoly) -> Sign:
         """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
         still = all(
-            g.constant and g.kind in ("symbol", "root") for g in map(self._tower.generators.__getitem__, used(p))
+            g.constant and g.kind in ("symbol", "root") for g in map(self._ring.generators.__getitem__, used(p))
         )
         if not (self._facts or self._forms) or not still or self._programs <= 0 or self._depth > 2:
             return UNKNOWN
-        p = self._tower.reduce(self._without_forms(p))
+        p = self._ring.reduce(self._without_forms(p))
         degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)
         atoms = self._atoms_for(p)
         if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_PARTED or len(atoms) < 2:
@@ -569,33 +477,33 @@ class Signs:
         for fact, sign in self._facts:
             if sign.value:
                 with suppress(Unprovable):
-                    facts.append((self._tower.reduce(self._without_forms(fact * sign.value)), sign.strict))
+                    facts.append((self._ring.reduce(self._without_forms(fact * sign.value)), sign.strict))
         for index in self._forms:
-            g = self._tower.generators[index]
+            g = self._ring.generators[index]
             if g.sign and index not in self._below_one:
                 with suppress(Unprovable):
-                    facts.append((self._without_forms(self._tower.gens[index] * g.sign), g.strict))
+                    facts.append((self._without_forms(self._ring.gens[index] * g.sign), g.strict))
         near, chosen = used(p), []
         while more := [fact for fact in facts if fact not in chosen and used(fact[0]) & near]:
             chosen += more
             near = near.union(*(used(fact) for fact, _ in more))
         for index in sorted(near):
-            g, square = self._tower.generators[index], self._tower.radicand(index)
+            g, square = self._ring.generators[index], self._ring.radicand(index)
             is_real = square is None or index in used(p) or self._at_once(square).value > 0
             if g.sign and index not in self._forms.keys() - self._below_one and is_real:
-                chosen.append((self._tower.gens[index] * g.sign, g.strict))
+                chosen.append((self._ring.gens[index] * g.sign, g.strict))
         return chosen[:_MAX_ATOMS]
 
     def _products_of(self, atoms: list[tuple[fmpq_mpoly, bool]], degree: int) -> list[tuple[fmpq_mpoly, bool]]:
         """1 and the products of up to ``degree`` atoms, as many as are tried."""
-        found = level = [(self._tower.one, True, 0)]
+        found = level = [(self._ring.one, True, 0)]
         for _ in range(degree):
             level = [
-                (self._tower.times(product, atom), strict and also, i)
+                (self._ring.times(product, atom), strict and also, i)
                 for product, strict, first in level
                 for i, (atom, also) in enumerate(atoms[first:], first)
             ]
             if len(found) + len(level) > _MAX_PRODUCTS:
                 break
             found = found + level
-        return [(self._tower.reduce(product), strict) for product, strict, _ in found]
+        return [(self._ring.reduce(product), strict) for product, strict, _ in found]

@@ -36,7 +36,7 @@ from heavytop.features.claims.algebra.reader import (
     parse,
     symbol,
 )
-from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Setting
 from heavytop.features.claims.algebra.structure import rate_along
 from heavytop.features.claims.audit.statements import SYSTEMS

@@ -24,8 +24,7 @@ from heavytop.features.claims.algebra.conditions import conditions_of, is_exactl
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field
 from heavytop.features.claims.algebra.prover import Condition, Prover
-from heavytop.features.claims.algebra.rational import Quotient
-from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable
 from heavytop.features.claims.algebra.statement import Formulas, Setting, Statement
 from heavytop.features.claims.library.entry import Entry
 from heavytop.top.equations import System

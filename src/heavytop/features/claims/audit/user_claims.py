@@ -23,7 +23,7 @@ from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.reader import Formula, parse
-from heavytop.features.claims.algebra.signs import Unprovable
+from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.statement import AFTER, ALL, Flow, Formulas, Place, Setting, Statement
 from heavytop.features.claims.algebra.structure import Names, rate_along
 from heavytop.features.claims.audit.context import (

@@ -44,11 +44,10 @@ class ClaimEvaluationTable(PlanTable, tag=NAME):
         times = positive(self.rate_times, "rate_times")
         tasks = []
         for case in claimed(find, self.cases):
-            assert case.claim is not None
             for precision in map(parse, self.precisions):
                 for direction in self.directions:
                     signs = signed(times, direction)
-                    end = time_text(signs[-1] / case.claim.solves.rate)
+                    end = time_text(signs[-1] / claim_of(case).solves.rate)
                     for form in ("printed", "stable"):
                         subject = Subject("claimed", "(4.2)-(4.6)", form=form)
                         key = RowKey(NAME, case.name, GYROSTAT.name, subject, precision.name, direction, end)
@@ -78,7 +77,7 @@ class ClaimEvaluation(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of one form.  Raises OutOfReach where the formulas cannot be evaluated exactly."""
-        claim, precision, form = claim_of(task), task.precision, task.key.subject.form
+        claim, precision, form = claim_of(task.given), task.precision, task.key.subject.form
         times = [time / claim.solves.rate for time in task.times]
         errors = [errors_of.evaluation_error(claim, time, precision, form) for time in times]
         metrics: dict[Quantity, Metric] = {}
@@ -133,7 +132,7 @@ class ClaimEvaluation(Kind):
             both((row, _cells(row)) for row in rows),
             [f"Errors are the {largest_over(rows)}."],
         )
-        yield Chart(claim_error)
+        yield Chart(claim_error, of_all=True)
 
 
 def _cells(row: Row) -> list[Cell]:

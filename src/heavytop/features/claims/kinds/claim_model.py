@@ -14,6 +14,7 @@ from flint import arb
 from heavytop.cases import Case
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.flint.balls import FUNCTIONS, working_precision
 from heavytop.features.claims import claim_error as errors_of
 from heavytop.features.claims.claim_error import CLAIM_XI, divergence_time, true_solution
@@ -24,6 +25,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, exact_row, time_metric
 from heavytop.integrate.trajectory import Problem
 from heavytop.kind import Kind
 from heavytop.measure.scalar import largest, metric, text
+from heavytop.measure.scorer import INTEGRATION_ERROR
 from heavytop.measure.truth import certified, compute
 from heavytop.precision import exact, time_text
 from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
@@ -59,23 +61,23 @@ from heavytop.top.equations import HEAVY_TOP
 
 
 CLAIM = "claimed: (4.2)-(4.6)"
-MODEL_ERROR, EVALUATION_ERROR, INTEGRATION_ERROR = "claim_model_error", "claim_evaluation_error", "integration_error"
-"""The three errors of a claim: of its formulas, of their evaluation in a format, of an integrator on their motion."""
+MODEL_ERROR, EVALUATION_ERROR = "claim_model_error", "claim_evaluation_error"
+"""Errors of a claim: of its formulas, and of their evaluation in a format.  The third is an integrator's."""
 
 
 def claimed(find: Find, names: list[str]) -> Iterator[Case]:
     """The cases of these names; raises InputError for one about which nothing is claimed."""
     for case in map(find, names):
-        if case.claim is None:
+        if not isinstance(case.homoclinic, ErshkovPartial):
             raise InputError(f"Nothing is claimed about the case {case.name}.", "Use a case such as ershkov-partial-2.")
         yield case
 
 
-def claim_of(task: Task) -> PartialCase:
-    """The claim of a task about one."""
-    claim = task.given.claim
-    assert claim is not None
-    return claim
+def claim_of(case: Case) -> PartialCase:
+    """The claim about a case: its formulas have the data of the exact motion that they solve."""
+    known = case.homoclinic
+    assert isinstance(known, ErshkovPartial)
+    return PartialCase(known.alpha, known.i1, known.i3)
 
 
 # The section of a page about a claim: its error split in three.
@@ -248,7 +250,7 @@ class ClaimModel(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
-        claim, branch = claim_of(task), _branch(task.key.subject)
+        claim, branch = claim_of(task.given), _branch(task.key.subject)
         truth, against = true_motion(claim, task.times)
         errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}
         metrics: dict[Quantity, Metric] = {}
@@ -292,7 +294,7 @@ class ClaimModel(Kind):
         for row in forward:
             if row.case not in smooth or row.key.subject.branch == "smooth":
                 yield _card(row, [each for each in forward if each.case == row.case and each is not row])
-        yield Chart(claim_error)
+        yield Chart(claim_error, of_all=True)
 
 
 def _headline(rows: Sequence[Row]) -> Headline:

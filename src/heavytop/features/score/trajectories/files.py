@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from heavytop import written_numbers
+from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
     LONGEST_NAME,
-    MOST,
     AnyBody,
     GivenTrajectory,
     RawStart,
@@ -314,7 +314,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
         raise InputError("This is no text: it holds a byte 0.", REMEDY)
-    if text.count("\n") > 2 * MOST:
+    if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
     table = TextTable(text, sorted(_KEYS - {"times", "states"}))
     if table.header is not None:
@@ -326,7 +326,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
 
 
 def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
-    if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
+    if isinstance(document.get("times"), list) and len(document["times"]) > MOST_STATES:
         raise too_many(len(document["times"]))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)

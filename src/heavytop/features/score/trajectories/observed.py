@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from fractions import Fraction
 from math import isqrt
 from typing import Any
@@ -12,20 +11,18 @@ from typing import Any
 import numpy
 
 from heavytop import written_numbers
+from heavytop.arguments import MOST_STATES, bits_of, component
 from heavytop.errors import InputError
 from heavytop.features.score.diagnose.readings import BodyData, GivenStart, Reading, Seen
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
 from heavytop.precision import (
     DOUBLE,
-    EXTENDED,
-    QUAD,
     Precision,
     Vector,
     cross,
     decimal_text,
     dot,
-    exact,
     number,
     round_to,
     shown,
@@ -281,8 +278,6 @@ def raw_start(start: State) -> RawStart:
 # A trajectory that another program computed, as it is scored: exact times, states rounded to its format.
 
 
-MOST = 100_000
-"""States that are scored."""
 LONGEST_NAME = 200
 _ODD_GAMMA = Fraction(1, 10)
 """A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
@@ -359,37 +354,16 @@ def require_states(times: list[Fraction], rows: list[Any]) -> None:
     """Raises InputError unless there are as many states as times, and not too many."""
     if len(rows) != len(times):
         raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
-    if len(times) > MOST:
+    if len(times) > MOST_STATES:
         raise too_many(len(times))
 
 
 def too_many(count: int) -> InputError:
     """What is said of so many states."""
-    every = -(-count // MOST)
+    every = -(-count // MOST_STATES)
     return InputError(
-        f"{count} states are too many to score.", f"Give at most {MOST} of them, such as one row in {every}."
+        f"{count} states are too many to score.", f"Give at most {MOST_STATES} of them, such as one row in {every}."
     )
-
-
-def component(value: Any) -> Fraction | None:
-    """An exact number out of a number of any format or text; None for NaN and infinities."""
-    if isinstance(value, str):
-        return written_numbers.component(value)
-    try:
-        return exact(value)
-    except InputError:
-        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
-            return None
-        raise
-
-
-def bits_of(value: Any) -> int:
-    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
-    kind = type(value).__name__
-    if kind in ("real128", "longdouble", "real"):
-        return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
-    exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
-    return written_numbers.bits_of(str(value)) if exactly else DOUBLE.bits
 
 
 def named(text: str, what: str) -> str:

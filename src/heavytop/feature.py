@@ -1,0 +1,33 @@
+"""The record by which a feature joins the rooms that all features share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A package of ``features/``, and what it adds: each a ``MODULE:NAME`` within the package, loaded when it is used.
+
+    kinds: its kinds of measurement, classes of :class:`heavytop.kind.Kind`.
+    commands: modules that add commands to the command line when they are imported.
+    python: the names that :mod:`heavytop` has from it, by their modules.
+    motion: options of `propagate` and `reference`, a class of :class:`heavytop.cli.motions.MotionOptions`.
+    explain: a function of a case, its run and the largest error of that, which says what explains the error.
+    """
+
+    package: str
+    kinds: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
+    python: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    motion: str = ""
+    explain: str = ""
+
+    def load(self, name: str) -> Any:
+        """The module ``MODULE``, or what it calls ``NAME``."""
+        module, _, attribute = name.partition(":")
+        found = import_module(f"{self.package}.{module}")
+        return getattr(found, attribute) if attribute else found

@@ -1,0 +1,123 @@
+"""Polynomials over FLINT in generators, some of which are square roots of polynomials in those before them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from flint import Ordering, fmpq_mpoly, fmpq_mpoly_ctx
+
+from heavytop.errors import HeavyTopError
+
+SLOTS = 64
+_MAX_PRODUCT = 10_000
+"""Terms of a product: the paper's claims need 95, and what needs much more does not end."""
+
+
+class Unprovable(HeavyTopError):
+    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
+
+
+def used(p: fmpq_mpoly) -> set[int]:
+    """The generators that occur in a polynomial."""
+    return {index for index, degree in enumerate(p.degrees()) if degree > 0}
+
+
+@dataclass(frozen=True, slots=True)
+class Quotient:
+    """numerator / denominator, reduced by its tower."""
+
+    numerator: fmpq_mpoly
+    denominator: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Generator:
+    """One generator: what it stands for, whether it is constant in time, and what is known of its sign.
+
+    sign: 1 or -1 where it is so all over the domain, 0 allowed; else 0.  strict: it is never 0.
+    kind: ``symbol``, ``number``, ``root`` (√arguments[0]) or the name of a function of ``arguments``.
+    """
+
+    meaning: Any
+    constant: bool
+    sign: int
+    strict: bool = False
+    kind: str = "symbol"
+    arguments: tuple[Quotient, ...] = ()
+
+
+class PolynomialRing:
+    """Generators with the relations R² = q of the roots among them, and polynomials modulo these.
+
+    squares: q of each root, by its index.
+    """
+
+    def __init__(self) -> None:
+        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
+        self.gens = self.context.gens()
+        self.generators: list[Generator] = []
+        self.squares: dict[int, fmpq_mpoly] = {}
+        self.one = self.context.constant(1)
+
+    def add(
+        self,
+        meaning: Any,
+        *,
+        constant: bool,
+        sign: int = 0,
+        strict: bool = False,
+        kind: str = "symbol",
+        arguments: tuple[Quotient, ...] = (),
+    ) -> int:
+        """The index of a new free generator."""
+        if len(self.generators) == SLOTS:
+            raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
+        self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
+        return len(self.generators) - 1
+
+    def radicand(self, index: int) -> fmpq_mpoly | None:
+        """q of a root R² = q; None for a free generator."""
+        return self.squares.get(index)
+
+    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
+        """(R, q) of every root R² = q."""
+        return list(self.squares.items())
+
+    def relations(self) -> list[fmpq_mpoly]:
+        """R² − q for every root R = √q."""
+        return [self.gens[index] ** 2 - square for index, square in self.squares.items()]
+
+    def times(self, a: fmpq_mpoly, b: fmpq_mpoly) -> fmpq_mpoly:
+        """The product of two polynomials; raises Unprovable where it would be too large to hold."""
+        if len(a) * len(b) > _MAX_PRODUCT:
+            raise Unprovable("A product of polynomials is too large.", "Split the claim into smaller ones.")
+        return a * b
+
+    def reduce(self, p: fmpq_mpoly) -> fmpq_mpoly:
+        """``p`` with every root to a power below 2."""
+        degrees = p.degrees()
+        for index in sorted(self.squares, reverse=True):
+            if degrees[index] > 1:
+                parts = self.by_power(p, index)
+                q, root = self.squares[index], self.gens[index]
+                total = self.context.constant(0)
+                for power, part in parts.items():
+                    total += self.times(self.raised(q, power // 2), part * root ** (power % 2))
+                p, degrees = total, total.degrees()
+        return p
+
+    def raised(self, p: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
+        """A power of a polynomial; raises Unprovable where it would be too large to hold."""
+        result = self.one
+        for _ in range(exponent):
+            result = self.times(result, p)
+        return result
+
+    def by_power(self, p: fmpq_mpoly, index: int) -> dict[int, fmpq_mpoly]:
+        """The coefficients of the powers of one generator."""
+        parts: dict[int, dict[Any, Any]] = {}
+        for monomial, coefficient in p.to_dict().items():
+            rest = (*monomial[:index], 0, *monomial[index + 1 :])
+            parts.setdefault(int(monomial[index]), {})[rest] = coefficient
+        return {power: self.context.from_dict(terms) for power, terms in parts.items()}

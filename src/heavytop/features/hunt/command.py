@@ -1,0 +1,40 @@
+"""`heavytop hunt`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, command, print_json
+
+
+@command
+def hunt(
+    integrator: Annotated[str, typer.Option(help="A name of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
+    precision: Annotated[str, typer.Option(help="Number format.")] = "double",
+    horizon: Annotated[str, typer.Option(help="Time up to which errors count.")] = "100",
+    budget: Annotated[str, typer.Option(help="Motions, 5000, or seconds, 60s.")] = "5000",
+    family: Annotated[str, typer.Option(help="any, euler, lagrange, kovalevskaya or heavy_gyrostat.")] = "any",
+    against: Annotated[str | None, typer.Option(help="Search for the largest ratio to its error.")] = None,
+    limit: Annotated[str | None, typer.Option(help="What is found: an error in eps T^1.5, or a ratio.")] = None,
+    seed: Annotated[int, typer.Option(help="Search otherwise.")] = 1,
+    json: Json = False,
+) -> int:
+    """Search for the motion that breaks an integrator.
+
+    Bodies and starts are tried that are random, then ever worse.  What is found is shrunk to the simplest data that
+    still show it, and proven.  Found is a run that fails, or an error two decades beyond what the integrator's own law
+    and the motion's amplification explain.  5000 motions of heyoka take three minutes.  Exit code 1 if anything is
+    found, else 0.
+    """
+    from heavytop.cli.output import say_former
+    from heavytop.features.hunt.api import hunt as search
+
+    say_former([integrator])
+    found = search(integrator, precision, horizon, budget, family, against, limit, seed)  # type: ignore[arg-type]
+    if json:
+        print_json(found.document())
+    else:
+        print(found)
+    return 1 if found.found else 0

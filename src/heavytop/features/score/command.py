@@ -1,0 +1,92 @@
+"""`heavytop score`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from heavytop.cli.app import (
+    Json,
+    absolute,
+    cases,
+    command,
+    print_json,
+    require_apart,
+    require_new,
+    show_on_terminal,
+    writing,
+)
+from heavytop.cli.output import counted, say
+from heavytop.errors import InputError
+
+if TYPE_CHECKING:
+    from heavytop.records import Report
+
+_STATE_SECONDS = 1e-3
+"""Expected of comparing one state."""
+
+
+@command
+def score(
+    trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
+    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
+    require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
+    normalize: Annotated[
+        bool,
+        typer.Option("--normalize", help="Take quaternions, matrices and gamma of any length."),
+    ] = False,
+    json: Json = False,
+) -> int:
+    """Say how many digits of your trajectory are right.
+
+    Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
+    first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
+    Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
+
+    Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
+    3 where it ended early, or that is not known.
+    """
+    from heavytop.features.score.api import read_trajectory, scored
+    from heavytop.files import replace_all
+
+    if out is not None:
+        out = absolute(out)
+        require_new(out)
+    require_apart((html,), trajectory)
+    page = None if html is None else absolute(html)
+    given, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
+    for warning in given.warnings():
+        say(f"warning: {warning}")
+    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
+        found = scored(given, needed, advance)
+    if out is not None:
+        _write_report(found.report(), out)
+    if page is not None:
+        with writing():
+            replace_all([(page, found.to_html().encode())])
+    if json:
+        print_json(found.to_json())
+        return found.exit_code
+    from heavytop.features.score.text import requirement, score_text
+
+    show_on_terminal(score_text(found.assessment))
+    if html is not None:
+        print(f"\nPage: {html}")
+    if needed is not None:
+        print(f"\n{requirement(found.row, needed)}")
+    return found.exit_code
+
+
+def _write_report(report: Report, out: Path) -> None:
+    """The report that `compare` and `show` read."""
+    from heavytop.report.store import store
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        store.write(report, out)
+    except OSError as error:
+        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None

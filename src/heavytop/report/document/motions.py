@@ -1,0 +1,68 @@
+"""What the records of motions beside two reports come to, of one row that both have."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import msgspec
+
+from heavytop.integrate.trajectory import Outcome
+from heavytop.records import Identity
+
+
+class LossLimits(Protocol):
+    """What a policy allows of one metric, in decades: its floor in eps, loss, and the factor of its noise."""
+
+    @property
+    def floor(self) -> float: ...
+    @property
+    def loss(self) -> float: ...
+    @property
+    def noise(self) -> float: ...
+
+
+class WorseMotion(msgspec.Struct, frozen=True):
+    """A motion by its index in the sweep: digits right before and after, None where the run failed, how it ended now,
+    and the command that measures it alone.
+    """
+
+    index: int
+    before: float | None
+    after: float | None
+    outcome: str
+    command: str
+
+    @property
+    def text(self) -> str:
+        """``motion 531: digits right 14.2 → 9.1``."""
+        digits = ["-" if each is None else f"{each:.1f}" for each in (self.before, self.after)]
+        ended = "" if self.outcome == Outcome.SUCCESS.value else f", {self.outcome}"
+        return f"motion {self.index}: digits right {digits[0]} → {digits[1]}{ended}"
+
+
+class WorseMotions(msgspec.Struct, frozen=True):
+    """Of one survey: how many motions both have, how many of them got worse, the first few, those that lost most first.
+
+    reason: why the two are not joined by motion; empty where they are.
+    """
+
+    row: Identity
+    joined: int = 0
+    worse: int = 0
+    first: tuple[WorseMotion, ...] = ()
+    reason: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What a comparison says of it; empty where no motion got worse."""
+        name = f"{self.row.case} by {self.row.integrator} {self.row.key.precision}"
+        if self.reason:
+            return f"The motions of {name} are not compared one by one: {self.reason}."
+        if not self.worse:
+            return ""
+        return f"{self.worse} of {self.joined} motions of {name} got worse; {self.first[0].text}."
+
+    def to_json(self) -> dict[str, Any]:
+        """One of the surveys of `compare --json`."""
+        found = {"joined": self.joined, "worse": self.worse, "reason": self.reason}
+        return self.row.named | found | {"motions": [msgspec.structs.asdict(each) for each in self.first]}
