@@ -23,7 +23,7 @@ SPEC.loader.exec_module(engine_files)
 Log = engine_files.Log
 
 COARSE = replace(engine_files.random_engine(random.Random(5), "semi-implicit Euler"), step=1e-3, every=50, samples=12)
-FINE = replace(COARSE, method="Munthe-Kaas", step=0.01, every=20, omega=np.array([0.7, -0.4, 3.0]))
+FINE = replace(COARSE, method="Munthe-Kaas", step=0.005, every=40, omega=np.array([0.7, -0.4, 3.0]))
 VECTORS = ("omega", "gamma")
 
 

@@ -237,6 +237,7 @@ _NOT_READ = {
     "seconds",
     "amplification",
     "digits_lost",
+    "stability",
     "metrics",
     "attitude",
     "angles",
