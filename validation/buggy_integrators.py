@@ -90,7 +90,7 @@ def rk4(given):
     a, b = tableau("rk4")
     field, y, t, steps, states = field_of(given), numpy.array(given.start), 0.0, 0, []
     for end in times_of(given):
-        count = max(1, round(abs(end - t) / given.setting))
+        count = max(1, round(abs(end - t) / given.control))
         h = (end - t) / count
         for _ in range(count + BUG.get("further", 0)):
             y = y + h * sum(c * d for c, d in zip(b, stages(field, a, y, h)))
@@ -101,7 +101,7 @@ def rk4(given):
 
 def dp5(given):
     a, _ = tableau("dp5")
-    tolerance = given.setting * BUG.get("looser", 1)
+    tolerance = given.control * BUG.get("looser", 1)
     field, y, t, steps, states = field_of(given), numpy.array(given.start), 0.0, 0, []
     h = numpy.copysign(0.01, given.times[-1])
     wanted = list(times_of(given))

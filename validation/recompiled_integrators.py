@@ -246,7 +246,7 @@ def _python_rk4(given: Given, combine: Callable[..., Any]) -> Solved:
     """The classical method; ``combine`` makes y + Σ c k."""
     y, t, steps, states = list(map(float, given.start)), 0.0, 0, []
     for end in given.times:
-        count = math.ceil(abs(end - t) / given.setting)
+        count = math.ceil(abs(end - t) / given.control)
         h = (end - t) / count if count else 0.0
         for _ in range(count):
             k1 = _field(given, y)

@@ -4,6 +4,8 @@ import os
 import signal
 import sys
 
+from heavytop.errors import ExitCode
+
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
@@ -20,7 +22,7 @@ def _interrupted(*_: object) -> None:
     """
     if sys.stderr.isatty():
         os.write(2, b"\x1b[?25h\n")  # a progress bar had hidden the cursor
-    os._exit(130)
+    os._exit(ExitCode.INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,20 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
 import re
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """The exit codes of the command line."""
+
+    GOOD = 0
+    FINDING = 1
+    BAD_INPUT = 2
+    INCOMPLETE = 3
+    INTERRUPTED = 130
+    READER_GONE = 141
+    TERMINATED = 143
+
 
 _TYPES = {
     "str": "text",
@@ -43,7 +57,7 @@ def invalid(error: Exception) -> str:
 class HeavyTopError(Exception):
     """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
 
-    exit_code = 2
+    exit_code = ExitCode.BAD_INPUT
 
     def __init__(self, cause: str, remedy: str = "") -> None:
         super().__init__(f"{cause}\n  {remedy}" if remedy else cause)
@@ -70,22 +84,23 @@ class LevelNotDone(NotInClass):
 class Contradiction(HeavyTopError):
     """Two sources that must agree exclude each other: one of them is wrong, and nothing may rest on either."""
 
-    exit_code = 1
+    exit_code = ExitCode.FINDING
 
 
 class OutOfReach(HeavyTopError):
     """A reference that cannot be proven to the digits asked for; says how many could be reached."""
 
-    exit_code = 3
+    exit_code = ExitCode.INCOMPLETE
 
 
 class PeerFailed(HeavyTopError):
     """A third-party integrator that raised or broke its contract; says which and how.  Its row says so, others go on.
 
-    answered: whether it said itself that it failed, or gave a state that is not finite, and kept the protocol.
+    answered: whether it kept the protocol: it said itself that it failed, gave a state that is not finite, or was still
+    at it when its time was over.
     """
 
-    exit_code = 3
+    exit_code = ExitCode.INCOMPLETE
 
     def __init__(self, cause: str, remedy: str = "", answered: bool = False) -> None:
         super().__init__(cause, remedy)
@@ -99,7 +114,7 @@ class Unsupported(InputError):
 class OutOfTime(HeavyTopError):
     """A third-party integrator that was stopped at the time limit of its row."""
 
-    exit_code = 3
+    exit_code = ExitCode.INCOMPLETE
 
 
 class NotAsked(OutOfTime):

@@ -7,11 +7,10 @@ import pytest
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
-from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.separable.abel import Rest
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_narrow, assert_solves, positive, rational
+from support.proofs import assert_enclosed, assert_exact, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 UP = (F(0), F(0), F(1))
@@ -32,18 +31,12 @@ def random_motion(seed):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_every_random_motion_solves_all_six_equations(seed):
-    motion = random_motion(seed)
-    assert_solves(motion, rational(random.Random(seed), size=30))
-    assert_narrow(motion, F(10**6))
+    assert_exact(random_motion(seed), seed)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_enclosure_holds_the_closed_form(seed):
-    motion = random_motion(seed)
-    enclosure = Validated(motion.top, motion.start)
-    for time in (F(3, 2), F(-2)):
-        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
+    assert_enclosed(random_motion(seed))
 
 
 @pytest.mark.parametrize(

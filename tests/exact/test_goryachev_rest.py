@@ -17,7 +17,16 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
+from support.proofs import (
+    assert_attitude,
+    assert_enclosed,
+    assert_meets,
+    assert_narrow,
+    assert_solves,
+    positive,
+    rational,
+    triple,
+)
 
 F = Fraction
 TOP = HeavyTop((4, 4, 1), 1, (1, 0, 0))
@@ -81,10 +90,7 @@ def test_motions_that_tend_to_rest_are_elementary(start):
 
 @pytest.mark.parametrize("motion", [from_rest(1), from_rest(5), moving(1), moving(2)])
 def test_the_enclosure_holds_the_closed_form(motion):
-    enclosure = Validated(motion.top, motion.start)
-    for time in (F(3, 2), F(-2)):
-        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
+    assert_enclosed(motion)
 
 
 @pytest.mark.slow

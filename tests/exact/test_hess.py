@@ -12,13 +12,20 @@ from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, Disc, Segment, System2, Transfer, plan
 from heavytop.exact.catalogue import find
-from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
 from heavytop.measure.reference import reference
 from heavytop.precision import dot
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+from support.proofs import (
+    assert_attitude,
+    assert_enclosed,
+    assert_exact,
+    assert_narrow,
+    assert_solves,
+    positive,
+    rational,
+)
 
 F = Fraction
 TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))
@@ -52,10 +59,7 @@ def random_pendulum(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_every_random_motion_solves_all_six_equations(seed):
-    motion = random_hess(seed)
-    assert_solves(motion, rational(random.Random(seed), size=30))
-    assert_narrow(motion, F(10**6))
-    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
+    assert_exact(random_hess(seed), seed, attitude=True)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -70,10 +74,7 @@ def test_every_random_pendulum_solves_all_six_equations(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("motion", [random_hess(1), random_hess(2), random_pendulum(3)], ids=["1", "2", "pendulum"])
 def test_the_enclosure_holds_the_closed_form(motion):
-    enclosure = Validated(motion.top, motion.start)
-    for time in (F(3, 2), F(-2)):
-        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
+    assert_enclosed(motion)
 
 
 @pytest.mark.slow

@@ -8,10 +8,9 @@ import pytest
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.one_interval import Steklov, quadratics, steklov_motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+from support.proofs import assert_enclosed, assert_exact, assert_narrow, assert_solves, positive
 
 F = Fraction
 
@@ -43,19 +42,12 @@ def turning(second, ratio, rate):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_every_random_motion_solves_all_six_equations(seed):
-    motion = random_motion(seed)
-    assert_solves(motion, rational(random.Random(seed), size=30))
-    assert_narrow(motion, F(10**6))
-    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
+    assert_exact(random_motion(seed), seed, attitude=True)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_enclosure_holds_the_closed_form(seed):
-    motion = random_motion(seed)
-    enclosure = Validated(motion.top, motion.start)
-    for time in (F(3, 2), F(-2)):
-        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
+    assert_enclosed(random_motion(seed))
 
 
 @pytest.mark.parametrize("data", [(F(1, 5), F(1, 3), F(2)), (F(2, 3), F(1, 2), F(-1)), (F(3, 10), F(2, 3), F(1, 2))])

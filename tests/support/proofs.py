@@ -138,3 +138,23 @@ class AsRounded:
     def __init__(self, motion):
         self.top, self.start = motion.rounded(280)
         self.state, self.attitude = motion.state, motion.attitude
+
+
+def assert_exact(motion, seed, attitude=False):
+    """The contract of a random motion of a class: equations at a random time, balls narrow far out, attitude."""
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, Fraction(10**6))
+    if attitude:
+        assert_attitude(motion, rational(random.Random(seed + 50), size=30))
+
+
+def assert_enclosed(motion, system=HEAVY_TOP):
+    """The validated enclosure meets the closed form on both sides of the start."""
+    enclosure = Validated(motion.top, motion.start, system)
+    for time in (Fraction(3, 2), Fraction(-2)):
+        assert_overlap(motion.state(time, 180), enclosure.state(time, 180))
+
+
+def assert_overlap(balls, others):
+    """As many balls, each of which meets its counterpart."""
+    assert all(ball.overlaps(other) for ball, other in zip(balls, others, strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack, cast
 
 import numpy
 
@@ -52,6 +52,18 @@ Observer: TypeAlias = Callable[[Fraction, Any], object]
 EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
 
 
+class RunOptions(TypedDict, total=False):
+    """How a run is computed, as :func:`propagate` says; None, or none, for what the integrator does by itself."""
+
+    tolerance: Number | None
+    high_accuracy: bool | None
+    compact_mode: bool | None
+    step_limit: int | None
+
+
+_OPTIONS = tuple(RunOptions.__annotations__)
+
+
 def propagate(
     top: HeavyTop | Body,
     start: State,
@@ -63,11 +75,8 @@ def propagate(
     xi: Numbers | None = None,
     attitude: bool | None = None,
     angles: bool | None = None,
-    tolerance: Number | None = None,
-    high_accuracy: bool | None = None,
-    compact_mode: bool | None = None,
-    step_limit: int | None = None,
     observer: Observer | None = None,
+    **options: Unpack[RunOptions],
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, computed in a number format.
 
@@ -117,9 +126,7 @@ def propagate(
             integrator=integrator,
             system=system,
             angles=True,
-            tolerance=tolerance,
-            step_limit=step_limit,
-            flags={"high_accuracy": high_accuracy, "compact_mode": compact_mode},
+            **options,
         )
         whole_states = shown.trajectory.states
         return replace(
@@ -129,22 +136,10 @@ def propagate(
             angle_texts=shown.angles,
         )
     # what of the arguments can change between two calls is looked at in each
-    lasting = isinstance(integrator, str) and tolerance is None and xi is None and observer is None
+    checked = _checked_names(options)
+    lasting = isinstance(integrator, str) and checked["tolerance"] is None and xi is None and observer is None
     prepare = _kept if lasting and described(cast(str, integrator)).streams else _prepared
-    run = prepare(
-        top,
-        start,
-        precision,
-        integrator,
-        system,
-        xi,
-        attitude,
-        tolerance,
-        high_accuracy,
-        compact_mode,
-        arguments.steps(step_limit),
-        observer,
-    )
+    run = prepare(top, start, precision, integrator, system, xi, attitude, observer, *checked.values())
     return run(times)
 
 
@@ -156,17 +151,14 @@ def _prepared(
     system: System | str | None,
     xi: Numbers | None,
     attitude: bool | None,
-    tolerance: Number | None,
-    high_accuracy: bool | None,
-    compact_mode: bool | None,
-    step_limit: int | None,
     observer: Observer | None,
+    *values: Any,
 ) -> Callable[[Numbers], Trajectory]:
-    """:func:`propagate` of times, everything else checked."""
+    """:func:`propagate` of times, everything else checked; values: of :class:`RunOptions`, in order."""
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     setup = Setup.of(body, state, form, arguments.system(system, body))
-    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, setup.watched(observer))
+    options = _options(form, dict(zip(_OPTIONS, values, strict=True)), setup.watched(observer))
     wanted = arguments.flag(attitude, "attitude")
     which = named(integrator)
     if wanted is None:
@@ -200,19 +192,16 @@ def motion(
     system: System | str | None = None,
     angles: bool = False,
     outputs: tuple[Output, ...] = (),
-    tolerance: Number | None = None,
-    step_limit: int | None = None,
-    flags: Mapping[str, bool | None] | None = None,
     reached: Callable[[Fraction], None] | None = None,
+    **options: Unpack[RunOptions],
 ) -> Motion:
     """What `heavytop propagate` shows: a computed motion with the drift of every first integral that holds.
 
     Arguments:
-        top, start, times, precision, integrator, system, tolerance, step_limit: as in :func:`propagate`.
+        top, start, times, precision, integrator, system, options: as in :func:`propagate`.
         angles: ξ rides along, and the Euler angles φ, θ, ψ are followed from t = 0, continuous but for jumps by π at
             the poles.
         outputs: of :func:`heavytop.top.attitude.outputs`, told beside the states.
-        flags: ``high_accuracy`` and ``compact_mode``.
         reached: called with the times on the way.
 
     Returns:
@@ -224,12 +213,11 @@ def motion(
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     about = arguments.system(system, body)
-    asked = flags or {}
-    options = _options(form, tolerance, asked.get("high_accuracy"), asked.get("compact_mode"), step_limit, None)
+    checked = _options(form, options, None)
     given = ordered(times, "times", "Give a list such as [1, 2, 5].")
     instants = check_times(given)
     written = [str(TimeText.of(time)) for time in given]
-    return compute(body, state, instants, form, about, angles, options, named(integrator), reached, outputs, written)
+    return compute(body, state, instants, form, about, angles, checked, named(integrator), reached, outputs, written)
 
 
 def ensemble(
@@ -241,11 +229,8 @@ def ensemble(
     integrator: str = "heyoka",
     system: System | str | None = None,
     threads: int | None = None,
-    tolerance: Number | None = None,
-    high_accuracy: bool | None = None,
-    compact_mode: bool | None = None,
-    step_limit: int | None = None,
     observer: EnsembleObserver | None = None,
+    **options: Unpack[RunOptions],
 ) -> list[Trajectory]:
     """Many motions at once, over the same times: in SIMD lanes in double, in threads in every format.
 
@@ -267,9 +252,9 @@ def ensemble(
     form, bodies = arguments.precision(precision), arguments.bodies(tops, "tops")
     states = arguments.listed(starts, State, "starts")
     setups = _setups(bodies, states, form, arguments.system(system, *bodies))
-    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, _watching(setups, observer))
-    options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
-    run = registry.ensemble_propagator(named(integrator), options)
+    checked = _options(form, options, _watching(setups, observer))
+    checked |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
+    run = registry.ensemble_propagator(named(integrator), checked)
     found = run([setup.problem for setup in setups], check_times(times))
     return [setup.given(member) for setup, member in zip(setups, found, strict=True)]
 
@@ -309,21 +294,24 @@ def reference(
         InputError: for what is no motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
-    return known(top, start, times, digits, system, attitude, derivatives, effort=effort)
+    return watched_reference(
+        top, start, times, digits, find, system=system, attitude=attitude, derivatives=derivatives, effort=effort
+    )
 
 
-def known(
+def watched_reference(
     top: HeavyTop | Body,
     start: State,
     times: Numbers,
-    digits: int = 50,
+    digits: int,
+    finder: Finder,
+    *,
     system: System | str | None = None,
     attitude: bool | None = None,
     derivatives: str | None = None,
-    finder: Finder = find,
     effort: Number | None = None,
 ) -> Reference:
-    """:func:`reference`, whose progress may be watched: ``finder`` is :func:`heavytop.exact.catalogue.find`."""
+    """:func:`reference` with the exact solution of ``finder``, whose progress may be watched."""
     body, state = arguments.motion(top, start, of_any_size=True)
     about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
     arguments.any_times(given)
@@ -357,20 +345,24 @@ def _watching(setups: Sequence[Setup], observer: EnsembleObserver | None) -> Ens
     return lambda index, time, state: observer(index, time, setups[index].in_body_axes(state))
 
 
+def _checked_names(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Every option in order, None where it was not given; TypeError for any other name, as Python raises it."""
+    for name in options:
+        if name not in _OPTIONS:
+            raise TypeError(f"got an unexpected keyword argument {name!r}")
+    return {name: options.get(name) for name in _OPTIONS}
+
+
 def _options(
-    form: Precision,
-    tolerance: Number | None,
-    high_accuracy: bool | None,
-    compact_mode: bool | None,
-    step_limit: int | None,
-    observer: Callable[..., object] | None,
+    form: Precision, options: Mapping[str, Any], observer: Callable[..., object] | None = None
 ) -> dict[str, Any]:
     """The options that were asked for, checked: an integrator need not know the others."""
+    given = _checked_names(options)
     checked = {
-        "tolerance": arguments.tolerance(tolerance, form),
-        "high_accuracy": arguments.flag(high_accuracy, "high_accuracy"),
-        "compact_mode": arguments.flag(compact_mode, "compact_mode"),
-        "step_limit": arguments.steps(step_limit),
+        "tolerance": arguments.tolerance(given["tolerance"], form),
+        "high_accuracy": arguments.flag(given["high_accuracy"], "high_accuracy"),
+        "compact_mode": arguments.flag(given["compact_mode"], "compact_mode"),
+        "step_limit": arguments.steps(given["step_limit"]),
         "observer": arguments.callback(observer, "observer"),
     }
     return {name: value for name, value in checked.items() if value is not None}
@@ -444,22 +436,14 @@ class Integrator:
         *,
         integrator: str | Any = "heyoka",
         system: System | str | None = None,
-        tolerance: Number | None = None,
-        high_accuracy: bool | None = None,
-        compact_mode: bool | None = None,
-        step_limit: int | None = None,
+        **options: Unpack[RunOptions],
     ) -> None:
         self._form = arguments.precision(precision)
         self._top, _ = arguments.motion(top, _SOME_START, self._form)
         self._system = arguments.system(system, self._top)
         self._asked = integrator
-        self._limit = arguments.steps(step_limit)
-        flags = {
-            "high_accuracy": arguments.flag(high_accuracy, "high_accuracy"),
-            "compact_mode": arguments.flag(compact_mode, "compact_mode"),
-        }
-        checked = {**flags, "tolerance": arguments.tolerance(tolerance, self._form), "step_limit": self._limit}
-        self._options: dict[str, Any] = {name: value for name, value in checked.items() if value is not None}
+        self._options = _options(self._form, options)
+        self._limit: int | None = self._options.get("step_limit")
         self._is_plain = (
             self._form == DOUBLE
             and named(integrator) == "heyoka"

@@ -1,7 +1,8 @@
 """The command line.  Only this room prints; each command is a few lines that join the other rooms.
 
-Exit codes: 0 good, 1 a finding, 2 usage, bad input, or an output that cannot be written, 3 incomplete, undecided,
-incomparable or out of reach, 130 interrupted, 141 nobody reads the output any more, 143 terminated.
+Exit codes, :class:`heavytop.errors.ExitCode`: 0 good, 1 a finding, 2 usage, bad input, or an output that cannot be
+written, 3 incomplete, undecided, incomparable or out of reach, 130 interrupted, 141 nobody reads the output any more,
+143 terminated.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 from heavytop.cli import docs, integrators, motions, output, reports  # noqa: F401  # each adds its commands
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
-from heavytop.errors import HeavyTopError
+from heavytop.errors import ExitCode, HeavyTopError
 from heavytop.features import FEATURES
 
 _ORDER = (
@@ -45,7 +46,7 @@ def run_command_line() -> int:
         sys.stdout.flush()
     except output.ReaderGone:
         output.drop_output()
-        return output.READER_GONE
+        return ExitCode.READER_GONE
     except HeavyTopError as error:
         return _failed(str(error), error.exit_code)
     except MemoryError:
@@ -64,11 +65,13 @@ def _run() -> int:
     try:
         app(args=with_file_of_latex(sys.argv[1:]), prog_name="heavytop")
     except SystemExit as ended:
-        return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 2
-    return 0
+        return (
+            ended.code if isinstance(ended.code, int) else ExitCode.GOOD if ended.code is None else ExitCode.BAD_INPUT
+        )
+    return ExitCode.GOOD
 
 
-def _failed(message: str, code: int = 2) -> int:
+def _failed(message: str, code: int = ExitCode.BAD_INPUT) -> int:
     """Say why; what standard output holds so far is still written where that is possible."""
     output.say(message)
     try:

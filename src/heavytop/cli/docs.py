@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import command, show_on_terminal
+from heavytop.errors import ExitCode
 
 
 def _begun(text: str) -> list[str]:
@@ -39,4 +40,4 @@ def docs(
         show_on_terminal(Markdown(page(topic)))
     else:
         print(page(topic), end="")
-    return 0
+    return ExitCode.GOOD

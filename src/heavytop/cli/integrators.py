@@ -11,6 +11,7 @@ import typer
 
 from heavytop.cli.app import Json, cases, command, print_json, show_on_terminal
 from heavytop.cli.output import Progress
+from heavytop.errors import ExitCode
 
 _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
@@ -27,6 +28,7 @@ def check_integrator(
     """
     from dataclasses import asdict
 
+    from heavytop.api.integrators import NOT_TRIED
     from heavytop.api.integrators import check_integrator as check
     from heavytop.cli.output import say_former, waiting
     from heavytop.records import current
@@ -37,14 +39,17 @@ def check_integrator(
     violated = [each for each in found if each.verdict == "violated"]
     if json:
         verdict = "violated" if violated else "kept"
-        print_json({"integrator": current(integrator), "verdict": verdict, "checks": [asdict(each) for each in found]})
+        checks = [asdict(each) for each in found]
+        about = {"integrator": current(integrator), "verdict": verdict, "not_tried": NOT_TRIED}
+        print_json(about | {"checks": checks})
     else:
         width = max(len(each.check) for each in found)
         for each in found:
             head = f"{each.verdict:8}  {each.check:{width}}  "
             print(fill(each.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
         print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
-    return 1 if violated else 0
+        print(fill(NOT_TRIED, 80, **_WHOLE_WORDS))
+    return ExitCode.FINDING if violated else ExitCode.GOOD
 
 
 @command
@@ -62,7 +67,7 @@ def new(
     files = new_integrator(folder, language)
     print(fill(f"{folder}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     print(f"Next: cd {folder}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml")
-    return 0
+    return ExitCode.GOOD
 
 
 # `list`.
@@ -92,7 +97,7 @@ def list_(
     listed = listing()
     if json:
         print_json(listed)
-        return 0
+        return ExitCode.GOOD
     print("Cases (--case NAME shows the data)")
     _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
@@ -105,7 +110,7 @@ def list_(
     _lines(listed["formats"])
     print("Integrators")
     _lines(listed["integrators"])
-    return 0
+    return ExitCode.GOOD
 
 
 def _lines(notes: dict[str, str], indent: int = 0) -> None:
@@ -121,14 +126,14 @@ def _one_case(name: str, json: bool) -> int:
     found = case_document(name)
     if json:
         print_json({key: value for key, value in found.items() if key != "json"})  # it would stand in itself
-        return 0
+        return ExitCode.GOOD
     print(fill(f"{found['name']}: {found['about']}", 80))
     if found["source"]:
         print(fill(f"Source: {found['source']}. Units: {found['units']}.", 80))
     for form, title in _FORMS.items():
         if form in found:
             print(f"\n{title}\n{found[form]}")
-    return 0
+    return ExitCode.GOOD
 
 
 # `selftest`.
@@ -155,4 +160,4 @@ def selftest(
         print_json({"trials": [trial.to_json() for trial in trials]})
     else:
         show_on_terminal(detectors.in_words(trials))
-    return 0 if all(trial.as_expected for trial in trials) else 1
+    return ExitCode.GOOD if all(trial.as_expected for trial in trials) else ExitCode.FINDING

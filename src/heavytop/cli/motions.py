@@ -16,7 +16,7 @@ import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
 from heavytop.cli.output import reaching, say, say_former, watched
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode, InputError
 from heavytop.features import FEATURES
 from heavytop.files import replace
 
@@ -232,7 +232,11 @@ class _Asked:
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
-    """The command with the times and the options that say which motion before its own, and the others behind."""
+    """The command with the times and the options that say which motion before its own, and the others behind.
+
+    Typer takes options from the signature of a function alone, and reads neither TypedDict nor Unpack: without one made
+    here, the 25 shared options would stand in both commands.
+    """
 
     @wraps(function)
     def with_options(times: str, **options: Any) -> int:
@@ -301,7 +305,7 @@ def propagate(
         return motion_text(motion, shown)
 
     asked.write(motion.to_json, table, text, asked.beside(_PROPAGATE_SECONDS, precision=precision, **settings))
-    return 0 if motion.complete else 3
+    return ExitCode.GOOD if motion.complete else ExitCode.INCOMPLETE
 
 
 @command
@@ -323,12 +327,13 @@ def reference(
     up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
     with M = IΩ; γ points up.
     """
-    from heavytop.api.motions import known
+    from heavytop.api.motions import watched_reference
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        given = asked.top, asked.start, asked.times, digits, asked.system
-        found = known(*given, told, derivatives, watch.find, effort)
+        where = asked.top, asked.start, asked.times, digits, watch.find
+        options = {"system": asked.system, "attitude": told, "derivatives": derivatives, "effort": effort}
+        found = watched_reference(*where, **options)
         found.require_outputs(asked.outputs)
 
     def table() -> MotionTable:
@@ -342,7 +347,7 @@ def reference(
         return reference_text(found, shown)
 
     asked.write(lambda: found.document(asked.outputs), table, text, asked.beside(_REFERENCE_SECONDS, digits=digits))
-    return 0
+    return ExitCode.GOOD
 
 
 def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:

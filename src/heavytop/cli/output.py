@@ -16,8 +16,6 @@ from typing import Any, Self, TextIO
 from heavytop import records
 from heavytop.errors import HeavyTopError
 
-READER_GONE = 141
-"""The exit code of other tools whose reader went away: 128 + SIGPIPE."""
 _LOSSY = {"strict": "replace", "surrogateescape": "replace"}
 _own: TextIO | None = None
 _CAUSES = {errno.EBADF: "it is closed"}

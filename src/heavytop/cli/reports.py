@@ -22,6 +22,7 @@ from heavytop.cli.app import (
     writing,
 )
 from heavytop.cli.output import Progress, counted, say, say_former
+from heavytop.errors import ExitCode
 from heavytop.report.render import FORMATS
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def history(
         print_json(found.to_json())
     else:
         show_on_terminal(history_text(found.names, found.tracks))
-    return 0
+    return ExitCode.GOOD
 
 
 def _write(files: list[tuple[Path, str]]) -> None:
@@ -127,7 +128,7 @@ def show(
     require_apart(files, report)
     if not files:
         _print(report, full, json)
-        return 0
+        return ExitCode.GOOD
     found = read_report(report)
     with ExitStack() as stack:
         stack.enter_context(writing())
@@ -140,7 +141,7 @@ def show(
             tables.write(parquet, found.rows, found.plan)
     for path in files:
         print(path)
-    return 0
+    return ExitCode.GOOD
 
 
 def _print(report: Path, full: bool, json: bool) -> None:
@@ -185,7 +186,7 @@ def export(
         print(text, end="")
     else:
         _write([(out, text)])
-    return 0
+    return ExitCode.GOOD
 
 
 # `run`.
@@ -244,7 +245,7 @@ def run(
         ended = asked.finished()
         print(ended.summary)
         print(f"\nReport: {directory / REPORT} (was finished already)")
-        return 0 if ended.good else 3
+        return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
     began = perf_counter()
     try:
         with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
@@ -253,13 +254,13 @@ def run(
         kept = f"finished rows are kept: --out {directory} --resume goes on"
         said = kept if (directory / ROWS).exists() else "no row was finished"
         say(f"interrupted; {said}")
-        return 143 if isinstance(stop, _Terminated) else 130
+        return ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED
     print(ended.summary)
     page = directory / PAGE
     print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
     print(f"Report: {directory / REPORT}")
     print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
-    return 0 if ended.good else 3
+    return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
 
 
 class _Terminated(KeyboardInterrupt):

@@ -287,7 +287,7 @@ def _require_possible(command: Command) -> None:
         raise InputError(f"timeout = {quoted(command.timeout)} is not above 0 and up to {_MOST_SECONDS} seconds.")
     if command.order < 0:
         raise InputError(f"order = {command.order} is below 0.")
-    for name, values in (("systems", command.systems), ("directions", command.directions)):
+    for name, values in (("systems", command.declared.systems), ("directions", command.directions)):
         if not values:
             raise InputError(f"{name} is empty.")
     for each in command.systems:
@@ -362,16 +362,16 @@ def require(which: str | IntegratorSource) -> None:
         peer(which)
 
 
-def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = None) -> Peer:
-    """The peer with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
+def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = None) -> Peer:
+    """The peer with ``control``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
 
     Its calls raise PeerFailed for whatever others do wrong (:mod:`heavytop.integrate.peers.contract`).
-    Raises InputError for an unknown integrator and for a setting that one of this program's does not have; PeerFailed
+    Raises InputError for an unknown integrator and for a control that one of this program's does not have; PeerFailed
     where another package's cannot be used.
     """
     name, own = name_of(which), described(which).own
     if isinstance(which, Command):
-        return _program(which, setting)
+        return _program(which, control)
     try:
         chosen = peer(which)
     except InputError as error:
@@ -379,31 +379,31 @@ def ready(which: str | IntegratorSource, setting: tuple[str, Fraction] | None = 
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
     declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
-    given: dict[str, Any] = dict([setting] if setting else [])
-    if setting is not None or not own:
+    given: dict[str, Any] = dict([control] if control else [])
+    if control is not None or not own:
         with contained(name, " when its arguments were looked at"):
             arguments = inspect.signature(chosen).parameters
             takes_any = any(each.kind is each.VAR_KEYWORD for each in arguments.values())
-        for control in given:
-            if control not in arguments and not takes_any and own:
+        for option in given:
+            if option not in arguments and not takes_any and own:
                 raise InputError(
-                    f"The integrator {name} has no {control}.", "Fixed steps take a step, others a tolerance."
+                    f"The integrator {name} has no {option}.", "Fixed steps take a step, others a tolerance."
                 )
-            if control not in arguments and not takes_any:
-                raise PeerFailed(f"{name} has no {control}")
+            if option not in arguments and not takes_any:
+                raise PeerFailed(f"{name} has no {option}")
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
     return CheckedPlugin(name, chosen, own, declared, given)
 
 
-def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
-    """The program with that setting; one that says that it failed raises PeerFailed with what it said."""
-    if setting is not None and setting[0] != command.control:
-        raise PeerFailed(f"{command.name} has no {setting[0]}")
+def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
+    """The program with that control; one that says that it failed raises PeerFailed with what it said."""
+    if control is not None and control[0] != command.control:
+        raise PeerFailed(f"{command.name} has no {control[0]}")
     integrate: Peer = CommandIntegrator(command)
 
     def call(*arguments: Any, **options: Any) -> Trajectory:
-        run = integrate(*arguments, **options, **dict([setting] if setting else []))
+        run = integrate(*arguments, **options, **dict([control] if control else []))
         if run.outcome is Outcome.FAILED:
             raise PeerFailed(f"{command.name} failed: {run.flags['failure']}", answered=True)
         return run
@@ -411,7 +411,7 @@ def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
     return call
 
 
-def control(which: str | IntegratorSource) -> str:
+def control_name(which: str | IntegratorSource) -> str:
     """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     if isinstance(which, Command):
         return which.control
@@ -427,15 +427,15 @@ def control(which: str | IntegratorSource) -> str:
 
 
 def control_apart(which: str | IntegratorSource) -> str:
-    """:func:`control`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
+    """:func:`control_name`; a third-party one is looked at in a process of its own, which it may end or hold."""
     if isinstance(which, Command) or described(which).own:
-        return control(which)
+        return control_name(which)
     from heavytop.processes import ChildContext
 
     context = ChildContext()
     with ProcessPoolExecutor(1, mp_context=context) as pool:
         try:
-            return pool.submit(control, which).result(timeout=_PATIENCE)
+            return pool.submit(control_name, which).result(timeout=_PATIENCE)
         except BrokenProcessPool:
             return ""
         except TimeoutError:

@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, Protocol, Self, SupportsInt, TypeVar
 
 from flint import acb_mat, arb, arb_mat, ctx, fmpq
 
-from heavytop.errors import HeavyTopError, OutOfReach
+from heavytop.errors import ExitCode, HeavyTopError, OutOfReach
 from heavytop.precision import quotient_text, ratio_text
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import HeavyTop, State
@@ -90,7 +90,7 @@ _UNHURRIED = 0.05
 class ContextChanged(HeavyTopError):
     """Another thread set ``flint.ctx`` during an evaluation, each time that it was tried."""
 
-    exit_code = 3
+    exit_code = ExitCode.INCOMPLETE
 
     def __init__(self) -> None:
         super().__init__(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json
+from heavytop.errors import ExitCode
 
 
 @command
@@ -24,7 +25,7 @@ def body(
 
     Says whether a body has it, and if not, which slip makes it one.
 
-    Exit 0 for a body, 1 where there is none with this tensor or the tensor is suspect, 2 for a file that cannot be
+    Exit 0 for a body, 1 where there is none with this tensor or the tensor is implausible, 2 for a file that cannot be
     read.  Prints the body as a table for a plan.
     """
     from heavytop.features.body.document import assess
@@ -37,4 +38,4 @@ def body(
         print_json(assessment.document())
     else:
         print("\n".join(assessment.lines()))
-    return 0 if assessment.sound else 1
+    return ExitCode.GOOD if assessment.sound else ExitCode.FINDING

@@ -9,6 +9,7 @@ from typing import Any
 
 from heavytop import arguments
 from heavytop.display import Tabular, TitledTable
+from heavytop.errors import ExitCode
 from heavytop.features.claims.audit.audit import PAPER, Judged, judged, only_branch, require_branch
 from heavytop.features.claims.audit.audit import audit as audit_named
 from heavytop.features.claims.audit.judge import Audit
@@ -67,9 +68,9 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
         return tuple(e.id for e in self.entries if self.verdicts[e.id].verdict == _OPEN != e.expects)
 
     @property
-    def exit_code(self) -> int:
+    def exit_code(self) -> ExitCode:
         """0 where every verdict is the expected one, 1 where one is another, else 3 where one is undecided."""
-        return 1 if self.changed else 3 if self.undecided else 0
+        return ExitCode.FINDING if self.changed else ExitCode.INCOMPLETE if self.undecided else ExitCode.GOOD
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``heavytop claims --json``."""

@@ -9,7 +9,7 @@ import typer
 
 from heavytop.cli.app import Json, absolute, command, print_json, require_new, show_on_terminal
 from heavytop.cli.output import counted, followed, waiting
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode, InputError
 
 _AUDIT_SECONDS, _FIGURE_SECONDS, _ENTRY_SECONDS = 6.0, 1.0, 1.0
 """Expected, for the time left: of an audit, of each figure, and of each entry of the library."""
@@ -71,7 +71,7 @@ def _library(claim: str, system: str | None, branch: str | None, json: bool) -> 
         from heavytop.features.claims.text import unexpected_text
 
         show_on_terminal(unexpected_text(found))
-    return int(found.exit_code)
+    return ExitCode(found.exit_code)
 
 
 @command
@@ -90,7 +90,7 @@ def claims(
         from heavytop.features.claims.text import claims_text
 
         show_on_terminal(claims_text(found))
-    return 0
+    return ExitCode.GOOD
 
 
 def _listed(tag: str | None, anew: bool) -> Any:
@@ -117,7 +117,7 @@ def figures(
             print(file)
     except OSError as error:
         raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
-    return 0
+    return ExitCode.GOOD
 
 
 def _drawn(out: Path, report: Path | None) -> list[Path]:

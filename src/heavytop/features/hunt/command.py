@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, print_json
+from heavytop.errors import ExitCode
 
 
 @command
@@ -37,4 +38,4 @@ def hunt(
         print_json(found.document())
     else:
         print(found)
-    return 1 if found.found else 0
+    return ExitCode.FINDING if found.found else ExitCode.GOOD

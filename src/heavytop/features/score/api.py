@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers, required
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import ExitCode, InputError, quoted
 from heavytop.features.score.measurement import Assessment, assess, passed
 from heavytop.features.score.text import diagnosis_text, score_report, to_json
 from heavytop.features.score.trajectories.observed import (
@@ -182,9 +182,11 @@ class Score(Tabular):
     sha256: str = field(repr=False)
 
     @property
-    def exit_code(self) -> int:
+    def exit_code(self) -> ExitCode:
         """0, 1 where fewer digits are right than were required, 3 where that is not known or the run ended early."""
-        return 3 if self.passed is None else 0 if self.passed else 1
+        if self.passed is None:
+            return ExitCode.INCOMPLETE
+        return ExitCode.GOOD if self.passed else ExitCode.FINDING
 
     def to_json(self) -> dict[str, Any]:
         """The document of `score --json`."""

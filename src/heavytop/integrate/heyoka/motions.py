@@ -28,10 +28,8 @@ CHUNK_SECONDS = 0.25
 _ON_A_GRID = ("double", "extended", "quad")
 _MANY, _CLOSE = 256, 20
 """States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
-_FAR = 100
-"""Longest steps: farther times are foreseen by the mean step."""
-_FORGETS = 0.98
-"""The part of a miss, in steps, that still counts at the next far time."""
+_GROWTH = 16
+"""Times the steps so far: more are not taken at once, since few steps say little of the longest."""
 _SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
 """Rates within which no Taylor coefficient of double is 0 or infinite for its size alone."""
 
@@ -52,10 +50,6 @@ class Stepper:
     time: Any = 0
     _covers: bool = False
     _largest_step: float = 0.0
-    _mean_step: float = 0.0
-    _part: float = 0.95
-    _foreseen: float = 0.0
-    _spread: float | None = None
     _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
     rest: Any = None
@@ -73,9 +67,6 @@ class Stepper:
             outcome = self.single() if count < 2 else self._several(count, target)
             if outcome is not Outcome.SUCCESS:
                 return outcome
-        if self._foreseen:
-            self._spread = max(abs(self.steps - self._foreseen), _FORGETS * (self._spread or 0.0))
-            self._foreseen = 0.0
         return Outcome.SUCCESS
 
     def at(self, target: Any, time: Fraction | None = None) -> tuple[Outcome, Any]:
@@ -89,23 +80,13 @@ class Stepper:
         return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
 
     def _steps_short_of(self, target: OrderedRing) -> int:
-        """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
+        """How many steps as long as the longest lie before the target, the step limit and a quarter of a second."""
         distance = float(target - self.engine.time)
         if not self.forwards:
             distance = -distance
         if self._one_by_one or not self._largest_step or distance < 2 * self._largest_step:
             return 1
-        # many steps average out; each of a few may be as long as the longest so far
-        if distance > _FAR * self._largest_step:
-            expected = distance / (self._mean_step or abs(float(self.time)) / self.steps)
-            self._foreseen = self._foreseen or self.steps + expected
-            count = self._part * expected
-            if self._spread is not None:
-                count = max(count, expected - self._spread - 2)
-        else:
-            count = distance / self._largest_step
-        # a few steps say little of the mean of many
-        count = min(count, CHUNK_SECONDS / self._seconds_per_step, 16 * max(self.steps, 1))
+        count = min(distance / self._largest_step, CHUNK_SECONDS / self._seconds_per_step, _GROWTH * max(self.steps, 1))
         if self.step_limit is not None:
             count = min(count, self.step_limit - self.steps)
         return int(count)
@@ -125,7 +106,7 @@ class Stepper:
             return Outcome.SUCCESS
         if now == before[0]:
             return Outcome.STEP_TOO_SMALL
-        self._went(1, now)
+        self.steps, self.time = self.steps + 1, now
         size = abs(float(length))
         if size > self._largest_step:
             self._largest_step = size
@@ -136,29 +117,20 @@ class Stepper:
         began = perf_counter()
         outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
         self._seconds_per_step = (perf_counter() - began) / max(done, 1)
-        # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
         self._largest_step = max(self._largest_step, abs(float(largest)))
         failed = outcome == self._not_finite
         if failed or self._beyond(target):
-            # until the next step counts: the steps behind the target say how many lie before it
-            self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
-            self._spread = None
             self.engine.state[:] = state
             self.engine.dtime = time
             if failed:
                 # over the same ground again, one by one, to find where
                 self._one_by_one = True
-            elif abs(float(target - self.engine.time)) <= _FAR * self._largest_step:
+            else:  # steps that grow: half as long again is soon long enough
                 self._largest_step *= 1.5
             return Outcome.SUCCESS
-        self._went(done, self.engine.time)
+        self.steps, self.time = self.steps + done, self.engine.time
         self._covers = False
         return Outcome.SUCCESS
-
-    def _went(self, steps: int, time: Any) -> None:
-        self.steps += steps
-        self.time = time
-        self._mean_step, self._part = 0.0, 0.95
 
     def polynomial(self) -> Any:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""

@@ -30,8 +30,8 @@ def _call(given: Request, method: str) -> Any:
         method,
         given.times,
         args=given.numbers,
-        rtol=given.setting,
-        atol=given.setting,
+        rtol=given.control,
+        atol=given.control,
     )
 
 

@@ -52,7 +52,7 @@ def _solve(given: Request) -> Solution:
     # settings of this thread and this block alone: the user's jax stays what it is
     with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
         code, seconds = timed(_compiled, given.system, given.width, len(given.times))
-        run = code(given.start, given.times, given.numbers, given.setting)
+        run = code(given.start, given.times, given.numbers, given.control)
         states = numpy.asarray(jax.block_until_ready(run.ys))
     # diffrax fills what it did not reach with infinities
     unreached = numpy.isinf(states).all(axis=1)

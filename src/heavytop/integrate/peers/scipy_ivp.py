@@ -24,8 +24,8 @@ def _solver(method: str) -> Solve:
                 given.start,
                 method=method,
                 args=(given.numbers,),
-                rtol=max(given.setting, _FINEST),
-                atol=given.setting,
+                rtol=max(given.control, _FINEST),
+                atol=given.control,
                 dense_output=dense,
             )
         except ValueError as error:

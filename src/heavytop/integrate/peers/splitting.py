@@ -22,6 +22,7 @@ from heavytop.integrate.peers.double import (
     compiler,
     count,
     double_peer,
+    fixed_steps,
     reader,
     timed,
 )
@@ -87,20 +88,20 @@ def _stepper(system: System) -> Callable[..., None]:
 
 
 def _solver(order: int) -> Solve:
-    def solve(given: Request) -> Solution:
-        advance, seconds = timed(_stepper, given.system)
+    def solve(request: Request) -> Solution:
+        advance, seconds = timed(_stepper, request.system)
         stages = numpy.array(STAGES[order])
-        inertia = given.numbers[:3]
-        k = given.numbers[6:] if given.system is HEAVY_GYROSTAT else numpy.zeros(3)
-        v = numpy.concatenate([inertia * given.start[:3] + k, given.start[3:]])
-        states, time, steps = [], 0.0, 0
-        for end in given.times:
-            more = math.ceil(abs(end - time) / given.setting)
-            if more:
-                advance(v, given.numbers, k, (end - time) / more, more, stages)
-            time, steps = end, steps + more
-            states.append(numpy.concatenate([(v[:3] - k) / inertia, v[3:]]))
-        return Solution(states, time, steps, None, seconds)
+        inertia = request.numbers[:3]
+        k = request.numbers[6:] if request.system is HEAVY_GYROSTAT else numpy.zeros(3)
+        v = numpy.concatenate([inertia * request.start[:3] + k, request.start[3:]])
+
+        def steps(v: Doubles, h: float, number: int) -> None:
+            advance(v, request.numbers, k, h, number, stages)
+
+        def state(v: Doubles) -> Doubles:
+            return numpy.concatenate([(v[:3] - k) / inertia, v[3:]])
+
+        return fixed_steps(request, v, steps, state, seconds)
 
     return solve
 

@@ -29,7 +29,7 @@ def _solve(given: Request) -> Solution:
     def rates(time: float, y: Any, result: Any) -> None:
         write(result, time, y, given.numbers)
 
-    solver = CVODE(rates, method="Adams", rtol=given.setting, atol=given.setting, max_num_steps=_MOST_STEPS)
+    solver = CVODE(rates, method="Adams", rtol=given.control, atol=given.control, max_num_steps=_MOST_STEPS)
     run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
     if len(given.times) == 1:
         # two times are a span: CVODE gives every step in between

@@ -497,3 +497,49 @@ class Stepping(ABC):
         b.branch(head)
         b.position_at_end(out)
         b.ret(taken)
+
+
+class Following(ABC):
+    """Writes a function that takes steps and samples by turns, until all times are done or there were enough steps.
+
+    arrays: what the function ``advance`` takes but its number of steps.  counts, status: as of :class:`Stepping`.
+    progress: times and steps done.  times_count: of the times.  most: of the steps.  result: of the samples.
+    """
+
+    def __init__(self, code: Code, arrays: Sequence[Operand], counts: Operand, status: int) -> None:
+        self.code, self.arrays, self.counts, self.status = code, arrays, counts, status
+        self.progress, self.times_count, self.most, self.result = code.arguments[-4:]
+
+    @abstractmethod
+    def covered(self, place: Operand) -> Operand:
+        """Whether the last step covers a time, a bit."""
+
+    @abstractmethod
+    def aim(self, place: Operand) -> None:
+        """Make a time the target of ``advance``."""
+
+    @abstractmethod
+    def put(self, done: Operand, head: Any, otherwise: Any) -> None:
+        """Write samples from the time ``done`` on and go to ``head``, or to ``otherwise`` where there are none."""
+
+    def write(self, advance: Any) -> None:
+        """The loop over times and steps."""
+        code, b = self.code, self.code.builder
+        head, inside, step, sample, out = map(b.append_basic_block, ("head", "in", "step", "at", "out"))
+        b.branch(head)
+        b.position_at_end(head)
+        done, taken = (code.load_one(self.progress, place) for place in range(2))
+        running = code.load_one(self.counts, self.status) == 0
+        left = (done < self.times_count) & (taken < self.most)
+        b.cbranch(running & left, inside, out)
+        b.position_at_end(inside)
+        b.cbranch(self.covered(done), sample, step)
+        b.position_at_end(step)
+        self.aim(done)
+        more = code.call(advance, [*self.arrays, self.most - taken])
+        code.store_one(taken + more, self.progress, 1)
+        b.branch(head)
+        b.position_at_end(sample)
+        self.put(done, head, out)
+        b.position_at_end(out)
+        b.ret_void()

@@ -15,6 +15,7 @@ import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from llvmlite import ir
 
@@ -26,6 +27,7 @@ from heavytop.multiword.codegen.machine_code import (
     INTEGERS,
     POINTER,
     Code,
+    Following,
     Index,
     Machine,
     Operand,
@@ -346,7 +348,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
     advance = _Step(module, layout, system)
     advance.write()
     _write_sample(module, layout, system)
-    _Follow(module, layout, system, advance.made).write()
+    _Follow(module, layout, system).write(advance.made)
     integer, double = ctypes.c_int64, ctypes.c_double
     machine = compiled(
         module,
@@ -383,43 +385,30 @@ def _put_samples(rows: Recurrence, orders: Pair, times: Sequence[Pair], result: 
         rows.code.store(word, result, 8 * index)
 
 
-class _Follow:
+class _Follow(Following):
     """Writes ``follow``."""
 
-    def __init__(self, module: ir.Module, layout: Layout, system: System, advance: Operand) -> None:
+    def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
-        _, self.code = function(module, "follow", ir.VoidType(), kinds)
-        self.arrays = self.code.arguments[:5]
-        highs, lows, self.progress, self.count, self.most, self.result = self.code.arguments[5:]
-        self.times, self.advance, self.layout = (highs, lows), advance, layout
-        self.rows = Recurrence(self.code, layout, system, self.code.null, self.arrays[-1])
+        _, code = function(module, "follow", ir.VoidType(), kinds)
+        super().__init__(code, code.arguments[:5], code.arguments[2], STATUS)
+        self.times, self.layout = (code.arguments[5], code.arguments[6]), layout
+        self.rows = Recurrence(code, layout, system, code.null, self.arrays[-1])
 
-    def write(self) -> None:
-        """The loop over times and steps."""
-        code, b = self.code, self.code.builder
-        head, inside, step, sample, one, out = map(b.append_basic_block, ("head", "in", "step", "at", "one", "out"))
-        b.branch(head)
-        b.position_at_end(head)
-        done, taken = (code.load_one(self.progress, place) for place in range(2))
-        running = code.load_one(self.arrays[2], STATUS) == 0
-        left = (done < self.count) & (taken < self.most)
-        b.cbranch(running & left, inside, out)
-        b.position_at_end(inside)
-        b.cbranch(self._covered(done), sample, step)
-        b.position_at_end(step)
-        for word, place in zip(self._target(done), (TARGET, TARGET_LOW), strict=True):
-            code.store_one(word, self.arrays[1], place)
-        more = code.call(self.advance, [*self.arrays, self.most - taken])
-        code.store_one(taken + more, self.progress, 1)
-        b.branch(head)
-        b.position_at_end(sample)
+    def covered(self, place: Operand) -> Operand:
+        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(place))
+
+    def aim(self, place: Operand) -> None:
+        for word, at in zip(self._target(place), (TARGET, TARGET_LOW), strict=True):
+            self.code.store_one(word, self.arrays[1], at)
+
+    def put(self, done: Operand, head: Any, otherwise: Any) -> None:
+        one = self.code.builder.append_basic_block("one")
         self._put(done, AT_ONCE, head, one)
-        b.position_at_end(one)
-        self._put(done, 1, head, out)
-        b.position_at_end(out)
-        b.ret_void()
+        self.code.builder.position_at_end(one)
+        self._put(done, 1, head, otherwise)
 
-    def _put(self, done: Operand, count: int, head: Operand, otherwise: Operand) -> None:
+    def _put(self, done: Operand, count: int, head: Any, otherwise: Any) -> None:
         """Put so many rows of the result, of which those count whose times are covered, and go to the head; or nothing,
         where one of these times takes exact numbers.
         """
@@ -427,9 +416,9 @@ class _Follow:
         began, put = (self._clock(BEGAN), self._clock(BEGAN_LOW)), b.append_basic_block("put")
         sure, times, end = code.true, [], done
         for k in range(count):
-            place = code.smaller(done + k, self.count - 1)
+            place = code.smaller(done + k, self.times_count - 1)
             at, known = behind(code, self._target(place), began, self._clock(SIGN))
-            is_covered = self._covered(place)
+            is_covered = self.covered(place)
             sure &= known | ~is_covered
             end += is_covered.extended()
             times.append(at)
@@ -438,14 +427,11 @@ class _Follow:
         result = code.address(self.result, done * (16 * self.layout.vectors))
         low_order, order = (code.load_one(self.arrays[2], place) for place in (USED, ORDER))
         _put_samples(self.rows, (low_order, order), times, result)
-        code.store_one(code.smaller(end, self.count), self.progress, 0)
+        code.store_one(code.smaller(end, self.times_count), self.progress, 0)
         b.branch(head)
 
     def _target(self, place: Operand) -> Pair:
         return self.code.load_one(self.times[0], place), self.code.load_one(self.times[1], place)
-
-    def _covered(self, place: Operand) -> Operand:
-        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(place))
 
     def _clock(self, place: int) -> Operand:
         return self.code.load_one(self.arrays[1], place)

@@ -25,6 +25,7 @@ from heavytop.multiword.codegen.machine_code import (
     POINTER,
     VECTOR,
     Code,
+    Following,
     Machine,
     Operand,
     Processor,
@@ -392,7 +393,7 @@ def build(
         advance = _Advance(module, grid, series.vectors, made)
         advance.write()
         samples = write_samples(module, grid, series.vectors)
-        _Follow(module, grid, series.vectors, advance.made, samples).write()
+        _Follow(module, grid, series.vectors, samples).write(advance.made)
         signatures["advance"] = (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer])
         signatures["samples"] = (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES])
         follow = [*pointers, *[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 2, INTEGERS, integer, integer, DOUBLES]
@@ -455,44 +456,31 @@ class _Advance(Stepping):
         self.set_count(self.code.select(longer, halvings - 1, following), HALVINGS)
 
 
-class _Follow:
+class _Follow(Following):
     """Writes ``follow``."""
 
-    def __init__(self, module: ir.Module, grid: Grid, vectors: int, advance: ir.Function, samples: ir.Function) -> None:
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, samples: ir.Function) -> None:
         arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
         kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
-        _, self.code = function(module, "follow", ir.VoidType(), kinds)
-        self.grid, self.row, self.functions = grid, sample_row(grid, vectors), (advance, samples)
-        self.arrays = self.code.arguments[:10]
-        self.times, self.at, self.progress, self.count, self.most, self.result = self.code.arguments[10:]
+        _, code = function(module, "follow", ir.VoidType(), kinds)
+        super().__init__(code, code.arguments[:10], code.arguments[9], STATUS)
+        self.grid, self.row, self.samples = grid, sample_row(grid, vectors), samples
+        self.times, self.at = code.arguments[10:12]
 
-    def write(self) -> None:
-        """The loop over times and steps."""
-        code, b = self.code, self.code.builder
-        head, inside, step, sample, out = map(b.append_basic_block, ("head", "in", "step", "at", "out"))
-        b.branch(head)
-        b.position_at_end(head)
-        done, taken = (code.load_one(self.progress, place) for place in range(2))
-        running = code.load_one(self.arrays[9], STATUS) == OK
-        left = (done < self.count) & (taken < self.most)
-        b.cbranch(running & left, inside, out)
-        b.position_at_end(inside)
-        target = code.load_one(self.times, done)
-        b.cbranch(target <= self._clock(TIME), sample, step)
-        b.position_at_end(step)
-        code.store_one(target, self.arrays[8], TARGET)
-        more = code.call(self.functions[0], [*self.arrays, self.most - taken])
-        code.store_one(taken + more, self.progress, 1)
-        b.branch(head)
-        b.position_at_end(sample)
-        known = self._while(done, self.count, self._is_known)
-        order = code.load_one(self.arrays[9], ORDERS)
-        code.call(self.functions[1], [self.arrays[3], order, self.at, done, known, self.result])
+    def covered(self, place: Operand) -> Operand:
+        return self.code.load_one(self.times, place) <= self._clock(TIME)
+
+    def aim(self, place: Operand) -> None:
+        self.code.store_one(self.code.load_one(self.times, place), self.arrays[8], TARGET)
+
+    def put(self, done: Operand, head: Any, otherwise: Any) -> None:
+        code = self.code
+        known = self._while(done, self.times_count, self._is_known)
+        order = code.load_one(self.counts, ORDERS)
+        code.call(self.samples, [self.arrays[3], order, self.at, done, known, self.result])
         good = self._while(done, known, self._is_in_range)
         code.store_one(good, self.progress, 0)
-        b.cbranch(good > done, head, out)
-        b.position_at_end(out)
-        b.ret_void()
+        code.builder.cbranch(good > done, head, otherwise)
 
     def _while(self, start: Operand, stop: Operand, holds: Callable[[Operand], Operand]) -> Operand:
         """The first place from ``start`` on that ``holds`` does not, ``stop`` at the latest."""

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import ExitCode, InputError
 from heavytop.records import Identity, Row
 from heavytop.report.compare.findings import RANK, Change, Changes, sentences
 from heavytop.report.compare.noise import Policy
@@ -65,9 +65,9 @@ class Differences:
         return "better" if Verdict.BETTER in seen else "same"
 
     @property
-    def exit_code(self) -> int:
-        """0, 1 or 3, as for every command."""
-        return {"worse": 1, "incomparable": 3}.get(self.verdict, 0)
+    def exit_code(self) -> ExitCode:
+        """The exit code of `compare` and `gate`."""
+        return {"worse": ExitCode.FINDING, "incomparable": ExitCode.INCOMPLETE}.get(self.verdict, ExitCode.GOOD)
 
     def to_json(self) -> dict[str, Any]:
         """The document of `compare --json`."""

@@ -21,6 +21,7 @@ from math import comb
 from typing import Any, NamedTuple, TypeVar
 
 import sympy
+from flint import arb, fmpq
 
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra import structure
@@ -368,6 +369,7 @@ def assume(
 
     apart: the sides of what is assumed to be unequal.
     """
+    bounds = [*bounds, *(implied for bound in bounds for implied in _through_monotone(bound))]
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
@@ -393,6 +395,55 @@ def assume(
     facts += [(left - right) ** 2 for left, right in apart]
     weak = tuple(need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE)
     return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
+
+
+_MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = {
+    sympy.exp: (1, arb.log, lambda c: c > 0),
+    sympy.log: (1, arb.exp, lambda c: True),
+    sympy.sinh: (1, arb.asinh, lambda c: True),
+    sympy.tanh: (1, arb.atanh, lambda c: abs(c) < 1),
+    sympy.atan: (1, arb.tan, lambda c: abs(c) < arb.pi() / 2),
+    sympy.asin: (1, arb.sin, lambda c: abs(c) < arb.pi() / 2),
+    sympy.acos: (-1, arb.cos, lambda c: c > 0 and c < arb.pi()),
+    sympy.sqrt: (1, lambda c: c * c, lambda c: c >= 0),
+}
+"""Of functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
+
+
+def _through_monotone(bound: Bound) -> Iterator[Bound]:
+    """What left > right implies of the arguments of monotone functions: of both sides, or of one beside a fraction.
+
+    The inverse of a fraction is rounded outwards to a fraction.
+    """
+    (left, of_left), (right, of_right) = map(_monotone_argument, bound)
+    if left is None and right is None:
+        return
+    if left is right:
+        implied = (of_left, of_right)
+        sign = _MONOTONE[left][0]
+    else:
+        inner, number = (of_left, bound[1]) if right is None else (of_right, bound[0])
+        if not number.is_Rational:
+            return
+        sign, inverse, is_value = _MONOTONE[left if right is None else right]
+        value = arb(fmpq(int(number.p), int(number.q)))
+        if not is_value(value):
+            return
+        around = inverse(value)
+        below = (right is None) == (sign > 0)  # whether the inverse lies below the argument
+        edge = (around.lower() if below else around.upper()).fmpq()
+        edge = sympy.Rational(int(edge.p), int(edge.q))
+        implied = (inner, edge) if right is None else (edge, inner)
+    implied = implied if sign > 0 else implied[::-1]
+    yield implied
+    yield from _through_monotone(implied)
+
+
+def _monotone_argument(e: sympy.Expr) -> tuple[Any, sympy.Expr]:
+    """A monotone function and its argument; None and the expression for any other."""
+    if e.is_Pow and e.exp == sympy.Rational(1, 2):
+        return sympy.sqrt, e.base
+    return (e.func, e.args[0]) if e.func in _MONOTONE and len(e.args) == 1 else (None, e)
 
 
 def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fraction, Fraction]]]:

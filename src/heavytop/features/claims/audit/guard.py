@@ -14,7 +14,7 @@ import sys
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.errors import ExitCode, HeavyTopError, InputError, quoted
 from heavytop.features.claims.audit.judge import Audit
 
 SECONDS = 20
@@ -33,7 +33,7 @@ _TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or spl
 class AuditEnded(HeavyTopError):
     """The process of an audit ended without an answer: says how."""
 
-    exit_code = 3
+    exit_code = ExitCode.INCOMPLETE
 
 
 class Answer(msgspec.Struct, frozen=True):

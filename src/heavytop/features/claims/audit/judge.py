@@ -18,6 +18,7 @@ import sympy
 from flint import arb
 
 from heavytop.display import Tabular, TitledTable
+from heavytop.errors import ExitCode
 from heavytop.exact.flint.balls import radius as radius_of
 from heavytop.exact.flint.balls import radius_text, value_text
 from heavytop.features.claims.algebra.conditions import conditions_of, is_exactly_zero, written
@@ -122,9 +123,9 @@ class Audit(Tabular):
         return verdict_of(self.rows)
 
     @property
-    def exit_code(self) -> int:
+    def exit_code(self) -> ExitCode:
         """0 if every equation holds, 1 if one is refuted, 3 if none is but one is undecided."""
-        return {"holds": 0, "refuted": 1, "undecided": 3}[self.verdict]
+        return {"holds": ExitCode.GOOD, "refuted": ExitCode.FINDING, "undecided": ExitCode.INCOMPLETE}[self.verdict]
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``heavytop audit --json``."""

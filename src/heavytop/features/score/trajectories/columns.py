@@ -22,23 +22,37 @@ from heavytop.precision import Vector, dot, exact, log10, vector
 REMEDY = "`heavytop docs score` lists the columns that are understood."
 _UNIT = re.compile(r"(?:(deg(?:rees?)?|°)|rad(?:ians?)?)\s*[\])]?$", re.IGNORECASE)
 _INDEXED = re.compile(r"(.*[^\W\d_])((?:[\[(]\s*[0-4wxyz]\s*(?:,\s*[0-4wxyz]\s*)?[\])])+)(?:\s.*)?", re.IGNORECASE)
-_POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
-_PARTS = re.compile(r"(?:q|quat|quaternion)([wxyz0-4])")
-_MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
-_SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
-_FRAMED = re.compile(r"w([xyz])")
-_BODY = re.compile(r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])")
-_GAMMA = re.compile(r"(?:gamma|gam|g|γ)([xyz0-3])")
-_EULER = {
-    **{f"euler{k}": k for k in (1, 2, 3)},
-    **{f"angle{k}": k for k in (1, 2, 3)},
-    **dict.fromkeys(("phi", "φ", "alpha", "α"), 1),
-    **dict.fromkeys(("theta", "θ", "beta", "β"), 2),
-    **dict.fromkeys(("psi", "ψ"), 3),
+_PATTERNS = tuple(
+    (quantity, re.compile(pattern))
+    for quantity, pattern in (
+        ("quaternion", r"(?:q|quat|quaternion)([wxyz0-4])"),
+        ("matrix", r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])"),
+        ("framed", r"w([xyz])"),
+        ("omega_space", r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])"),
+        ("omega", r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])"),
+        ("gamma", r"(?:gamma|gam|g|γ)([xyz0-3])"),
+        ("position", r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])"),
+    )
+)
+"""The names of each quantity, tried in this order; what the groups hold is the component."""
+_NAMES = {
+    name: (quantity, component)
+    for quantity, component, names in (
+        ("omega", "1", "p"),
+        ("omega", "2", "q"),
+        ("omega", "3", "r"),
+        ("euler", "1", "euler1 angle1 phi φ alpha α"),
+        ("euler", "2", "euler2 angle2 theta θ beta β"),
+        ("euler", "3", "euler3 angle3 psi ψ"),
+        ("euler", "X", "roll"),
+        ("euler", "Y", "pitch"),
+        ("euler", "Z", "yaw heading"),
+    )
+    for name in names.split()
 }
-_TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
+"""Names of single components, before :data:`_PATTERNS`."""
 _AXES = {"x": "1", "y": "2", "z": "3"}
-_CLASSIC = {"p": "1", "q": "2", "r": "3"}
+_CLASSIC = ("p", "q", "r")
 _TIME = ("t", "time")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
 """Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
@@ -143,7 +157,7 @@ def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
 
     Lengths are none.  Raises InputError where x, y, z may belong to either of two, as in x,y,z,w,x,y,z.
     """
-    if any(_PARTS.fullmatch(name) for name in plain):
+    if any(meaning is not None and meaning[0] == "quaternion" for meaning in map(_meaning, plain)):
         return {}
     runs = [(place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3)]
     lengths = [_unit("position", name).name in _LENGTHS for name in names]
@@ -210,21 +224,11 @@ def _plain(name: str) -> str:
 
 def _meaning(plain: str) -> tuple[str, str] | None:
     """The quantity and the component of a name; None where it is not understood."""
-    if plain in _EULER:
-        return "euler", str(_EULER[plain])
-    if plain in _CLASSIC:
-        return "omega", _CLASSIC[plain]
-    if plain in _TAIT_BRYAN:
-        return "euler", _TAIT_BRYAN[plain]
-    if match := _PARTS.fullmatch(plain):
-        return "quaternion", match[1]
-    if match := _MATRIX.fullmatch(plain):
-        return "matrix", match[1] + match[2]
-    if match := _FRAMED.fullmatch(plain):
-        return "framed", match[1]
-    for quantity, pattern in (("omega_space", _SPACE), ("omega", _BODY), ("gamma", _GAMMA), ("position", _POSITION)):
+    if plain in _NAMES:
+        return _NAMES[plain]
+    for quantity, pattern in _PATTERNS:
         if match := pattern.fullmatch(plain):
-            return quantity, match[1]
+            return quantity, "".join(match.groups())
     return None
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-_PATH = Path(__file__).parents[2] / "validation" / "random_claims.py"
+_PATH = Path(__file__).parents[3] / "validation" / "random_claims.py"
 
 
 @pytest.fixture(scope="module")

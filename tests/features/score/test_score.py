@@ -22,7 +22,7 @@ from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
 from heavytop.top.equations import HEAVY_TOP
 from support import in_process
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 LAGRANGE = CASES["lagrange"]
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(7)]
 HEADER = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"

@@ -8,7 +8,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 
-LINES = (Path(__file__).parents[2] / "validation" / "subtle_claims.jsonl").read_text("utf-8").splitlines()
+LINES = (Path(__file__).parents[3] / "validation" / "subtle_claims.jsonl").read_text("utf-8").splitlines()
 CLAIMS = [json.loads(line) for line in LINES]
 QUICK = CLAIMS[::23]
 

@@ -17,7 +17,7 @@ from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
 from support.in_process import heavytop
 
-FAULTS = Path(__file__).parents[1] / "support" / "hunted_integrators.py"
+FAULTS = Path(__file__).parents[2] / "support" / "hunted_integrators.py"
 NUMBERS = ("inertia", "centre", "omega", "gamma")
 
 

@@ -18,7 +18,7 @@ from heavytop.features.claims.algebra.structure import Defined, at_values, rate_
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP
 
-_PATH = Path(__file__).parents[2] / "validation" / "disguised_claims.py"
+_PATH = Path(__file__).parents[3] / "validation" / "disguised_claims.py"
 T = sympy.Symbol("t", real=True)
 A, B, C = sympy.symbols("a b c", real=True)
 P, Q = sympy.symbols("p q", positive=True)

@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from claims.test_where import TOPS
+from features.claims.test_where import TOPS
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.fields import Field
 from heavytop.features.claims.algebra.prover import Region

@@ -22,7 +22,7 @@ from heavytop.features.score.trajectories.files import read
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 
-FILE = Path(__file__).parents[2] / "validation" / "conventions.py"
+FILE = Path(__file__).parents[3] / "validation" / "conventions.py"
 SPEC = importlib.util.spec_from_file_location("conventions", FILE)
 conventions = importlib.util.module_from_spec(SPEC)
 sys.modules["conventions"] = conventions
