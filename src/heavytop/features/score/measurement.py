@@ -17,7 +17,7 @@ from heavytop.errors import HeavyTopError, InputError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.diagnosis import Diagnosis, diagnose
 from heavytop.features.score.diagnose.readings import Seen, disagreement
-from heavytop.features.score.diagnose.samples import Frame, turning_rate
+from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
@@ -142,11 +142,11 @@ def _rounded(found: Observed, written: Rounding | None, error: float | None) -> 
     return [Diagnosis("rounded", to)] if explains(amplified, error) else []
 
 
-def _frame(found: Observed) -> Frame:
+def _frame(found: Observed) -> FileAxes:
     """The axes of the file, and which of Ω and γ are columns of it."""
     axes = numpy.array([[float(value) for value in row] for row in found.posed.axes])
     columns = [*(range(3) if "omega" in found.names else ()), *(range(3, 6) if "gamma" in found.names else ())]
-    return Frame(axes, found.posed.xi if set(FORMS) & set(found.names) else None, tuple(columns))
+    return FileAxes(axes, found.posed.xi if set(FORMS) & set(found.names) else None, tuple(columns))
 
 
 def _in_axes_of_file(seen: Seen) -> list[tuple[Any, ...]]:

@@ -29,7 +29,7 @@ from heavytop.features.score.diagnose.samples import (
     WITH_ATTITUDE,
     Array,
     Examined,
-    Frame,
+    FileAxes,
     Units,
     examined,
 )
@@ -94,7 +94,7 @@ def diagnose(
     precision: Precision,
     relative_error: float | None,
     errors: Sequence[float] = (),
-    frame: Frame | None = None,
+    frame: FileAxes | None = None,
     seen: Seen | None = None,
     step: Fraction | None = None,
 ) -> list[Diagnosis]:

@@ -76,7 +76,7 @@ class Units:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FileAxes:
     """Axes of the body in which a file gives its vectors, and what its columns are.
 
     axes: A with v_file = A v_principal.  xi: the attitude vector at t = 0 in principal axes; None where no attitude is
@@ -108,7 +108,7 @@ class Examined:
     states: Array
     rate: float
     units: Units
-    frame: Frame
+    frame: FileAxes
 
     @property
     def times(self) -> list[Fraction]:
@@ -228,7 +228,7 @@ def examined(
     times: Sequence[Fraction],
     states: Sequence[Sequence[Fraction | None]],
     worst: int | None = None,
-    frame: Frame | None = None,
+    frame: FileAxes | None = None,
 ) -> Examined | None:
     """At most :data:`MOST_SAMPLES` samples, over the first turns of the body, and ``worst`` where it is among these.
 
@@ -258,7 +258,9 @@ def examined(
     last = max(early, min(len(ends), _FEW))
     some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | set(range(min(last, _FEW)))
     rows = sorted(some if worst is None or worst >= last else some | {worst})
-    found = Examined(top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or Frame())
+    found = Examined(
+        top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or FileAxes()
+    )
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
 

@@ -15,7 +15,7 @@ import pytest
 from heavytop.features.score.measurement import Assessment
 from heavytop.features.score.text import to_json
 
-FILE = Path(__file__).parents[2] / "validation" / "engine_files.py"
+FILE = Path(__file__).parents[3] / "validation" / "engine_files.py"
 SPEC = importlib.util.spec_from_file_location("engine_files", FILE)
 engine_files = importlib.util.module_from_spec(SPEC)
 sys.modules["engine_files"] = engine_files
