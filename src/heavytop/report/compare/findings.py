@@ -515,8 +515,9 @@ def _steps(change: Change) -> float:
 
 
 def _ends_as_before(change: Change) -> bool:
-    """Whether of a row whose digits fell the last state is as right as it was."""
-    moved = [] if change.old is None else [change.decades_of(name) for name in _finals(change.old)]
+    """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
+    computed = change.old is not None and change.old.key.subject.what == "computed"
+    moved = [] if change.old is None or not computed else [change.decades_of(name) for name in _finals(change.old)]
     return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
 
 
