@@ -1,8 +1,8 @@
 """Files as simulation engines write them: first and second order, with one mistake each or with none.
 
-``python validation/engine_files.py [seed]`` writes files with mistakes and right files beside them, at 0.5 to 5 digits
-right, and right files of unusual motions in unusual columns; it prints which mistakes `score` names and which
-right files it accuses.  The methods are written here, in double and by no part of heavytop.
+``python validation/engine_files.py [seed]`` writes 40 files with one mistake each and the right file beside each, of
+four methods, at 0.5 to 5 digits right; it prints which mistakes `score` names and which right files it accuses.  The
+methods are written here, in double and by no part of heavytop.
 """
 
 from __future__ import annotations

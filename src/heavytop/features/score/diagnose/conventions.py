@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from itertools import permutations, product
 
 import numpy
@@ -28,7 +29,18 @@ from heavytop.features.score.diagnose.readings import (
     turning,
     with_tensor,
 )
-from heavytop.features.score.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, named, notable, principal
+from heavytop.features.score.diagnose.samples import (
+    ALIKE,
+    DROP,
+    FIRST,
+    FITTED_DROP,
+    FLOOR,
+    LIKELY_DROP,
+    Array,
+    named,
+    notable,
+    principal,
+)
 from heavytop.measure.attitude_error import FORMS
 from heavytop.precision import decimal_text
 from heavytop.top.attitude import SEQUENCES
@@ -45,6 +57,8 @@ _CONTRADICTS = 0.1
 AS_LIKELY = 3.0
 """Of likely suppositions whose errors differ by less, the simplest is named."""
 _REFINED = 4
+_ANISOTROPY = 3.0
+"""Factor by which M may grow more than Ω."""
 _NO_SHIFT = Fraction(0)
 _MOST_OTHERS = 3
 _SAME = 1e-9
@@ -139,6 +153,9 @@ class Suppositions:
     def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
         self.every, self.seen = seen, sampled(seen)
         self.courses = _Courses(self.seen)
+        self.early = _Courses(
+            self.seen.at(list(range(min(len(self.seen.times), FIRST[-1] + (not self.seen.times[0])))))
+        )
         self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         self.tried: list[tuple[_Try, Array]] = []
@@ -176,12 +193,34 @@ class Suppositions:
         )
         return Mistake(kind, {**numbers, "of": RATES}, own, left, len(seen.times)) if left * DROP <= own else None
 
+    @cached_property
+    def _refused(self) -> float:
+        """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω."""
+        largest = [
+            max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
+            if {"omega", "omega_space"} & seen.columns.keys()
+            else 1.0
+            for seen in (self.early.seen, self.seen)
+        ]
+        own = float(self.own.max())
+        growth = _ANISOTROPY * largest[1] / largest[0] if largest[0] else numpy.inf
+        return growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP
+
     def _left(self, each: _Try) -> Array:
-        seen, body = self.seen, each.body or self.seen.body
-        course = self.courses.of(each.start, body, each.shift)
+        """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
+        if each.start is not None or each.body is not None or each.shift:
+            early = self._error(each, self.early)
+            if not float(early.max()) <= self._refused:
+                return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
+        return self._error(each, self.courses)
+
+    @staticmethod
+    def _error(each: _Try, courses: _Courses) -> Array:
+        seen, body = courses.seen, each.body or courses.seen.body
+        course = courses.of(each.start, body, each.shift)
         if each.body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
-        if each.rates and course is not None and (plain := self.courses.of()) is not None:
+        if each.rates and course is not None and (plain := courses.of()) is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
         if each.still:
