@@ -20,8 +20,8 @@ def markdown() -> str:
         _parameters(program.get_params(context), context),
         *(_command(name, context) for name in program.list_commands(context)),
     ]
-    (codes,) = (text for text in str(heavytop.cli.__doc__).split("\n\n") if text.startswith("Exit codes: "))
-    return "\n\n".join([*parts, "## Exit codes", _escaped(codes.removeprefix("Exit codes: "))]) + "\n"
+    (codes,) = (text for text in str(heavytop.cli.__doc__).split("\n\n") if text.startswith("Exit codes"))
+    return "\n\n".join([*parts, "## Exit codes", _escaped(codes.partition(": ")[2])]) + "\n"
 
 
 def _command(name: str, above: Any) -> str:

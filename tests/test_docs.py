@@ -283,6 +283,14 @@ def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
         assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
 
 
+def test_a_stranger_sees_a_result_in_the_first_lines_of_a_short_readme() -> None:
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    assert len(lines) <= 120
+    (result,) = [block for block in blocks(ROOT / "README.md") if block.language == "text"]
+    assert result.line <= 40
+    assert result.text in (DOCS / "score.md").read_text("utf-8"), "which runs the same commands, and compares"
+
+
 def test_the_page_of_gates_shows_the_example_as_it_is() -> None:
     shown = [block.text for block in blocks(DOCS / "gate.md")]
     for file in ("mine.py", "gate.toml"):
@@ -301,8 +309,8 @@ def test_what_several_pages_say_of_the_peers_is_what_the_report_says() -> None:
     }
     assert f"it is {low} to {high} times as fast" in pages["docs/choose.md"]
     assert re.search(rf"heyoka is {low} \([^)]+\) to {high} times \([^)]+\) as fast", pages["results/README.md"])
-    minutes = {re.search(r"plan peers\b[^;.]*?, (\w+) minutes", text)[1] for text in pages.values()}
-    minutes |= {re.search(r"peers (\w+),", typer.main.get_command(app).commands["run"].help)[1]}
+    minutes = {re.search(r"plan peers\b[^;]*?, (\w+) minutes", text)[1] for text in pages.values()}
+    minutes |= {re.search(r"peers\s+(\w+),", typer.main.get_command(app).commands["run"].help)[1]}
     assert len(minutes) == 1
 
 

@@ -1,6 +1,6 @@
 """An integrator of one's own behind the call of heavytop: the classical Runge-Kutta method with fixed steps."""
 
-from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.peers.double import Solution, double_peer
 
 
 def _solve(given):
@@ -18,7 +18,7 @@ def _solve(given):
             y = [a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(y, k1, k2, k3, k4, strict=True)]
         time, steps = end, steps + count
         states.append(y)
-    return Solved(states, time, steps, 4 * steps)
+    return Solution(states, time, steps, 4 * steps)
 
 
 rk4 = double_peer("mine:rk4", 4, _solve, "step", attitude=True)

@@ -96,7 +96,8 @@ class OutOfReach(HeavyTopError):
 class PeerFailed(HeavyTopError):
     """A third-party integrator that raised or broke its contract; says which and how.  Its row says so, others go on.
 
-    answered: whether it said itself that it failed, or gave a state that is not finite, and kept the protocol.
+    answered: whether it kept the protocol: it said itself that it failed, gave a state that is not finite, or was still
+    at it when its time was over.
     """
 
     exit_code = ExitCode.INCOMPLETE

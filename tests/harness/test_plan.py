@@ -262,7 +262,7 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
         assert text.startswith(
             "top mine: The inertia tensor about the centre of mass, of principal moments -14.7656, -14.7656, 0.46875,"
         )
-        assert text.endswith('If it was meant about it, give about = "centre of mass".')
+        assert text.endswith("The tensor is about the centre of mass, and was read as about the pivot.")
     else:
         assert found == []
 

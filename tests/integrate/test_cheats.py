@@ -233,14 +233,17 @@ CHEATS = {
     "last_bit": " in two equal calls",
     "other_steps": "ended two equal calls as success at t = 20 in ",
     "sometimes": "raised ValueError: not today",
-    "one_step": "counts its steps wrongly: 1 of order ",
     "no_step": "counts its steps wrongly: it moved, and says that it took no step",
-    "few_evaluations": "and 1 evaluations of the field",
-    "few_steps": "counts its steps wrongly",
     "fixed_few": "where each is 0.01",
     "field_of_its_own": "changed the field of the system heavy_top",
 }
 """What the row of each says, or "" where nothing is hidden by it: its error and seconds are the ones of such a run."""
+DOUBTED = {
+    "one_step": "It counts 1 steps of ",
+    "few_steps": "or takes more steps than it counts.",
+    "few_evaluations": " steps, and 1 evaluations of the field.",
+}
+"""What is said of counts that are no proof: there are motions on which a method is exact."""
 TIMED = ("no_time", "all_compiling", "slow", "slow_compiling", "later", "fractions", "somebody", "honest")
 STEPPED = ("fixed", "fixed_few", "fixed_many")
 
@@ -252,7 +255,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info = tmp_path / "cheats-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cheats\nVersion: 1.0\n")
-    lines = [f"mine:{name} = cheats:{name}" for name in {*CHEATS, *TIMED, *STEPPED}]
+    lines = [f"mine:{name} = cheats:{name}" for name in {*CHEATS, *DOUBTED, *TIMED, *STEPPED}]
     (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
@@ -322,12 +325,16 @@ def test_an_honest_one_is_measured_on_every_kind_of_motion(package: Path, case: 
 
 
 @pytest.mark.slow
-def test_a_count_of_steps_that_makes_steps_short_contradicts_the_run_as_a_whole(package: Path) -> None:
+def test_a_doubtful_count_is_said_and_no_failure(package: Path) -> None:
+    for name, row in zip(DOUBTED, rows(package, *DOUBTED), strict=True):
+        assert row.outcome == "success"
+        assert (row.explained.kind, DOUBTED[name] in row.explained.text) == ("steps", True)
+
+
+@pytest.mark.slow
+def test_a_count_of_steps_makes_no_step_shorter_that_has_its_length_given(package: Path) -> None:
     (honest,), (many,) = (rows(package, kind=single_steps(name)) for name in ("fixed", "fixed_many"))
-    assert honest.outcome == "success"
-    assert many.outcome == "failed"
-    assert "mine:fixed_many counts its steps wrongly: 20000, each off by " in many.reference.reason
-    assert "and its run to t = 4 is off by" in many.reference.reason
+    assert (honest.outcome, honest.metrics, honest.steps) == ("success", many.metrics, many.steps / 50)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,10 @@ def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, be
     old = rk5(metrics={DIGITS: error("1e-12"), "solution_error_omega_final": error("1e-12")})
     new = replace(old, metrics={DIGITS: error("1e-6"), "solution_error_omega_final": error(last)})
     assert ("errors are between steps" in found([old], [new])[0]) is between
+    given = [
+        replace(each, key=replace(each.key, subject=replace(each.key.subject, what="given"))) for each in (old, new)
+    ]
+    assert "between steps" not in str(found(given[:1], given[1:]))  # a file says nothing of steps
 
 
 def failing(row: Row, outcome: str = "failed", reason: str = "it returned NaN") -> Row:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.files import replace
+from heavytop.harness.integrator_check import NOT_TRIED as NOT_TRIED
 from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
 from heavytop.version import commit

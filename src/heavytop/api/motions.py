@@ -137,6 +137,7 @@ def propagate(
         )
     # what of the arguments can change between two calls is looked at in each
     checked = _checked_names(options)
+    checked["step_limit"] = arguments.steps(checked["step_limit"])
     lasting = isinstance(integrator, str) and checked["tolerance"] is None and xi is None and observer is None
     prepare = _kept if lasting and described(cast(str, integrator)).streams else _prepared
     run = prepare(top, start, precision, integrator, system, xi, attitude, observer, *checked.values())

@@ -28,6 +28,7 @@ def check_integrator(
     """
     from dataclasses import asdict
 
+    from heavytop.api.integrators import NOT_TRIED
     from heavytop.api.integrators import check_integrator as check
     from heavytop.cli.output import say_former, waiting
     from heavytop.records import current
@@ -38,13 +39,16 @@ def check_integrator(
     violated = [each for each in found if each.verdict == "violated"]
     if json:
         verdict = "violated" if violated else "kept"
-        print_json({"integrator": current(integrator), "verdict": verdict, "checks": [asdict(each) for each in found]})
+        checks = [asdict(each) for each in found]
+        about = {"integrator": current(integrator), "verdict": verdict, "not_tried": NOT_TRIED}
+        print_json(about | {"checks": checks})
     else:
         width = max(len(each.check) for each in found)
         for each in found:
             head = f"{each.verdict:8}  {each.check:{width}}  "
             print(fill(each.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
         print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
+        print(fill(NOT_TRIED, 80, **_WHOLE_WORDS))
     return ExitCode.FINDING if violated else ExitCode.GOOD
 
 

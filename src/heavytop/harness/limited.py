@@ -27,8 +27,8 @@ from heavytop.integrate.peers.contract import said
 from heavytop.processes import GuardedProcess, stopwatch
 from heavytop.records import FAILED, OUT_OF_TIME, Row
 
-_BASE, _BASE_LATER = 30.0, 10.0
-"""Seconds that every row may take; fewer once the integrator has begun, compiled and finished a row."""
+_BASE = 30.0
+"""Seconds that every row may take, on a loaded machine too."""
 _TIMES = 10.0
 """How many times as long as expected a row may take beside that."""
 _LEAST = 10.0
@@ -44,14 +44,10 @@ _AHEAD, _SHORT = 4, 0.25
 
 @dataclass(slots=True)
 class _Record:
-    """What the rows of one integrator took: seconds over the expected cost, at most, and how many just ran out.
-
-    base: seconds of a row beside that.  out_of_time: how many ran out in all.
-    """
+    """Rows of one integrator: seconds over the expected cost, at most; how many just ran out of time, and in all."""
 
     ratio: float = 1.0
     lost: int = 0
-    base: float = _BASE
     out_of_time: int = 0
 
 
@@ -59,7 +55,7 @@ class _Record:
 class RowLimits:
     """Seconds that a row of a third-party integrator may take.
 
-    30 s, or 10 s once it has finished a row, and ten times the expected cost: that of heyoka for the same row, times
+    30 s and ten times the expected cost: that of heyoka for the same row, times
     the largest ratio of seconds to cost among the integrator's finished rows, and at least that.  Each row in
     succession that ran out of time divides the next limit, by 2, 3, ..., down to 10 s; once two ran out no other is
     asked for.
@@ -74,12 +70,12 @@ class RowLimits:
         if self.fixed is not None:
             return self.fixed
         record = self._of(task)
-        return max((record.base + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
+        return max((_BASE + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
 
     def finished(self, task: Task, cost: float, seconds: float) -> None:
         """A row ended by itself."""
         record = self._of(task)
-        record.lost, record.ratio, record.base = 0, max(record.ratio, seconds / cost), _BASE_LATER
+        record.lost, record.ratio = 0, max(record.ratio, seconds / cost)
 
     def ran_out(self, task: Task) -> None:
         """A row was stopped at its limit."""

@@ -118,7 +118,8 @@ def read(
     """
     plan, digest = load(name, kinds)
     try:
-        defined = definitions(plan, Path() if name in BUILT_IN else Path(name).parent)
+        folder = Path() if name in BUILT_IN else Path(name).parent
+        plan, defined = _by_name(plan, definitions(plan, folder), folder)
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
             plan = with_integrator(plan, integrator)
@@ -201,6 +202,30 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
     if plan.row_timeout != "":
         seconds_of(plan.row_timeout, "row_timeout")
     return defined
+
+
+def _by_name(
+    plan: Plan, defined: Mapping[str, IntegratorSource], folder: Path
+) -> tuple[Plan, dict[str, IntegratorSource]]:
+    """The plan with the names of integrators where its tables give files in that folder, and these among the defined.
+
+    Raises InputError for a file that describes none, and where one of that name is defined elsewhere.
+    """
+    known = dict(defined)
+
+    def by_name(table: Any) -> Any:
+        changes: dict[str, Any] = {}
+        if getattr(table, "ladders", None):
+            changes["ladders"] = list(map(by_name, table.ladders))
+        text = getattr(table, "integrator", "")
+        source = text if text in known else named(text, folder)
+        if not isinstance(source, str):
+            if known.setdefault(source.name, source) != source:
+                raise InputError(f"The plan {plan.name} gives one name to two integrators, {source.name}.", _RENAME)
+            changes["integrator"] = source.name
+        return msgspec.structs.replace(table, **changes)
+
+    return msgspec.structs.replace(plan, measure=list(map(by_name, plan.measure))), known
 
 
 def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:

@@ -287,7 +287,7 @@ def _require_possible(command: Command) -> None:
         raise InputError(f"timeout = {quoted(command.timeout)} is not above 0 and up to {_MOST_SECONDS} seconds.")
     if command.order < 0:
         raise InputError(f"order = {command.order} is below 0.")
-    for name, values in (("systems", command.systems), ("directions", command.directions)):
+    for name, values in (("systems", command.declared.systems), ("directions", command.directions)):
         if not values:
             raise InputError(f"{name} is empty.")
     for each in command.systems:

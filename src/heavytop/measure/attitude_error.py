@@ -132,7 +132,7 @@ def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any
 # Everything is in balls: no digit is lost where two attitudes all but agree.
 
 
-ATTITUDE_ERROR, POSITION_ERROR = "attitude_error", "position_error"
+ATTITUDE_ERROR, POSITION_ERROR, JOINT_VIOLATION = "attitude_error", "position_error", "joint_violation"
 _ONE = arb(1)
 Values = Mapping[str, Sequence[Fraction]]
 """The numbers of one sample by the name of the quantity."""
@@ -163,7 +163,8 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
 
     Twice atan2(s, c) with s = |R − S|/(2√2) and c² = 1 − s²: no digits are lost near 0.
     """
-    square = sum(((a - b) ** 2 for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)), arb(0)) / 8
+    off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
+    square = sum((each * each for each in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
     if square > _ONE:  # of what is no rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
@@ -323,8 +324,38 @@ def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[
         return [*space_to_body(axes, omega), *space_to_body(axes, gamma)]
 
 
+class JointViolation(Statistics):
+    """Distance of the body's fixed point from where it is held, of files that give attitude and position.
+
+    Where the point whose position is given is the fixed one itself, the position alone says it.  It needs no reference.
+    """
+
+    def __init__(self, bits: int, posed: Posed, said: Convention, keep: Sequence[Fraction]) -> None:
+        self.bits, self.said, self.keep = bits, said, frozenset(keep)
+        self.point = posed.centre if said.point is None else said.point
+        self.distances = Running()
+
+    @whole_evaluation
+    def __call__(self, time: Fraction, values: Values) -> None:
+        """Take in one sample."""
+        with working_precision(self.bits):
+            given = {name: [ball(value) for value in part] for name, part in values.items()}
+            position, pivot = given["position"], [ball(value) for value in self.said.pivot]
+            off = self.said.upright([a - b for a, b in zip(position, pivot, strict=True)])
+            if any(self.point):
+                form = next(form for form in FORMS if form in given)
+                rows = self.said.upright(self.said.rotation(form, given[form], ball_functions()))
+                arm = rotated(rows, [ball(value) for value in self.point])
+                off = [a - b for a, b in zip(off, arm, strict=True)]
+            self.distances.take(time, self.distances.following(root(dot(off, off))), time in self.keep)
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """``joint_violation``."""
+        return {Quantity(JOINT_VIOLATION): self.distances}
+
+
 class ObservedScorer(DriftAndError):
-    """Drift where the state is whole, errors where there is a reference."""
+    """Drift where the state is whole, errors where there is a reference, the joint where position and attitude are."""
 
     def __init__(
         self,
@@ -342,6 +373,13 @@ class ObservedScorer(DriftAndError):
         self.error: ObservedErrors | None = None
         if not isinstance(truth, str):
             self.error = ObservedErrors(problem, truth, posed, said, names, keep)
+        held = "position" in names and (
+            set(FORMS) & set(names) or not any(posed.centre if said.point is None else said.point)
+        )
+        self.joint = JointViolation(self.bits, posed, said, keep) if held else None
+
+    def _parts(self) -> list[Statistics]:
+        return [*super()._parts(), *([] if self.joint is None else [self.joint])]
 
     @whole_evaluation
     def __call__(self, time: Fraction, values: Values) -> None:
@@ -351,6 +389,8 @@ class ObservedScorer(DriftAndError):
             self.drift.take(time, self.drift.following(state))
         if self.error is not None:
             self.error(time, values, state)
+        if self.joint is not None:
+            self.joint(time, values)
 
 
 ATTITUDE, POSITION = Quantity(ATTITUDE_ERROR), Quantity(POSITION_ERROR)

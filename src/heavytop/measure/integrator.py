@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from statistics import median
@@ -20,7 +20,7 @@ from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.peers.command import NOT_COUNTED, Command
-from heavytop.integrate.peers.contract import require_equal
+from heavytop.integrate.peers.contract import Declared, require_equal
 from heavytop.integrate.registry import Integrator, IntegratorSource, described, load, name_of
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
@@ -74,7 +74,7 @@ class ChosenIntegrator:
     def carries_attitude(self) -> bool:
         """Whether it declares that ξ rides along; not one that cannot be used."""
         if isinstance(self.source, Command):
-            return self.source.attitude
+            return bool(self.source.attitude)
         if self.capabilities.own:
             return self.capabilities.attitude
         try:
@@ -82,6 +82,21 @@ class ChosenIntegrator:
         except (InputError, PeerFailed):
             return False
         return bool(peer.carries_attitude)
+
+    @property
+    def declared(self) -> Declared:
+        """What it declares of itself; nothing where it cannot be used."""
+        if isinstance(self.source, Command):
+            return self.source.declared
+        try:
+            return getattr(registry.ready(self.which), "declared", None) or Declared()
+        except (InputError, PeerFailed):
+            return Declared()
+
+    @property
+    def one_step(self) -> bool:
+        """Whether a step depends on the state where it begins alone: unless it declares that it has a memory."""
+        return self.capabilities.own or self.declared.one_step
 
     def propagate(
         self,
@@ -208,8 +223,8 @@ _AFAR = 512
 _KEPT_SECONDS = 1e-3
 """Shorter calls are not looked at for that: a pause of the machine is as long."""
 _ANGLE_OF_ORDER = 4
-"""Radians of a step by which a method of order p errs by no less than its size: as many times p + 1, generously.  The
-remainder of the exponential's series of order p is (θ e/(p + 1))^(p + 1) about."""
+"""Radians of a step by which a method of order p hardly errs by less than its size: as many times p + 1, generously.
+The remainder of the exponential's series of order p is (θ e/(p + 1))^(p + 1) about."""
 
 Integrate = Callable[..., Trajectory]
 """(times, start): a run over the times, from another start where one is given."""
@@ -355,39 +370,45 @@ def _rested(integrate: Integrate, times: Sequence[Fraction], start: State) -> fl
     return float(integrate(times, start).seconds["run"])
 
 
-def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | None, error: Fraction | None) -> None:
-    """Raises PeerFailed where a run to its end cannot have as few steps as it says, with the ``error`` that it has.
+def require_counts(name: str, run: Trajectory, control: tuple[str, Fraction] | None) -> None:
+    """Raises PeerFailed where a run to its end cannot have taken as few steps as it says.
 
-    Steps are no fewer than half of those that a step size asks for, and no more than the evaluations of the field.  One
-    step of a method of order p is off by (θ/(4 (p + 1)))^(p + 1) of the state at least where the motion turns by θ in
-    it; of a run that declares no order, 0, that is not asked, and of one without counts nothing is.
+    A motion takes a step at least, and steps are no fewer than half of those that a step size asks for.
     """
     if NOT_COUNTED.items() <= run.flags.items():
         return
-    if reason := next(_impossible_counts(run, control, error), ""):
-        raise PeerFailed(f"{name} counts its steps wrongly: {reason}")
-
-
-def _impossible_counts(run: Trajectory, control: tuple[str, Fraction] | None, error: Fraction | None) -> Iterator[str]:
-    start, span = run.problem.start.flat, abs(run.times[-1])
-    states = numpy.array([[float(exact(value)) for value in state] for state in (start, *run.states)])
-    if not run.steps:
-        if (states[1:] != states[0]).any():
-            yield "it moved, and says that it took no step"
-        return
-    if run.evaluations is not None and run.evaluations < run.steps:
-        yield f"{run.steps}, and {run.evaluations} evaluations of the field"
-    if control is not None and control[0] == "step" and 2 * run.steps < span / control[1]:
-        yield f"{run.steps} over {decimal_text(span, 6)}, where each is {decimal_text(control[1], 3)}"
-    if error is None or not run.order:
-        return
-    angle = _rate(run.problem, states) * float(span) / run.steps
-    least = min(1.0, angle / (_ANGLE_OF_ORDER * (run.order + 1))) ** (run.order + 1) * numpy.abs(states).max()
-    if error < exact(float(least)):
-        yield (
-            f"{run.steps} of order {run.order} over {angle:.2g} rad each would be off by {least:.1g} or more, "
-            f"and it is off by {decimal_text(error, 2)}"
+    span = abs(run.times[-1])
+    start = run.problem.start.flat
+    if not run.steps and any(tuple(map(exact, state))[:6] != start for state in run.states):
+        raise PeerFailed(f"{name} counts its steps wrongly: it moved, and says that it took no step")
+    if control is not None and control[0] == "step" and 0 < 2 * run.steps < span / control[1]:
+        raise PeerFailed(
+            f"{name} counts its steps wrongly: {run.steps} over {decimal_text(span, 6)}, where each is "
+            f"{decimal_text(control[1], 3)}"
         )
+
+
+def doubtful_counts(run: Trajectory, error: Fraction | None) -> str:
+    """In a sentence, that its steps do not explain how small the ``error`` of a run is; "" where they do.
+
+    One step of a method of order p is off by (θ/(4 (p + 1)))^(p + 1) of the state about, where the motion turns by θ in
+    it.  That refutes no count: there are motions on which a method is exact, and steps that do not evaluate the field.
+    """
+    if NOT_COUNTED.items() <= run.flags.items() or not run.steps:
+        return ""
+    if run.evaluations is not None and run.evaluations < run.steps:
+        return f"It counts {run.steps} steps, and {run.evaluations} evaluations of the field."
+    if error is None or not run.order:
+        return ""
+    states = numpy.array([[float(exact(value)) for value in state] for state in (run.problem.start.flat, *run.states)])
+    angle = _rate(run.problem, states) * float(abs(run.times[-1])) / run.steps
+    least = min(1.0, angle / (_ANGLE_OF_ORDER * (run.order + 1))) ** (run.order + 1) * numpy.abs(states).max()
+    if error >= exact(float(least)):
+        return ""
+    return (
+        f"It counts {run.steps} steps of {angle:.2g} rad: of order {run.order} they would be off by {least:.1g}, and "
+        f"it is off by {decimal_text(error, 2)}: it is exact on this motion, or takes more steps than it counts."
+    )
 
 
 def _rate(problem: Problem, states: Any) -> float:

@@ -152,7 +152,7 @@ def digits_right(row: Measured) -> float | None:
 
     At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
     Of an ensemble: from the root mean square over its starts of each start's largest.
-    0 where the format has lost all significant digits before the end.
+    0 where an error is as large as the value, and where the format has lost all significant digits before the end.
     None without a reference, without a sample, and for a value that is not finite.
     """
     metric = row.metrics.get(RELATIVE.text)
@@ -161,12 +161,12 @@ def digits_right(row: Measured) -> float | None:
     if row.reference.until:
         return 0.0
     most = row.bits * math.log10(2)
-    return most if metric.size is None else min(most, -metric.size)
+    return most if metric.size is None else min(most, max(0.0, -metric.size))
 
 
 def digits_text(kept: float) -> str:
-    """Digits right, for people: to one place, and none where the error is larger than the value."""
-    return f"{max(0.0, kept):.1f}"
+    """Digits right, for people: to one place."""
+    return f"{kept:.1f}"
 
 
 def digits_of(bits: int) -> int:
@@ -179,7 +179,7 @@ def digits_of(bits: int) -> int:
 
 _SPARE = 3
 """Digits that the format must have beyond those written, or nothing was rounded."""
-_LEAST = 12
+LEAST = 12
 """Numbers that must agree."""
 _SINGLE = 24
 EXPLAINS = 1.5
@@ -209,7 +209,7 @@ class Rounding:
         return numpy.where(values == 0, 0.0, base ** (numpy.floor(numpy.log(size) / numpy.log(base)) + 1 - self.digits))
 
 
-def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = _LEAST) -> Rounding | None:
+def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = LEAST) -> Rounding | None:
     """The coarsest rounding that all numbers have; None where they are written in full, or fewer than ``least``."""
     numbers = [value for state in states for value in state if value]
     if len(numbers) < least:

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from math import isqrt
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -120,6 +121,14 @@ def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real
     length = lib.sqrt(sum(value * value for value in multiple))
     w, x, y, z = (value / length for value in multiple)
     return w, x, y, z
+
+
+def near_quaternion(rows: Rows[Fraction], bits: int) -> tuple[Fraction, ...]:
+    """The quaternion of rational rows, in rationals, of length 1 to within 2^-bits."""
+    multiple = _multiple_of_quaternion(rows)
+    square = sum((value * value for value in multiple), Fraction(0))
+    length = Fraction(isqrt((square.numerator << 2 * bits) // square.denominator), 1 << bits)
+    return tuple(value / length for value in multiple)
 
 
 def continuous(quaternions: Iterable[Sequence[Real]]) -> list[tuple[Real, ...]]:

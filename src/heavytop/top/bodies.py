@@ -27,6 +27,17 @@ from heavytop.precision import (
 )
 from heavytop.top.attitude import Attitude, Rows, Three, multiplied, perpendicular, rotated, rotation_of, transposed
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.inertia_slips import (
+    MassProperties,
+    Tensor,
+    has_second_moments,
+    is_positive,
+    mending,
+    minus,
+    plus,
+    six_of,
+    steiner,
+)
 
 # Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation all but theirs.
 #
@@ -212,7 +223,6 @@ def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> tuple[Fraction, ..
     return (p[0] * q[0] - dot(p[1:], q[1:]), *(p[0] * q[i + 1] + q[0] * p[i + 1] + w[i] for i in range(3)))
 
 
-Tensor = tuple[Vector, Vector, Vector]
 PIVOT, CENTRE = "pivot", "centre of mass"
 _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
@@ -259,8 +269,9 @@ class Body:
             )
         place = vector(centre, "centre")
         given = _tensor(inertia)
-        at_pivot = _at_pivot(given, found["mass"], place, _about(about, place))
-        _require_positive(at_pivot)
+        to_pivot = _about(about, place) == CENTRE
+        at_pivot = plus(given, steiner(found["mass"], place)) if to_pivot else given
+        _require_positive(at_pivot, MassProperties(six_of(given), found["mass"], place, not to_pivot))
         whirl = None if rotor is None else vector(rotor, "rotor")
         values = {**found, "centre": place, "tensor": at_pivot, "about": about, "rotor": whirl}
         for name, value in values.items():
@@ -389,33 +400,17 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
     return rows
 
 
-def _at_pivot(tensor: Tensor, mass: Fraction, centre: Vector, about: str) -> Tensor:
-    """Steiner's theorem: J = J_c + m (|c|² 1 − c cᵀ)."""
-    if about == PIVOT:
-        return tensor
-    square = dot(centre, centre)
-
-    def row(i: int) -> Vector:
-        x, y, z = (
-            tensor[i][j] + mass * ((square if i == j else Fraction(0)) - centre[i] * centre[j]) for j in range(3)
-        )
-        return x, y, z
-
-    return row(0), row(1), row(2)
-
-
 def _warnings_about_centre(body: Body) -> list[str]:
-    """Whether ∫ x xᵀ dm = ½ tr J − J about the centre of mass can be that of a body: no principal minor is negative."""
-    central = _at_pivot(body.tensor, -body.mass, body.centre, CENTRE)
-    half = sum(central[i][i] + _ROUNDED_DATA * body.tensor[i][i] for i in range(3)) / 2
-    second = [[(half if i == j else 0) - central[i][j] for j in range(3)] for i in range(3)]
-    pairs = (second[i][i] * second[j][j] - second[i][j] ** 2 for i, j in ((0, 1), (0, 2), (1, 2)))
-    whole = dot(vector(second[0], "row"), cross(vector(second[1], "row"), vector(second[2], "row")))
-    if min(second[0][0], second[1][1], second[2][2], *pairs, whole) >= 0:
+    """Whether the tensor about the centre of mass can be that of a body; where not, with the slip that mends it."""
+    central = minus(body.tensor, steiner(body.mass, body.centre))
+    slack = _ROUNDED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
+    if has_second_moments(central, slack):
         return []
     moments = ", ".join(six_digits(value) for value in _principal_moments(central))
-    meant = "" if body.about == CENTRE else f' If it was meant about it, give about = "{CENTRE}".'
-    return [f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's.{meant}"]
+    six, at_pivot = six_of(central if body.about == CENTRE else body.tensor), body.about != CENTRE
+    slip = mending(MassProperties(six, body.mass, body.centre, at_pivot, slack))
+    sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's."
+    return [f"{sentence} {slip}".rstrip()]
 
 
 def _principal_moments(tensor: Tensor) -> list[Fraction]:
@@ -429,20 +424,14 @@ def _principal_moments(tensor: Tensor) -> list[Fraction]:
     return [Fraction(value) * size for value in values.tolist()]
 
 
-def _require_positive(tensor: Tensor) -> None:
-    """Raises InputError unless every moment of inertia is positive, by the leading minors."""
-    minors = (
-        tensor[0][0],
-        tensor[0][0] * tensor[1][1] - tensor[0][1] ** 2,
-        dot(tensor[0], cross(tensor[1], tensor[2])),
-    )
-    for size, minor in enumerate(minors, 1):
-        if minor <= 0:
-            raise InputError(
-                f"The inertia tensor is not that of a body: its leading minor of size {size} is {shown(minor)}, "
-                "so that some moment is not positive.",
-                "Check its entries, and the signs of the products of inertia: I12 is minus the integral of x y dm.",
-            )
+def _require_positive(tensor: Tensor, given: MassProperties) -> None:
+    """Raises InputError unless every principal moment about the pivot is positive; names the slip that mends it."""
+    if is_positive(tensor):
+        return
+    least = six_digits(_principal_moments(tensor)[0])
+    remedy = "Check its entries, and the signs of the products of inertia: I12 is minus the integral of x y dm."
+    cause = f"The principal moments of inertia must be positive; the smallest is {least}."
+    raise InputError(cause, mending(given) or remedy)
 
 
 # A body and its start out of texts: options of the command line, the tables of a plan.

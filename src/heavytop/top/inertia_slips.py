@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
 
-from heavytop.precision import Vector, cross, dot, round_to
+from heavytop.precision import Vector, cross, decimal_text, dot, round_to
 from heavytop.top.attitude import multiplied, transposed
 
 Tensor = tuple[Vector, Vector, Vector]
@@ -65,7 +65,7 @@ class MassProperties:
 class Slip:
     """A mistake in writing a tensor down that makes this one right.
 
-    inertia: the mended six numbers, None for one that the file does not hold.  scale: of lengths and of masses.
+    inertia: the mended six numbers, None for one that the file does not hold.
     """
 
     name: str
@@ -97,6 +97,11 @@ def minus(left: Tensor, right: Tensor) -> Tensor:
     return rows([a - b for a, b in zip(six_of(left), six_of(right), strict=True)])
 
 
+def plus(left: Tensor, right: Tensor) -> Tensor:
+    """The sum of two symmetric tensors."""
+    return rows([a + b for a, b in zip(six_of(left), six_of(right), strict=True)])
+
+
 def second_moments(central: Tensor) -> Tensor:
     """∫ x xᵀ dm = ½ tr J − J about the centre of mass."""
     half = (central[0][0] + central[1][1] + central[2][2]) / 2
@@ -115,9 +120,29 @@ def determinant(tensor: Tensor) -> Fraction:
     return dot(tensor[0], cross(tensor[1], tensor[2]))
 
 
+def has_second_moments(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
+    """Whether a body, a plate, a rod or a point has this tensor about its centre of mass: the triangle inequality."""
+    return _semidefinite(second_moments(central), slack)
+
+
+def is_positive(tensor: Tensor) -> bool:
+    """Whether every principal moment is positive, by the leading minors."""
+    return min(tensor[0][0], tensor[0][0] * tensor[1][1] - tensor[0][1] ** 2, determinant(tensor)) > 0
+
+
+def mending(given: MassProperties) -> str:
+    """The likeliest slip as a sentence, with the mended numbers; empty where none makes the tensor that of a body."""
+    for slip in slips(given):
+        if None in slip.inertia or slip.inertia == given.six:
+            return slip.sentence
+        numbers = ", ".join(decimal_text(value, 6) for value in slip.inertia if value is not None)
+        return f"{slip.sentence} Mended: inertia = [{numbers}]."
+    return ""
+
+
 def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
     """Whether a body has this tensor about its centre of mass: positive moments, triangle inequality."""
-    return _semidefinite(second_moments(central), slack) and not _is_rod(central, slack)
+    return has_second_moments(central, slack) and not _is_rod(central, slack)
 
 
 def _is_rod(central: Tensor, slack: Fraction) -> bool:
@@ -127,14 +152,14 @@ def _is_rod(central: Tensor, slack: Fraction) -> bool:
 
 
 def slips(given: MassProperties) -> list[Slip]:
-    """The slips of which one makes the tensor that of a body, the likeliest first; [] where nothing is suspect.
+    """The slips of which one makes the tensor that of a body, the likeliest first; [] where nothing is implausible.
 
-    A realisable tensor is suspect where no material is so dense or so thin, where the centre of mass lies a hundred
+    A realisable tensor is implausible where no material is so dense or so thin, where the centre of mass lies a hundred
     sizes away, where Steiner's part explains its products of inertia, or where the geometry of the file has another.
     """
     central = given.central
     if not realisable(central, given.slack):
-        if _semidefinite(second_moments(central), given.slack):
+        if has_second_moments(central, given.slack):
             return [_rod(given)]
         return [slip for slip, mended in _mends(given) if realisable(mended.central, given.slack)]
     return [*_against_geometry(given), *_of_units(given), *_of_products(given)][:3]
@@ -153,8 +178,14 @@ def _mends(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """Each slip, with the mass properties that it would mean."""
     n = given.six
     for six, which in (
-        ((n[0], n[3], n[5], n[1], n[2], n[4]), "ixx ixy ixz iyy iyz izz, and was read as I11 I22 I33 I12 I13 I23"),
-        ((n[0], n[3], n[4], n[1], n[5], n[2]), "I11 I22 I33 I12 I13 I23, and was read as ixx ixy ixz iyy iyz izz"),
+        (
+            (n[0], n[3], n[5], n[1], n[2], n[4]),
+            "ixx ixy ixz iyy iyz izz, and they were read as I11 I22 I33 I12 I13 I23",
+        ),
+        (
+            (n[0], n[3], n[4], n[1], n[5], n[2]),
+            "I11 I22 I33 I12 I13 I23, and they were read as ixx ixy ixz iyy iyz izz",
+        ),
     ):
         yield _mend(given, "order_urdf", f"The six numbers are in the order {which}.", six)
     yield from _row_major(given)

@@ -24,7 +24,7 @@ class BodyAssessment:
     """A body in a file, judged.
 
     name: of the link.  given: its mass properties about the pivot.  realisable: whether a body has them.
-    slips: of which one makes it a body, or explains what is suspect.  gravity: text, of the table for a plan.
+    slips: of which one makes it a body, or explains what is implausible.  gravity: text, of the table for a plan.
     """
 
     name: str
@@ -40,7 +40,7 @@ class BodyAssessment:
 
     @property
     def sound(self) -> bool:
-        """Whether it is a body and nothing about it is suspect."""
+        """Whether it is a body and nothing about it is implausible."""
         return self.realisable and not self.slips
 
     def data(self, free: bool = False) -> dict[str, str | list[str]]:
@@ -91,7 +91,7 @@ class BodyAssessment:
         if self.sound:
             yield f"{self.name}: a rigid body."
         elif self.realisable:
-            yield f"{self.name}: a body has this tensor, but it is suspect."
+            yield f"{self.name}: a body has this tensor, but it is implausible."
         else:
             yield f"{self.name}: no rigid body has this tensor: {_reason(principal.moments)}"
         for slip in self.slips:

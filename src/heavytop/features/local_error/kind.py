@@ -4,22 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from math import inf
 
 import msgspec
 
-from heavytop.errors import OutOfReach
+from heavytop.errors import OutOfReach, Unsupported
 from heavytop.features.local_error import measurement as local_error
 from heavytop.features.local_error.field_faults import field_fault
-from heavytop.features.local_error.measurement import require_sum, single_calls
+from heavytop.features.local_error.measurement import (
+    ORDER_OF_RUNS,
+    error_at_end,
+    order_of_runs,
+    single_calls,
+    stepped,
+    unexplained,
+)
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
-from heavytop.integrate.trajectory import Outcome, TaylorStep
+from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import OBSERVED_ORDER
-from heavytop.precision import parse, time_text
-from heavytop.records import Against, Beside, Row, RowKey
+from heavytop.precision import exact, parse, time_text
+from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.report.document.document import Table as Cells
 
@@ -27,6 +37,8 @@ NAME = "local_error"
 _AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")
 
 
+ERROR = Quantity("error", statistic="final")
+"""Of the run of a method that keeps a memory, at its end, largest component."""
 _LARGEST = local_error.LOCAL_ERROR.over("max").text
 _UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
 
@@ -72,6 +84,8 @@ class LocalErrorKind(Kind):
         """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
         case, precision = task.given, task.precision
         given = case.top, case.start, task.times[-1], precision, case.system
+        if not task.integrator.one_step:
+            return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
         if task.integrator.capabilities.steps:
             run, taken = task.integrator.first_steps(*given)
@@ -81,13 +95,19 @@ class LocalErrorKind(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
-        if run.outcome is Outcome.SUCCESS and error.running.count and not task.integrator.capabilities.own:
-            require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
-        return row if task.integrator.capabilities.own else _with_fault(row, error)
+        if task.integrator.capabilities.own:
+            return row
+        if run.outcome is Outcome.SUCCESS:
+            row = msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run))
+        row = _with_fault(row, error)
+        if row.explained or run.outcome is not Outcome.SUCCESS:
+            return row
+        text = unexplained(run, exact(step.length), error.largest, row.amplification or 1.0)
+        return msgspec.structs.replace(row, explained=Explained("steps", text)) if text else row
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
@@ -95,16 +115,39 @@ class LocalErrorKind(Kind):
         """
         told = _told(rows)
         if told:
-            yield Headline(_said(max(told, key=lambda row: row.metrics[_LARGEST])))
+            yield Headline(_said(max(told, key=_size)))
         yield from (Note(_said(row), shown=In.SHORT) for row in told)
-        columns = "case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"
+        columns = "case", "format", "steps", "largest", "rms", "order seen", "of runs", "declared", "outcome"
         title = "Single steps, each against the proven motion from where it starts"
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
 
 
+def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
+    """Of a method with a memory: the error at the end, and the order that whole runs show."""
+    if integrator.control is None:
+        raise Unsupported(
+            f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
+            "single step.",
+            "Measure whole runs: work_precision.",
+        )
+    case = task.given
+    run = integrator.propagate(case.top, case.start, task.times, task.precision, case.system)
+    metrics = {}
+    if run.outcome is Outcome.SUCCESS:
+        metrics = by_name({ERROR: of_fraction(error_at_end(run))}) | _order_of_runs(task, run)
+    return computed_row(task, run, metrics, {}, _AGAINST)
+
+
+def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
+    """The order that whole runs show, of a method with fixed steps; none where they do not agree on one."""
+    integrator = stepped(task.integrator)
+    order = None if integrator.control is None else order_of_runs(integrator, run)
+    return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
+
+
 def _with_fault(row: Row, error: local_error.LocalError) -> Row:
     """The row with the fault of the field that explains its steps, where these show no order, or less than declared."""
-    seen = row.metrics.get(OBSERVED_ORDER.text)
+    seen = row.metrics.get(ORDER_OF_RUNS.text) or row.metrics.get(OBSERVED_ORDER.text)
     if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
         return row
     found = field_fault(error.problem, error.calls, row.order or 0)
@@ -112,7 +155,7 @@ def _with_fault(row: Row, error: local_error.LocalError) -> Row:
 
 
 def _cells(row: Row) -> list[Cell]:
-    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), OBSERVED_ORDER)
+    quantities = local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), OBSERVED_ORDER, ORDER_OF_RUNS
     return [
         clip(row.case + computed_by(row)),
         row.precision,
@@ -126,21 +169,45 @@ def _cells(row: Row) -> list[Cell]:
 def _told(rows: Sequence[Row]) -> list[Row]:
     """Those that have an error; of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
-    return [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
+    return [row for row in theirs or rows if any(_number(row, each) for each in (_LARGEST, ERROR.text))]
+
+
+def _size(row: Row) -> float:
+    """log10 of the largest error of a step."""
+    metric = row.metrics.get(_LARGEST)
+    return -inf if metric is None or metric.log10 is None else metric.log10
+
+
+def _number(row: Row, name: str) -> str:
+    """The metric in short; "" where there is none."""
+    metric = row.metrics.get(name)
+    return "" if metric is None or metric.value == "missing" else short(metric.value)
 
 
 def _said(row: Row) -> str:
-    """The largest error of a step, and the order beside the one that the integrator declares."""
-    what, largest = clip(row.case + computed_by(row)), short(row.metrics[_LARGEST].value)
-    text = f"{what} in {row.precision}: a step is off by {largest} eps"
-    order = row.metrics.get(OBSERVED_ORDER.text)
-    if order is None:
-        return f"{text} at most.{_explained(row)}"
-    if not row.order:
-        return f"{text} at most; its order is {order.value}.{_explained(row)}"
-    declared = "as it says" if order.value == str(row.order) else f"not the {row.order} that it says"
-    return f"{text} at most; its order is {order.value}, {declared}.{_explained(row)}"
+    """The largest error of a step, or of a run of what keeps a memory, and the order beside the declared one."""
+    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", _number(row, _LARGEST)
+    if largest:
+        text = f"{text}: a step is off by {largest} eps at most"
+    else:
+        text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
+    order = _order(row)
+    return f"{text}{'; ' if order else ''}{order}.{' ' + row.explained.text if row.explained else ''}"
 
 
-def _explained(row: Row) -> str:
-    return f" {row.explained.text}" if row.explained else ""
+def _order(row: Row) -> str:
+    """The order that the method shows beside the one that it declares; "" for none.
+
+    Of a third-party integrator it is that of whole runs: one of single steps may be that of a starting method.
+    """
+    single, runs = (_number(row, each.text) for each in (OBSERVED_ORDER, ORDER_OF_RUNS))
+    order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
+    if not order:
+        return ""
+    text = f"its order is {order}{'' if known else ' in single steps'}"
+    if order == str(row.order):
+        text += ", as it says"
+    elif row.order and known:
+        text += f", {'not' if int(order) < row.order else 'more than'} the {row.order} that it says"
+    hint = f" ({single} in single steps: declare one_step = false where it keeps a memory)"
+    return text + (hint if runs and single not in ("", runs) else "")

@@ -3,15 +3,18 @@
 Each step is compared with the enclosure of the motion that starts exactly where the step starts: what earlier steps did
 wrong plays no part.  The order shows in steps of several lengths τ, whose error is C τ^(p+1).  At heyoka's own step
 length h the truncation error is far below rounding; there the step's polynomial is asked beyond it, at 2 h and 3 h.
-A method with fixed steps is asked for steps of 2 h, 4 h and on, until they err by more than rounding can.
+A method with fixed steps is asked for steps of 2 h, 4 h and on, until they err by more than rounding can.  Of one that
+keeps a memory a single step is that of its starting method: its order is that of whole runs at h, h/2 and h/4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import log
+from itertools import pairwise
+from math import log, log2
 from statistics import median
 from typing import Any
 
@@ -21,8 +24,8 @@ from heavytop.errors import PeerFailed, Unsupported
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.heyoka import motions
 from heavytop.integrate.peers.command import NOT_COUNTED
+from heavytop.integrate.peers.contract import DEFAULT_STEP
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
@@ -36,6 +39,7 @@ _NEAR, _FAR = 2, 3
 _ABOVE_ROUNDING = 1000
 """Times eps and the size of the state: an error from which the order of a rounded step is read."""
 LOCAL_ERROR = Quantity("local_error_ulp")
+ORDER_OF_RUNS = Quantity("observed_order", "runs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +149,6 @@ _LONGEST = 2
 """Radians: in longer steps no order shows."""
 _UNSEEN = 10
 """Times as large as the largest error of 16 steps may be that of another."""
-_ROUNDINGS = 32
-"""Of one step, in eps of the state: 17 stages of a splitting method come to 16."""
-_MOST_STEPS = 64
-"""Steps in one call over the mean step: CVODE and LSODA, which begin with order 1 and small steps, take 18."""
 
 
 def single_calls(
@@ -156,17 +156,19 @@ def single_calls(
 ) -> tuple[Trajectory, list[tuple[Fraction, Call]]]:
     """A run to ``until`` > 0, and 16 calls, each with the time at which it ends; none where a run failed.
 
-    A call starts at one of 16 states of the run, evenly spread from the start on, and goes over the mean step of the
-    run, which a method with fixed steps takes as its step.  Raises PeerFailed for whatever a third-party integrator
-    does wrong, also where its count of steps cannot be, and for a gyrostat unless it takes many motions.
+    A call starts at one of 16 states of the run, evenly spread from the start on, and goes over the step that a method
+    with fixed steps is given, whatever it counts; of another over the mean step of the run.
+    Raises PeerFailed for whatever a third-party integrator does wrong, also where it moved in no step, Unsupported for
+    one that does not count its steps, and PeerFailed for a gyrostat unless it takes many motions.
     """
+    integrator = stepped(integrator)
     whole = integrator.propagate(top, start, [until], precision, system)
     times = [exact(number(until * i / _CALLS, precision)) for i in range(1, _CALLS)]
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = registry.control_name(integrator.which) == "step"
-    length = until / max(whole.steps, 1)
+    fixed = integrator.control is not None
+    length = integrator.control[1] if integrator.control else until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
         tau = exact(number(n * length, precision))
@@ -177,10 +179,13 @@ def single_calls(
     failed = next((run for run in (whole, sampled, *own) if run.outcome is not Outcome.SUCCESS), None)
     if failed is not None:
         return failed, []
-    _require_count(integrator, [whole], whole.steps)
-    _require_count(integrator, own, 1 if fixed else _MOST_STEPS)
+    _require_count(integrator, whole)
     turned = length**2 * _rate_squared(whole.problem)
-    longer = {n: over(n) for n in (_LONGER if fixed else ()) if n**2 * turned <= _LONGEST**2}
+    longer = {}
+    with suppress(PeerFailed):  # an implicit step of that length need not have a solution
+        for n in _LONGER if fixed else ():
+            if n**2 * turned <= _LONGEST**2:
+                longer[n] = over(n)
     calls = [
         Call(begin, exact(number(length, precision)), own[i].states[0], _reached(longer, i))
         for i, begin in enumerate(begins)
@@ -188,58 +193,113 @@ def single_calls(
     return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
 
 
-def _require_count(integrator: ChosenIntegrator, runs: Sequence[Trajectory], most: int) -> None:
-    """Raises PeerFailed where a run moved in no step, or took more than ``most`` over one mean step.
-
-    A mean step follows from the count of steps: one too many times too large would make every call look exact.
-    """
-    for run in runs:
-        if NOT_COUNTED.items() <= run.flags.items():
-            raise Unsupported(f"{integrator.name} does not say how many steps it takes.", "Say it: `done steps N`.")
-        moved = any(tuple(map(exact, state)) != run.problem.start.flat for state in run.states)
-        if moved and run.steps == 0:
-            raise PeerFailed(f"{integrator.name} moved, and says that it took no step")
-        if run.steps > most:
-            raise PeerFailed(
-                f"{integrator.name} counts its steps wrongly: {run.steps} in a call over the mean step of its own run"
-            )
+def stepped(integrator: ChosenIntegrator) -> ChosenIntegrator:
+    """With the step 1/100 where it has fixed steps and none is given."""
+    if integrator.control is not None or registry.control_name(integrator.which) != "step":
+        return integrator
+    return replace(integrator, control=("step", DEFAULT_STEP))
 
 
-def require_sum(integrator: ChosenIntegrator, whole: Trajectory, step: Fraction) -> None:
-    """Raises PeerFailed where an integrator ends further off than its steps, each a number, can have taken it.
+def _require_count(integrator: ChosenIntegrator, run: Trajectory) -> None:
+    """Raises Unsupported where the steps of a run are not counted, PeerFailed where it moved in none."""
+    if NOT_COUNTED.items() <= run.flags.items():
+        raise Unsupported(f"{integrator.name} does not say how many steps it takes.", "Say it: `done steps N`.")
+    moved = any(tuple(map(exact, state)) != run.problem.start.flat for state in run.states)
+    if moved and run.steps == 0:
+        raise PeerFailed(f"{integrator.name} moved, and says that it took no step")
 
-    step: the largest error of a step over the mean step, which follows from its count of steps; one too large makes
-    every step short, and its error small.  Errors add up, roundings as a random walk, and grow along the motion as its
-    neighbours part, or with the angle that it turns by.
+
+def unexplained(whole: Trajectory, length: Fraction, step: Fraction, amplification: float) -> str:
+    """In a sentence, that a run ends further off than its steps can have taken it; "" where they can.
+
+    length: of a step.  step: the largest error of one.  amplification: of any error by the motion itself.
+
+    Errors of one sign add up, and are amplified; those between the calls may be larger.  That refutes no count: what
+    errs more between the calls, and what keeps a memory, is off by more as well.
     """
     p, until = whole.problem, whole.times[-1]
-    growth = 1 + until * exact(float(_rate_squared(p)) ** 0.5) + _parting(p, until)
-    bits = p.precision.bits + GUARD_BITS
-    truth = Validated(p.top, p.start, p.system, p.parameters.rotor).state(until, bits)
-    off = max(abs(exact(value) - midpoint(true)) for value, true in zip(whole.states[-1], truth, strict=True))
-    rounding = p.precision.eps * max(map(abs, p.start.flat))
-    at_random = step <= _ROUNDINGS * rounding
-    added = exact(whole.steps**0.5) if at_random else whole.steps
-    most = _UNSEEN * growth * added * (step + rounding)
-    if off > most:
-        raise PeerFailed(
-            f"{integrator.name} counts its steps wrongly: {whole.steps}, each off by {decimal_text(step, 2)} at most, "
-            f"and its run to t = {decimal_text(until, 6)} is off by {decimal_text(off, 2)}"
-        )
-
-
-def _parting(problem: Problem, until: Fraction) -> Fraction:
-    """How many times as far apart two neighbouring motions are in the end, by heyoka."""
-    top, start = problem.given or (problem.top, problem.start)
-    by = Fraction(1, 1 << problem.precision.bits // 2)
-    near = State(*([(1 + by) * value for value in part] for part in (start.omega, start.gamma)))
-    one, other = (
-        motions.propagate(top, each, [until], problem.precision, system=problem.system) for each in (start, near)
+    off, count = error_at_end(whole), until / length
+    size: Fraction = max(map(abs, p.start.flat))
+    turned = until * exact(float(_rate_squared(p)) ** 0.5)
+    most = _UNSEEN * (1 + turned + exact(amplification)) * count * (step + p.precision.eps * size)
+    if off <= most:
+        return ""
+    return (
+        f"Its run to t = {decimal_text(until, 6)} is off by {decimal_text(off, 2)}, which {round(count)} steps, each "
+        f"off by {decimal_text(step, 2)} at most where it starts anew, do not explain: it keeps a memory "
+        "(one_step = false), errs more elsewhere, or takes fewer steps than it counts."
     )
-    if Outcome.SUCCESS is not one.outcome or one.outcome is not other.outcome:
-        return Fraction(0)
-    apart: Fraction = max(abs(exact(a) - exact(b)) for a, b in zip(one.states[0], other.states[0], strict=True))
-    return apart / by / max(map(abs, start.flat))
+
+
+def error_at_end(run: Trajectory) -> Fraction:
+    """The largest component of the error of its last state."""
+    p = run.problem
+    bits = p.precision.bits + GUARD_BITS
+    truth = Validated(p.top, p.start, p.system, p.parameters.rotor).state(run.times[-1], bits)
+    off: Fraction = max(abs(exact(value) - midpoint(true)) for value, true in zip(run.states[-1], truth, strict=True))
+    return off
+
+
+# The order of whole runs, which that of single steps is no evidence of where a method keeps a memory.
+
+
+_REFINED = (0, -1, -2, -3, -4)
+_COARSENED = (1, 2, 3, 4, 5, 6)
+"""Binary logarithms of steps over h: refined until two orders in succession agree, or an error drowns in rounding."""
+_AGREE = 0.3
+
+
+def order_of_runs(integrator: ChosenIntegrator, whole: Trajectory) -> float | None:
+    """The order that the ends of whole runs at h, h/2, h/4 show, and of finer ones where they do not agree on one.
+
+    integrator: with the step h of the run ``whole``.  Where the errors at these steps are of rounding, coarser ones are
+    taken.  None where no two orders in succession agree.
+    """
+    assert integrator.control is not None
+    step, p, until = integrator.control[1], whole.problem, whole.times[-1]
+    top, start = p.given or (p.top, p.start)
+    size: Fraction = max(map(abs, p.start.flat))
+
+    def error(place: int) -> Fraction | None:
+        """At the step h 2^place; None where the run fails, or rounding may have made it."""
+        taken = step * Fraction(2) ** place
+        asked = replace(integrator, control=("step", taken))
+        try:
+            run = asked.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
+        except PeerFailed:
+            return None
+        if run.outcome is not Outcome.SUCCESS:
+            return None
+        off = error_at_end(run)
+        roundings: Fraction = max(Fraction(_ABOVE_ROUNDING), _UNSEEN * until / taken)
+        return off if off > roundings * p.precision.eps * size else None
+
+    errors: list[Fraction] = []
+    for place in _REFINED:
+        off = error(place)
+        if off is None:
+            break
+        errors.append(off)
+        if (order := _settled(errors)) is not None:
+            return order
+    errors = errors[:3]
+    for place in _COARSENED if len(errors) < 3 else ():
+        taken = step * Fraction(2) ** place
+        if taken**2 * _rate_squared(p) > _LONGEST**2:
+            break
+        if (off := error(place)) is not None:
+            errors.insert(0, off)
+        if (order := _settled(errors[:3])) is not None:
+            return order
+    return None
+
+
+def _settled(errors: Sequence[Fraction]) -> float | None:
+    """The order of the last halving of the step, where that of the one before is the same."""
+    if len(errors) < 3:
+        return None
+    before, last = (log2(float(a / b)) for a, b in pairwise(errors[-3:]))
+    return last if abs(last - before) <= _AGREE else None
 
 
 def _rate_squared(problem: Problem) -> Fraction:

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import HeavyTopError
-from heavytop.exact.flint.balls import midpoint, whole_evaluation, working_precision
-from heavytop.features.score.diagnose.conventions import mistake, sampled
+from heavytop.errors import HeavyTopError, InputError
+from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.diagnosis import Diagnosis, diagnose
-from heavytop.features.score.diagnose.readings import disagreement
-from heavytop.features.score.diagnose.samples import turning_rate
+from heavytop.features.score.diagnose.readings import Seen, disagreement
+from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.attitude_error import ObservedScorer, state_of
+from heavytop.measure.attitude_error import FORMS, ObservedScorer
 from heavytop.measure.scalar import (
     GUARD_BITS,
     RELATIVE,
+    Rounding,
     digits_kept,
     digits_of,
     digits_right,
@@ -38,6 +40,8 @@ from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scor
 from heavytop.measure.truth import Truth, truth, truth_with_attitude
 from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, round_to, shown, time_text
 from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
+
+Progress = Callable[[], None]
 
 # Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.
 
@@ -76,23 +80,20 @@ def observed_of(given: GivenTrajectory) -> Observed:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """A scored trajectory: what measured it, and the relative error of each sample where the reference goes."""
+    """A scored trajectory: its row, what measured it, and the relative error of each sample with a reference."""
 
+    row: Row
     problem: Problem
-    scorer: ObservedScorer
+    scorer: DriftAndError
     errors: list[float]
 
 
-def scored(
-    given: GivenTrajectory,
-    times: Sequence[Fraction],
-    keep: Sequence[Fraction],
-    effort: float,
-    progress: Callable[[], None],
-) -> Scored:
-    """Every sample up to the first that is not finite, compared with the true motion.  times: rounded to the format."""
+def _observed(given: GivenTrajectory, progress: Progress) -> Scored:
+    """A trajectory of attitudes, positions or Ω in any axes: samples up to the first that is not finite."""
     found, problem = observed_of(given), exact_problem(given)
-    true = truth_with_attitude(problem, times, effort)
+    times = [round_to(time, given.precision.bits) for time in given.times]
+    keep = [times[i - 1] for i in log_spaced(len(times))]
+    true = truth_with_attitude(problem, times, _REFERENCE_EFFORT)
     known = true if isinstance(true, str) else true.remembered()
     scorer = ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
     errors: list[float] = []
@@ -101,7 +102,7 @@ def scored(
         if scorer.error is not None and scorer.error.truth.covers(time):
             errors.append(scorer.error.last)
         progress()
-    return Scored(problem, scorer, errors)
+    return Scored(_row(given, problem, times, keep, scorer), problem, scorer, errors)
 
 
 def _count(found: Observed) -> int:
@@ -109,43 +110,58 @@ def _count(found: Observed) -> int:
 
 
 def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
-    """What explains the error of the columns: their digits, lengths off 1, a convention, or another mistake."""
-    found = observed_of(given)
-    times = given.times[: _count(found)]
-    rows = [row for row in given.states[: len(times)] if row is not None]
-    said = _disagreements(found, times)
-    written = rounding(rows, given.precision)
-    if error is not None and error <= _WORTH_ASKING:
-        rounded = written is not None and explains(written, error)
-        return said + ([Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})] if rounded else [])  # type: ignore[union-attr]
-    lengths = _lengths(found, times, given.precision)
-    if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
-        return [*said, lengths]
-    if written is not None and error is not None and explains(written, error):
-        return [*said, Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
-    seen = found.seen(times)
-    told = None if seen is None else mistake(sampled(seen))
-    if told is not None and seen is not None:
-        numbers = {"of": "data", **told.numbers} | ({"or": ", ".join(told.others)} if told.others else {})
-        looked = sampled(seen)
-        at = None if len(looked.times) == len(times) else (len(looked.times), len(times), shown(looked.times[-1]))
-        return [*said, Diagnosis(told.kind, numbers, told.error, told.left, at)]
-    return said + _of_states(given, times, error, errors)
+    """What explains the error: the digits written, lengths off 1, a convention, or another mistake."""
+    about: dict[str, Any] = {"step": _step(given)}
+    count = len(_finite(given))
+    times, states = given.times[:count], _finite(given)
+    said: list[Diagnosis] = []
+    if (found := given.observed) is not None:
+        seen = found.seen(times)
+        said = [] if seen is None else _disagreements(seen, times)
+        rounded = _rounded(found, rounding(states, given.precision), error)
+        if error is not None and (error <= _WORTH_ASKING or rounded):
+            return said + rounded
+        lengths = _lengths(found, times, given.precision)
+        if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
+            return [*said, lengths]
+        if seen is None:
+            return said
+        states, about["seen"], about["frame"] = _in_axes_of_file(seen), seen, _frame(found)
+    top, start = given.top, given.start
+    return said + diagnose(top, start, given.system, times, states, given.precision, error, errors, **about)
 
 
-def _of_states(
-    given: GivenTrajectory, times: Sequence[Fraction], error: float | None, errors: Sequence[float]
-) -> list[Diagnosis]:
-    """What the columns have wrong that a file of Ω and γ may have as well, where they give the whole state."""
-    found, bits = observed_of(given), given.precision.bits + GUARD_BITS
-    states: list[tuple[Fraction, ...]] = []
-    for row in range(len(times)):
-        state = state_of(found.sample(row), found.said, found.posed, bits)
-        if state is None:
-            return []
-        states.append(tuple(round_to(midpoint(value), given.precision.bits) for value in state))
-    top, start = found.posed.top, found.posed.start
-    return diagnose(top, start, given.system, times, states, given.precision, error, errors)
+def _rounded(found: Observed, written: Rounding | None, error: float | None) -> list[Diagnosis]:
+    """That the digits written explain the error of what follows from them."""
+    if written is None or error is None:
+        return []
+    arm = math.sqrt(float(dot(found.posed.centre, found.posed.centre)))
+    sizes = {"quaternion": 4.0, "euler": 3.0, "position": max(2.0, 2.0 / arm) if arm else 2.0}
+    amplified = replace(written, error=written.error * max(sizes.get(name, 1.0) for name in found.names))
+    to = {"to": written.kind, "digits": str(written.digits)}
+    return [Diagnosis("rounded", to)] if explains(amplified, error) else []
+
+
+def _frame(found: Observed) -> FileAxes:
+    """The axes of the file, and which of Ω and γ are columns of it."""
+    axes = numpy.array([[float(value) for value in row] for row in found.posed.axes])
+    columns = [*(range(3) if "omega" in found.names else ()), *(range(3, 6) if "gamma" in found.names else ())]
+    return FileAxes(axes, found.posed.xi if set(FORMS) & set(found.names) else None, tuple(columns))
+
+
+def _in_axes_of_file(seen: Seen) -> list[tuple[Any, ...]]:
+    """Ω, γ and, of an attitude, ξ of each sample in the axes of the file; None for what it does not give."""
+    unknown, said, columns = numpy.full((len(seen.times), 3), numpy.nan), seen.said, seen.columns
+    form = next((form for form in FORMS if form in columns), None)
+    omega, gamma = (columns.get(name, unknown) for name in ("omega", "gamma"))
+    parts = [omega, gamma]
+    if form is not None:
+        rotation = said.rotation(form, columns[form])
+        parts = [omega, rotation[:, 2], rotation[:, 0]]
+        if "omega" not in columns and "omega_space" in columns:
+            parts[0] = numpy.einsum("nji,nj->ni", rotation, said.vectors(columns["omega_space"], True))
+    rows = numpy.hstack(parts).tolist()
+    return [tuple(None if value != value else Fraction(value) for value in row) for row in rows]
 
 
 def _lengths(found: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
@@ -159,11 +175,8 @@ def _lengths(found: Observed, times: Sequence[Fraction], precision: Precision) -
     return Diagnosis("quaternion_length", {"off": size, "t": shown(times[worst])}, float(off[worst]))
 
 
-def _disagreements(found: Observed, times: Sequence[Fraction]) -> list[Diagnosis]:
+def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
     """Columns that say the same and differ."""
-    seen = found.seen(times)
-    if seen is None:
-        return []
     with numpy.errstate(all="ignore"):
         apart = disagreement(seen)
     said = []
@@ -196,8 +209,13 @@ def used(given: GivenTrajectory) -> str:
 
 __all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "direction", "score"]
 
-Progress = Callable[[], None]
 PEER = "heyoka"
+_CLOCK = Fraction(1, 1000)
+"""Of a step, by which the times of a clock may be off its multiples."""
+_ROUNDED = 4
+"""Roundings of a product."""
+_NOTICED = 0.05
+"""Digits."""
 _REFERENCE_EFFORT = 10.0
 """Seconds of the model of its cost that a computed reference may take."""
 _EFFORT = 20.0
@@ -258,13 +276,34 @@ def _is_number(metric: Metric) -> bool:
     return metric.log10 is not None or metric.value == "0"
 
 
+def _step(given: GivenTrajectory) -> Fraction | None:
+    """The step of the method, where the file says it in a number."""
+    try:
+        step = exact(given.flags.get("step", "0"))
+    except InputError:
+        return None
+    return step if step > 0 else None
+
+
+def _on_multiples(given: GivenTrajectory) -> GivenTrajectory | None:
+    """The same at multiples of its step, where its times are all but these; None where they are, or are not."""
+    step = _step(given)
+    if step is None:
+        return None
+    times = [round(time / step) * step for time in given.times]
+    off = [abs(one - other) for one, other in zip(times, given.times, strict=True)]
+    same = all(one <= _ROUNDED * given.precision.eps * abs(time) for one, time in zip(off, given.times, strict=True))
+    increasing = all(abs(one) < abs(other) for one, other in pairwise(times))
+    return None if same or not increasing or max(off) > _CLOCK * step else replace(given, times=times)
+
+
 def score(given: GivenTrajectory) -> Row:
     """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
 
     The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
     the first that is not finite on are not scored; the outcome says so.
     """
-    return _scored(given)[0] if given.observed is None else _observed_row(given)[0]
+    return _measured(given).row
 
 
 def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
@@ -272,21 +311,39 @@ def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessm
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
-    if given.observed is not None:
-        return _assess_observed(given, progress)
-    row, scorer, errors = _scored(given, progress)
-    states = _finite(given)
-    times = given.times[: len(states)]
-    diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row), errors)
-    written = rounding(states, given.precision)
+    found = _measured(given, progress)
+    count, told = len(_finite(given)), _of_clock(given, found.row)
+    explained = found if told is None else told[1]
+    said = diagnoses(given if told is None else told[2], _size(explained.row), explained.errors) if count else []
+    written = None if given.observed is not None else rounding(_finite(given), given.precision)
     single = written is not None and written.kind == "single"
-    problem = Problem.of(given.top, given.start, given.precision, given.system)
-    peer = _peer(given, problem, scorer, len(states), progress)
-    return Assessment(row, peer, diagnoses, given.format_guessed, single)
+    peer = _peer(given, found.problem, found.scorer, count, progress)
+    columns = "" if given.observed is None else used(given)
+    clock = [] if told is None else [told[0]]
+    return Assessment(found.row, peer, clock + said, given.format_guessed, single, columns)
 
 
-def _scored(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
+def _of_clock(given: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
+    """How many digits are right where the times are multiples of the step, if these are more."""
+    exactly = _on_multiples(given)
+    if exactly is None:
+        return None
+    found = _measured(exactly)
+    kept, with_exact = digits_kept(row), digits_kept(found.row)
+    if kept is None or with_exact is None or with_exact < kept + _NOTICED:
+        return None
+    off = max(abs(one - other) for one, other in zip(given.times, exactly.times, strict=True))
+    numbers = {"step": given.flags["step"], "off": decimal_text(off, 3), "digits": f"{with_exact:.1f}"}
+    return Diagnosis("clock", numbers, _size(row), _size(found.row)), found, exactly
+
+
+def _measured(given: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
     """The row, what made it, and the error of each state relative to the size of Ω and γ where the reference goes."""
+    return (_of_states if given.observed is None else _observed)(given, progress)
+
+
+def _of_states(given: GivenTrajectory, progress: Progress) -> Scored:
+    """A trajectory of Ω and γ in principal axes."""
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
     states = _finite(given)
@@ -301,7 +358,7 @@ def _scored(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[
         if scorer.error is not None and scorer.error.truth.covers(time):
             errors.append(scorer.error.last(rate))
         progress()
-    return _row(given, problem, times, keep, scorer), scorer, errors
+    return Scored(_row(given, problem, times, keep, scorer), problem, scorer, errors)
 
 
 def _row(
@@ -309,7 +366,7 @@ def _row(
     problem: Problem,
     times: list[Fraction],
     keep: list[Fraction],
-    scorer: Scorer | ObservedScorer,
+    scorer: DriftAndError,
 ) -> Row:
     """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
     precision, states = given.precision, _finite(given)
@@ -332,22 +389,6 @@ def _row(
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
     return msgspec.structs.replace(row, **said, data=data_of(case))
-
-
-def _observed_row(given: GivenTrajectory, progress: Progress = lambda: None) -> tuple[Row, Scored]:
-    """The row of a trajectory of attitudes, positions or Ω in any axes, and what made it."""
-    times = [round_to(time, given.precision.bits) for time in given.times]
-    keep = [times[i - 1] for i in log_spaced(len(times))]
-    found = scored(given, times, keep, _REFERENCE_EFFORT, progress)
-    return _row(given, found.problem, times, keep, found.scorer), found
-
-
-def _assess_observed(given: GivenTrajectory, progress: Progress) -> Assessment:
-    row, found = _observed_row(given, progress)
-    count = len(_finite(given))
-    told = diagnoses(given, _size(row), found.errors) if count else []
-    peer = _peer(given, found.problem, found.scorer, count, progress)
-    return Assessment(row, peer, told, given.format_guessed, False, used(given))
 
 
 def _finite(given: GivenTrajectory) -> list[tuple[Fraction, ...]]:

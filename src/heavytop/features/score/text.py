@@ -15,6 +15,7 @@ from rich.text import Text
 from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES, Diagnosis
 from heavytop.features.score.diagnose.samples import FLOOR
 from heavytop.features.score.measurement import Assessment, direction, passed
+from heavytop.measure.attitude_error import JOINT_VIOLATION
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.records import SCHEMA, Beside, Peer, Quantity, Report, Row
@@ -53,7 +54,7 @@ _CONVENTION_SENTENCES = {
     "extrinsic": "The Euler angles are about axes of space (extrinsic): those of {sequence}, one after the other",
     "angles_negated": "The Euler angles have the other sign",
     "angles_of_inverse": "The Euler angles are those of the inverse rotation, from space to body",
-    "omega_frame": "Ω is in the other axes: those of space where it is said to be in body axes, or the other way round",
+    "omega_frame": "Ω is in the axes of {frame}: {key}",
     "omega_in_degrees": "Ω is in degrees per time unit, not in radians",
     "omega_in_turns": "Ω is in turns per time unit, not in radians",
     "omega_in_rpm": "Ω is in turns per 60 time units (rpm where times are in s), not in radians",
@@ -64,6 +65,12 @@ _CONVENTION_SENTENCES = {
     "up": "Another axis points up: up = {up}",
     "left_handed": "The axes are left-handed: the {axis} axis is reversed",
     "inertia_about": "The inertia tensor is that about the {about}",
+    "no_gravity": "There is no gravity in this motion: gravity = 0 fits",
+    "free_about_centre_of_mass": "The body turns freely about its centre of mass: it is not held at the fixed point",
+    "tensor_axes_conjugated": "The principal axes of the inertia tensor are turned the other way: Qᵀ D Q for Q D Qᵀ",
+    "omega_zero": "Ω is 0 in every sample, and the other columns fit: it was not written",
+    "omega_shifted": "Ω is that of other times: the one given at t is that at t {shift}",
+    "times_shifted": "The times are shifted: the state given at t is that at t {shift}",
     "gravity_sign": "Gravity pulls the other way: g has the other sign, or the third axis of space points down",
     "gravity_unit": "Gravity has another unit: the weight is {factor} times the one that is given",
     "products_of_inertia": "The products of inertia have the other sign: what is asked for is I12 = −∫xy dm, and so on",
@@ -110,20 +117,23 @@ def sentence(found: Diagnosis) -> str:
     if found.kind == "columns_disagree":
         apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
         return f"Columns contradict each other: {apart}."
-    said = "; ".join(_one(kind, numbers) for kind in found.kind.split("+"))
-    where = {"columns": ", in the columns but not in the start", "start": ", in the start but not in the columns"}
+    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in found.kind.split("+"))
+    said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
+    where = {
+        "columns": ", in the columns but not in the start",
+        "start": ", in the start but not in the columns",
+        "rates": ". Found by comparing Ω with the rate at which the attitude turns, which needs no reference",
+    }
     said += where.get(numbers.get("of", ""), "")
     if found.error is None or found.left is None:
         return f"{said}."
+    if numbers.get("of") == "rates":
+        return f"{said}: they differ by {found.left:.2e} of Ω with it, by {found.error:.2e} without."
     digits = -math.log10(max(found.left, FLOOR))
     more = " or more" if found.left < FLOOR else ""
     fall = f"the largest error relative to the size of each quantity falls from {found.error:.2e} to {found.left:.2e}"
     text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
     return text + (f" As well fits: {numbers['or'].replace('_', ' ')}." if "or" in numbers else "")
-
-
-def _one(kind: str, numbers: dict[str, str]) -> str:
-    return _CONVENTION_SENTENCES[kind].format(**numbers)
 
 
 # What explains the error of a motion, in a sentence each.
@@ -139,6 +149,7 @@ _MEANINGS = {
 }
 """What the columns mean in these states, and what that comes to."""
 _SENTENCES = {
+    "no_gravity": "The states fit a motion without gravity, P = 0",
     "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
     "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
     "columns_swapped": "γ stands before Ω in these states",
@@ -167,9 +178,10 @@ _OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass"
 
 def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
     """One or two sentences: what fits, and how far the error falls with it."""
+    likely = "Likely: " if found.likely else ""
     if is_convention(found):
-        return _scope(found) + sentence(found)
-    said = _scope(found) + _said(found, system)
+        return _scope(found) + likely + sentence(found)
+    said = _scope(found) + likely + _said(found, system)
     if found.left is None or found.error is None:
         return said
     if found.kind in ("one_state", "some_states"):
@@ -250,6 +262,13 @@ def _said(found: Diagnosis, system: str) -> str:
             return f"From t = {numbers['t']} on nothing moves: {numbers['states']} states are the same."
         case "constant":
             return "Every state is the same: nothing moves."
+        case "reset":
+            return f"From t = {numbers['t']} on the motion starts again: the program went back to its start"
+        case "clock":
+            return (
+                f"The times are off multiples of the step {numbers['step']} by {numbers['off']} at most, as a sum of "
+                f"steps is: at the multiples themselves {numbers['digits']} digits are right"
+            )
         case "rounded":
             return _rounded(numbers)
     return _integrals_off(numbers)
@@ -394,6 +413,7 @@ def sizes(row: Row) -> list[list[Cell]]:
     until = f" before t = {short(row.reference.until)}" if row.reference.until else ""
     names = {Quantity(SOLUTION_ERROR, part): f"error{until}, {label}" for part, label in _PARTS.items()}
     names |= {Quantity(name): f"error{until}, {label}" for name, label in _OBSERVED.items()}
+    names[Quantity(JOINT_VIOLATION)] = "distance of the joint"
     found = [metric.quantity for metric in row.metrics.values() if metric.quantity]
     names |= {Quantity(DRIFT, q.component): f"drift, {q.component}" for q in found if q.name == DRIFT}
     return [

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.measure.scorer import ERRORS
-from heavytop.precision import parse
-from heavytop.records import UNMEASURED, UNRESOLVED_SECONDS, Row
+from heavytop.precision import exact, parse
+from heavytop.records import FINEST, UNMEASURED, UNRESOLVED_SECONDS, Row
 from heavytop.report.document.document import Headline, In, Table, clip, scientific
 
 _MOST_CASES = 2
+_ABOVE_ROUNDING = 100
+"""Times the roundings of all steps: an error from which an order is read."""
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 
@@ -22,6 +24,7 @@ OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
+    step: of a method with fixed steps, whose error at that step is more than rounding; else 0.
     seconds: of its fastest run, or where these are too few to be resolved, as many as are.  Other work on the machine
     only ever adds, and adds more to longer runs: medians on a busy machine would flatter whoever is quick.
     """
@@ -30,6 +33,7 @@ class WorkPrecisionPoint:
     seconds: float
     setting: str
     resolved: bool = True
+    step: float = 0.0
 
     def takes(self, digits: int = 3) -> str:
         """``15 ms``, or ``< 0.1 ms``."""
@@ -40,7 +44,7 @@ class WorkPrecisionPoint:
 class WorkPrecisionLine:
     """One integrator in one format, from coarse to fine as the plan has it.
 
-    failures: the seconds that points took which did not reach the end; they have no error.
+    failures: the seconds that points took which did not reach the end; they have no error.  declared: its order.
     compile: seconds that compiling took, at most over the points; 0 where none is known.
     resolution: seconds at and below which those of points are not resolved.
     """
@@ -50,7 +54,23 @@ class WorkPrecisionLine:
     points: list[WorkPrecisionPoint] = field(default_factory=list)
     failures: list[float] = field(default_factory=list)
     compile: float = 0.0
+    declared: int = 0
     resolution: float = 0.0
+
+    @property
+    def order(self) -> float | None:
+        """The order that whole runs show: between the two finest fixed steps whose errors are more than rounding."""
+        finest = sorted((point for point in self.points if point.step), key=lambda point: point.step)[:2]
+        if len({point.step for point in finest}) < 2:
+            return None
+        fine, coarse = finest
+        return (coarse.log10 - fine.log10) / math.log10(coarse.step / fine.step)
+
+    @property
+    def order_text(self) -> str:
+        """The order seen, and the declared one behind it; "-" where none is seen."""
+        declared = f" (declared: {self.declared})" if self.declared else ""
+        return "-" if self.order is None else f"{self.order + 0.0:.1f}{declared}"
 
     @property
     def label(self) -> str:
@@ -165,11 +185,20 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
-            point = WorkPrecisionPoint(error.log10, max(seconds, resolution), row.key.subject.asked, not resolution)
+            asked, step = row.key.subject.asked, _step(row, error.log10)
+            point = WorkPrecisionPoint(error.log10, max(seconds, resolution), asked, not resolution, step)
             line.points.append(point)
+            line.declared = row.order or 0
             line.resolution = max(line.resolution, resolution)
             line.compile = max(line.compile, row.seconds.get("compile", 0.0))
     return {case: list(lines.values()) for case, lines in found.items()}
+
+
+def _step(row: Row, log10: float) -> float:
+    """The fixed step of a row whose error is more than its roundings, in one direction, come to; else 0."""
+    rounding = math.log10(_ABOVE_ROUNDING * max(row.steps, 1) * float(parse(row.precision).eps))
+    step = row.key.subject.step
+    return float(exact(step)) if step not in ("", FINEST) and log10 > rounding else 0.0
 
 
 def beside_ours(rows: Sequence[Row]) -> list[Table]:
@@ -187,7 +216,8 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                 if line.integrator == name:
                     ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
                     cells = {_rung(line, point): _cell(point, ours) for point in line.points}
-                    cases[case] = cases.get(case, {}) | cells
+                    seen = {} if line.order is None else {"order seen": line.order_text}
+                    cases[case] = cases.get(case, {}) | cells | seen
         points = dict.fromkeys(point for cells in cases.values() for point in cells)
         lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
         note = f"{name}: largest error in its time" + (" (heyoka's time for that error)" if beside else "")

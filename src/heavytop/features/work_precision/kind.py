@@ -31,13 +31,13 @@ from heavytop.integrate import registry
 from heavytop.integrate.registry import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kind import Kind, with_explanation
-from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
+from heavytop.measure.integrator import TOO_LONG, Repeats, doubtful_counts, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import FINEST, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document.document import Block, Chart, In, Note
+from heavytop.records import FINEST, Beside, Explained, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document.document import Block, Chart, In, Note, clip
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.store.checks import CLOSE, bound, ended, size_of, sizes
 from heavytop.top.equations import GYROSTAT
@@ -161,8 +161,10 @@ class WorkPrecision(Kind):
 
         sampled = integrate(task.times)
         scorer = _scored(task, problem, sampled)
-        metrics = _metrics(scorer, bool(sampled.times))
-        seconds, alone = self._timed(task, integrate, sampled, _error(scorer))
+        metrics, error = _metrics(scorer, bool(sampled.times)), _error(scorer)
+        if error is not None and not task.integrator.one_step:  # it may begin anew at each sample, and be off by less
+            error = max(error, _error(_scored(task, problem, integrate(task.times[-1:]))) or error)
+        seconds, alone = self._timed(task, integrate, sampled, error)
         done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
         if case.system is not GYROSTAT:
             metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
@@ -173,6 +175,8 @@ class WorkPrecision(Kind):
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
         row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+        if done and not task.integrator.capabilities.own and (text := doubtful_counts(run, error)):
+            return msgspec.structs.replace(row, explained=Explained("steps", text))
         return with_explanation(row, task, run, scorer)
 
     def _timed(
@@ -184,7 +188,7 @@ class WorkPrecision(Kind):
         if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
             counted = replace(alone, times=sampled.times, states=sampled.states)
-            require_counts(name, counted, _setting(task.key.subject), error)
+            require_counts(name, counted, _setting(task.key.subject))
             return seconds, alone
         alone = integrate(end)
         warm = alone.seconds["run"] < TOO_LONG and alone.outcome is Outcome.SUCCESS
@@ -226,6 +230,8 @@ class WorkPrecision(Kind):
         yield from (Note(lead.text) for lead in leads(rows))
         shorter = [Note(f"{lead.case}: {lead.short}.", shown=In.SHORT) for lead in leads(rows) if lead.short]
         yield from beside_ours(rows) or shorter
+        doubts = ((row, row.explained) for row in rows if row.explained and row.explained.kind == "steps")
+        yield from (Note(f"{clip(row.case)} {row.integrator}: {doubt.text}") for row, doubt in doubts)
         yield from (Chart(work_precision), Chart(method_growth))
 
 
@@ -240,8 +246,9 @@ def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
         found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", line.takes(best.seconds)]
         at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
         found += ["-" if seconds is None else line.takes(seconds) for seconds in at]
+        found.append(line.order_text)
         cells.append([line.label, *found, str(len(line.failures) or "")])
-    columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "aborted"]
+    columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "order", "aborted"]
     return Cells(title, columns, cells)
 
 

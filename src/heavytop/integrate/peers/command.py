@@ -28,9 +28,9 @@ import numpy
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.guard import Guard, how_it_ended
-from heavytop.integrate.peers.contract import Declared, said
+from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, vector
 from heavytop.processes import stopwatch
 from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -38,7 +38,6 @@ from heavytop.top.heavy_top import HeavyTop, State, check_times
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
-DEFAULT_STEP = Fraction(1, 100)
 NOT_COUNTED = {"steps": "not counted"}
 """The flag of a run whose program did not say how many steps it took."""
 _MOST_LINE = 1 << 20
@@ -66,7 +65,7 @@ _OF_STATES = b"0123456789+-.eE \tsta"
 """The characters of lines of states in decimal."""
 _as_doubles = msgspec.json.Decoder(list[float]).decode
 """Reads a JSON list of numbers, each rounded correctly, in a tenth of the time that `float` takes."""
-_STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 9)}
+_STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 7, 9)}
 _PAIRS = {"steps": int, "evaluations": int, "seconds": float}
 
 
@@ -74,7 +73,8 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """A program that integrates, as the table `[[integrator]]` describes it.
 
     name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: what it is set by.
-    precisions, systems, directions, attitude: what it declares that it can do.  timeout: seconds of one request.
+    precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: what it declares that it can do, as
+    :class:`heavytop.integrate.peers.contract.Declared`.  timeout: seconds of one request.
     hex: whether it is given hexadecimal numbers.  folder: of the file; its working directory.
     """
 
@@ -87,7 +87,10 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     timeout: str | int | float = "600"
     systems: tuple[str, ...] = (HEAVY_TOP.name,)
     directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
-    attitude: bool = False
+    attitude: bool | Literal["quaternion"] = False
+    one_step: bool = True
+    fixed_grid: bool = False
+    singular_at: tuple[tuple[str | int | float, str | int | float, str | int | float], ...] = ()
     hex: bool = False
     folder: str = ""
 
@@ -104,7 +107,13 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     @property
     def declared(self) -> Declared:
         """What it can do."""
-        return Declared(self.systems, self.directions, self.precisions, self.attitude)
+        singular = tuple(vector(map(str, each), "singular_at") for each in self.singular_at)
+        able = self.systems, self.directions, self.precisions, self.attitude
+        return Declared(*able, self.one_step, self.fixed_grid, singular)
+
+    def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
+        """What it is asked for, in the form that it declares."""
+        return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion")
 
     def load(self) -> CommandIntegrator:
         """What integrates with it; nothing is started yet."""
@@ -146,11 +155,14 @@ class CommandIntegrator:
         """
         command = self.command
         instants = check_times(times)
-        command.declared.require(command.name, system, instants[-1], precision, xi)
+        declared = command.declared
+        declared.require(command.name, start, system, instants[-1], precision, xi)
         value = self._control(control, precision)
+        if value is not None and command.control == "step":
+            value = exact(number(declared.step(command.name, value, instants), precision))
         problem = Problem.of(top, start, precision, system, xi)
         grid = [exact(number(time, precision)) for time in instants]
-        request = ProgramRequest(problem, grid, value, command.hex)
+        request = command.request(problem, grid, value)
         with session(command) as program:
             overhead = program.empty_request(problem)
             reply = program.ask(request)
@@ -192,13 +204,15 @@ class CommandIntegrator:
             flags |= NOT_COUNTED
         if reply.failure:
             flags["failure"] = reply.failure
+        turned = (of_quaternion(command.name, problem, state) for state in reply.states)
+        states = tuple(turned if request.quaternion else reply.states)
         spent = {"compile": 0.0, "run": seconds} | ({UNRESOLVED_SECONDS: _RESOLUTION} if seconds < _RESOLUTION else {})
         own = reply.counts.get("seconds")
         return Trajectory(
             problem,
             command.name,
             tuple(request.times[:done]),
-            tuple(reply.states),
+            states,
             Outcome.FAILED if reply.failure else Outcome.SUCCESS,
             request.times[done - 1] if done else Fraction(0),
             int(steps or 0),
@@ -227,13 +241,21 @@ class ProgramRequest:
     """A problem with its times, as a program is asked for it.
 
     times: exact numbers of the format; none for a request that does nothing.  control: of the format, or None.
+    quaternion: whether the program computes with one: it is given that of the start, and answers (Ω, w, x, y, z).
+    width: of a state of the answer.
     """
 
     def __init__(
-        self, problem: Problem, times: Sequence[Fraction], control: Fraction | None, hexadecimal: bool
+        self,
+        problem: Problem,
+        times: Sequence[Fraction],
+        control: Fraction | None,
+        hexadecimal: bool,
+        quaternion: bool = False,
     ) -> None:
         self.problem, self.times, self.control, self.hex = problem, list(times), control, hexadecimal
-        self.width = 6 if problem.xi is None else 9
+        self.quaternion = quaternion
+        self.width = 7 if quaternion else 6 if problem.xi is None else 9
         self.written = _times_written(self.times, problem.precision, hexadecimal)
 
     def text(self, label: int) -> bytes:
@@ -247,11 +269,15 @@ class ProgramRequest:
             "moment": self._numbers(p.moment),
             "rotor": self._numbers(rotor),
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
+            "quaternion": self._quaternion() if self.quaternion else [],
             "precision": [precision.name],
             "setting": self._numbers([] if self.control is None else [self.control]),
             "times": [str(len(self.times)), *self.written.texts],
         }
         return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"
+
+    def _quaternion(self) -> list[str]:
+        return self._numbers([exact(number(value, self.problem.precision)) for value in quaternion(self.problem)])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
         return numbers_texts(values, self.problem.precision, self.hex)
@@ -472,7 +498,7 @@ class Session:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
         if not self._began_row:
             for _ in range(1 if self.requests else 2):  # the first of a process is slow
-                wall = self.ask(ProgramRequest(problem, [], None, self.command.hex)).wall
+                wall = self.ask(self.command.request(problem, [], None)).wall
                 self._overhead = min(self._overhead, wall)
             self._began_row = True
         return self._overhead
@@ -486,20 +512,22 @@ class Session:
         """Whether the program ended by itself after the last request of a row."""
         return not self._began_row and self.process.poll() is not None
 
-    def ask(self, request: ProgramRequest) -> Reply:
-        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout."""
+    def ask(self, request: ProgramRequest, most: float = inf) -> Reply:
+        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout, or after
+        ``most`` seconds where these are fewer.
+        """
         self.requests += 1
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        self._exchange(text, reply, "done")
+        self._exchange(text, reply, "done", most)
         reply.wall = seconds()
         return reply
 
-    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str) -> None:
+    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> None:
         """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then."""
-        began = monotonic()
-        deadline, awake_until = began + self.command.seconds, began + _AWAKE
+        began, seconds = monotonic(), min(seconds, self.command.seconds)
+        deadline, awake_until = began + seconds, began + _AWAKE
         waiting = self._write(memoryview(text))
         if waiting:
             self._poll.register(self._in, select.POLLOUT)
@@ -510,7 +538,7 @@ class Session:
                 return
             left = deadline - monotonic()
             if left <= 0:
-                raise self._failed(f"did not say {awaited} within {self.command.seconds:g} s")
+                raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
             now = monotonic()
             awake = not waiting and reply.due < _MANY and now < awake_until
             events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
@@ -544,9 +572,7 @@ class Session:
             try:
                 last = reply.take(line)
             except PeerFailed as error:
-                failure = self._failed(error.cause.removeprefix(f"{self.name} "))
-                failure.answered = error.answered
-                raise failure from None
+                raise self._failed(error.cause.removeprefix(f"{self.name} "), error.answered) from None
             if last:
                 if place < len(lines) or self._unread:
                     raise self._failed(f"wrote more after {said(repr(line.decode('utf-8', 'replace')))}")
@@ -588,13 +614,13 @@ class Session:
             return f"{'ended' if code >= 0 else 'was ended'} {how_it_ended(code)}"
         return "closed its output"
 
-    def _failed(self, what: str) -> PeerFailed:
+    def _failed(self, what: str, answered: bool = False) -> PeerFailed:
         """The failure, with the last that the program wrote on standard error."""
         for _ in range(4):
             self._read_errors()
         lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
         told = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
-        return PeerFailed(f"{self.name} {what}{told}")
+        return PeerFailed(f"{self.name} {what}{told}", answered=answered)
 
     def ends_after(self, text: bytes, seconds: float) -> bool:
         """Whether the program ends by itself within so many seconds of ``text`` and the end of its input."""

@@ -17,24 +17,31 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from math import isfinite
+from functools import reduce
+from math import ceil, gcd, isfinite
 from numbers import Real
 from threading import RLock
 from time import perf_counter
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy
 
-from heavytop.errors import HeavyTopError, PeerFailed, Unsupported
+from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number
 from heavytop.processes import stopwatch
+from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_SAID = 200
 _MOST_FLAGS = 20
+DEFAULT_STEP = Fraction(1, 100)
+_OFF_SPHERE = Fraction(1, 10**6)
+"""By which |γ|² may differ from 1 where a quaternion stands for it, and radians between directions that are one."""
+_FINER = 16
+"""Times as short as it was asked for a step may be made, so that all times are multiples of it."""
 _ALONE = RLock()
 """Where a process prints and what it warns of are its own, not a thread's: the code of others runs alone."""
 
@@ -137,18 +144,37 @@ class Declared:
     """What an integrator declares that it can do; None where it declares nothing.
 
     systems: names such as "heavy_top".  directions: "forward", "backward".  precisions: names of formats, "real:BITS"
-    for any number of bits.  attitude: whether ξ rides along.
+    for any number of bits.  attitude: whether ξ rides along, or "quaternion": it computes with one in the place of γ.
+    one_step: whether a step depends on the state where it begins alone.  fixed_grid: whether all steps of a run are of
+    one length.  singular_at: vertical directions in body axes, γ, where its coordinates are singular.
     """
 
     systems: tuple[str, ...] | None = None
     directions: tuple[str, ...] | None = None
     precisions: tuple[str, ...] | None = None
-    attitude: bool = False
+    attitude: bool | Literal["quaternion"] = False
+    one_step: bool = True
+    fixed_grid: bool = False
+    singular_at: tuple[Vector, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not all(map(any, self.singular_at)):
+            raise InputError("singular_at holds the zero vector, which has no direction.", "Give γ, such as 0, 0, 1.")
 
     def require(
-        self, name: str, system: System, end: Fraction, precision: Precision, xi: Sequence[Fraction] | None
+        self,
+        name: str,
+        start: State,
+        system: System,
+        end: Fraction,
+        precision: Precision,
+        xi: Sequence[Fraction] | None,
     ) -> None:
         """Raises Unsupported for a motion of ``system`` to the time ``end`` that is not among what is declared."""
+        if self.is_singular(start.gamma):
+            raise Unsupported(f"{name} declares that its coordinates are singular at this start.", "Give another γ.")
+        if self.attitude == "quaternion" and abs(dot(start.gamma, start.gamma) - 1) > _OFF_SPHERE:
+            raise Unsupported(f"{name} computes with a quaternion, and |γ| is not 1.", "Give a γ of length 1.")
         if xi is not None and not self.attitude:
             raise Unsupported(f"{name} declares that it does not carry the attitude.", "Ask for no attitude.")
         direction = "backward" if end < 0 else "forward"
@@ -162,6 +188,55 @@ class Declared:
             if declared is not None and not set(forms) & set(declared):
                 can = ", ".join(declared) or "none"
                 raise Unsupported(f"{name} declares that it cannot do {what} {value}.", f"It can do: {can}.")
+
+    def is_singular(self, gamma: Vector) -> bool:
+        """Whether its coordinates are singular at that γ."""
+        return any(_along(gamma, direction) for direction in self.singular_at)
+
+    def step(self, name: str, step: Fraction, times: Sequence[Fraction]) -> Fraction:
+        """The step to ask for: of a fixed grid the largest up to ``step`` of which all times are multiples.
+
+        Raises Unsupported where that is a small part of ``step``.
+        """
+        spacing = reduce(_common_measure, times, Fraction(0))
+        if not (self.fixed_grid and spacing):
+            return step
+        fitted = spacing / ceil(spacing / step)
+        if _FINER * fitted < step:
+            raise Unsupported(
+                f"{name} declares that its steps are all equal, and these times are no multiples of a step near "
+                f"{decimal_text(step, 6)}.",
+                "Ask for evenly spread times.",
+            )
+        return fitted
+
+
+def _along(gamma: Vector, direction: Vector) -> bool:
+    """Whether two directions are one, to within 1e-6 rad."""
+    across, along = cross(gamma, direction), dot(gamma, direction)
+    return along > 0 and dot(across, across) <= _OFF_SPHERE**2 * along**2
+
+
+def _common_measure(a: Fraction, b: Fraction) -> Fraction:
+    """The largest number of which both are multiples."""
+    return Fraction(gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
+
+
+def quaternion(problem: Problem) -> tuple[Fraction, ...]:
+    """(w, x, y, z) of the start, to many digits more than the format has: about the vertical as ξ says, if given."""
+    gamma = problem.start.gamma
+    xi = perpendicular(gamma) if problem.xi is None else problem.xi
+    return near_quaternion(rows_of(gamma, xi), 2 * problem.precision.bits)
+
+
+def of_quaternion(name: str, problem: Problem, state: Sequence[Any]) -> Any:
+    """(Ω, γ), or (Ω, γ, ξ) of a problem with ξ, as numbers of the format, from (Ω, w, x, y, z), q of any length."""
+    omega, q = state[:3], [exact(value) for value in state[3:]]
+    if not any(q):
+        raise PeerFailed(f"{name} returned a quaternion that is 0, which is no attitude")
+    rows = rotation_of(q)
+    vectors = rows[2] if problem.xi is None else (*rows[2], *rows[0])
+    return numpy.array([*omega, *(number(value, problem.precision) for value in vectors)])
 
 
 Run = Callable[[Problem, Sequence[Fraction], Fraction | None], Trajectory]
@@ -202,13 +277,13 @@ class CheckedPlugin:
         declared: Declared | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
-        self.name, self.call, self.own, self.declared, self.options = name, call, own, declared, options or {}
+        self.name, self.call, self.own, self.declared, self.options = name, call, own, declared, dict(options or {})
 
     @property
     def carries_attitude(self) -> bool:
         """Whether ξ rides along: what is declared, and of a peer that declares nothing whether it takes ``xi``."""
         if self.declared is not None:
-            return self.declared.attitude
+            return bool(self.declared.attitude)
         with contained(self.name, " when its arguments were looked at"):
             return "xi" in inspect.signature(self.call).parameters
 
@@ -229,15 +304,17 @@ class CheckedPlugin:
         Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
         """
         problem = Problem.of(top, start, precision, system, xi)
-        beside = options if xi is None else {"xi": xi, **options}
+        beside = self.options | options if xi is None else {"xi": xi, **self.options, **options}
         asked = [exact(number(time, precision)) for time in times]
         if self.declared is not None and asked:
-            self.declared.require(self.name, system, asked[-1], precision, xi)
+            self.declared.require(self.name, start, system, asked[-1], precision, xi)
+            if self.declared.fixed_grid:
+                beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
         given: list[Any]
         own: dict[str, Any]
         try:
-            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.options, **beside})))
+            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}

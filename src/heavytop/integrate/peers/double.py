@@ -9,19 +9,21 @@ from fractions import Fraction
 from functools import cache, partial, wraps
 from threading import RLock
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy
 
 from heavytop import precision as vectors
 from heavytop.errors import InputError, PeerFailed, quoted
-from heavytop.integrate.peers.contract import Declared, with_tolerance
+from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.top.attitude import matrix_of_quaternion
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
 
+_WIDE = {7: "Ω and a quaternion", 9: "Ω, γ and ξ"}
 FINEST = Fraction(1, 10**15)
 """The tolerance of a peer where none is asked for: below about 4 eps most refuse."""
 
@@ -30,9 +32,9 @@ FINEST = Fraction(1, 10**15)
 class Request:
     """A problem in double.
 
-    start: shape (6,), or (9,) with ξ behind where the attitude is asked for.  times: shape (n,), strictly monotone away
-    from 0.  numbers: the parameters I, n and the rotor: shape (7,) with λ, 0 for the heavy top, or (9,) with k for the
-    heavy gyrostat.
+    start: shape (6,), or (9,) with ξ behind where the attitude is asked for, or (7,), Ω and a quaternion, where that is
+    declared.  times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor: shape (7,)
+    with λ, 0 for the heavy top, or (9,) with k for the heavy gyrostat.
     control: the tolerance, or the step of a method with fixed steps; ``setting`` is its former name.
     step_limit: steps after which an adaptive method
     should give up, with the states so far and ``Outcome.STEP_LIMIT``.
@@ -57,12 +59,23 @@ class Request:
 
     @property
     def field(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
-        """y -> y', six numbers (Ω', γ'), or nine with ξ' behind: as many as ``start`` has."""
+        """y -> y', six numbers (Ω', γ'), nine with ξ' behind, or seven (Ω', q'): as many as ``start`` has."""
+        if self.width == 7:
+            return self._with_quaternion
         return partial(self.system.with_attitude, self.parameters)
+
+    def _with_quaternion(self, y: Sequence[float]) -> tuple[float, ...]:
+        """Of (Ω, q) with |q| = 1: q' = q (0, Ω)/2."""
+        omega, (w, *v) = y[:3], y[3:]
+        state = (*omega, *matrix_of_quaternion(y[3:])[2])
+        turning = self.system.angular_velocity(self.parameters, state)
+        across = vectors.cross(v, turning)
+        rates = (-vectors.dot(v, turning), *(w * a + b for a, b in zip(turning, across, strict=True)))
+        return (*self.system.field(self.parameters, state)[:3], *(rate / 2 for rate in rates))
 
     @property
     def width(self) -> int:
-        """Numbers of a state: 6, or 9 with ξ."""
+        """Numbers of a state: 6, 9 with ξ, or 7 with a quaternion."""
         return len(self.start)
 
 
@@ -70,7 +83,7 @@ class Request:
 class Solution:
     """What a library gave back.
 
-    states: shape (m, 6), or (m, 9) from a start of nine numbers, one for each of the first m <= n times.  reached: the
+    states: as wide as the start, shape (m, 6), (m, 9) or (m, 7), one for each of the first m <= n times.  reached: the
     last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
     outcome: how a run that did not come to the end failed; :func:`double_peer` sees by itself to the rest.
     """
@@ -97,7 +110,10 @@ def double_peer(
     systems: Sequence[str] | None = None,
     directions: Sequence[str] | None = None,
     precisions: Sequence[str] | None = None,
-    attitude: bool = False,
+    attitude: bool | Literal["quaternion"] = False,
+    one_step: bool = True,
+    fixed_grid: bool = False,
+    singular_at: Sequence[Sequence[Any]] = (),
 ) -> Callable[..., Trajectory]:
     """``solve`` as a peer, a callable that ``integrator`` takes wherever it takes a name.
 
@@ -110,6 +126,11 @@ def double_peer(
             ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
             declares nothing: a row that it cannot do is then ``failed``.
         attitude: declares that it carries ξ: where that is asked for, states have nine numbers, and so has ``start``.
+            "quaternion" declares that it computes with one: states have seven numbers then, Ω and (w, x, y, z).
+        one_step: False declares that a step depends on more than the state where it begins: of a multistep method,
+            say.  Its single steps and restarts are not judged then, and its order is that of whole runs.
+        fixed_grid: declares that all steps of a run are equal: all times are then multiples of the step.
+        singular_at: directions of the vertical in body axes, such as (0, 0, 1), where its coordinates are singular.
 
     Returns:
         The peer, called as ``peer(top, start, times, precision, *, system, tolerance, xi)`` (or ``step``).  It raises
@@ -118,10 +139,19 @@ def double_peer(
     Raises:
         InputError: for declarations that are not lists of text.
     """
-    declared = Declared(_declared(systems), _declared(directions), _declared(precisions), attitude)
+    singular = tuple(vectors.vector(each, "singular_at") for each in singular_at)
+    if attitude not in (False, True, "quaternion"):
+        raise InputError(f"attitude = {quoted(attitude)} declares nothing.", 'Give True, False or "quaternion".')
+    if fixed_grid and control != "step":
+        raise InputError("fixed_grid declares that all steps are equal.", 'Give control = "step" too.')
+    able = (_declared(systems), _declared(directions), _declared(precisions))
+    declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
     def integrate(problem: Problem, times: Sequence[Fraction], value: Fraction) -> Trajectory:
         given = _given(name, control, problem, times, value)
+        if declared.attitude == "quaternion":
+            q = problem.native(quaternion(problem))
+            given = replace(given, start=numpy.array([*given.start[:3], *q], dtype=float))
         began = perf_counter()
         solved = _from_start(name, given, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
@@ -135,7 +165,7 @@ def double_peer(
         precision: Precision = DOUBLE,
         *,
         system: System = HEAVY_TOP,
-        step: Fraction = Fraction(1, 100),
+        step: Fraction = DEFAULT_STEP,
         xi: tuple[Fraction, ...] | None = None,
     ) -> Trajectory:
         return integrate(Problem.of(top, start, precision, system, xi), times, step)
@@ -221,7 +251,7 @@ def _judged(
         problem,
         name,
         tuple(exact(time) for time in times[:count]),
-        tuple(states[:count]),
+        tuple(of_quaternion(name, problem, state) if given.width == 7 else state for state in states[:count]),
         Outcome.SUCCESS if count == len(times) else outcome,
         exact(reached if numpy.isfinite(reached) else times[count - 1] if count else 0.0),
         solved.steps,
@@ -240,7 +270,7 @@ def _states(name: str, given: Any, count: int, width: int) -> Any:
     if states.dtype.kind not in "fiu":
         raise PeerFailed(f"{name} returned states of {states.dtype}, not numbers of double")
     if states.ndim != 2 or states.shape[1] != width or len(states) > count:
-        why = " where states have 9 numbers, Ω, γ and ξ" if width == 9 else ""
+        why = f" where states have {width} numbers, {_WIDE[width]}" if width in _WIDE else ""
         raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times{why}")
     return states.astype(float)
 

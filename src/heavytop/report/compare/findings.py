@@ -220,7 +220,7 @@ class Changes:
         if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
             return ""
         most = lost.pop(finest)
-        if not most or any(each > _LESS * most for each in lost.values()):
+        if any(each > _LESS * most for each in lost.values()):
             return ""
         return "lost less" if lost else "are the same"
 
@@ -515,8 +515,9 @@ def _steps(change: Change) -> float:
 
 
 def _ends_as_before(change: Change) -> bool:
-    """Whether of a row whose digits fell the last state is as right as it was."""
-    moved = [] if change.old is None else [change.decades_of(name) for name in _finals(change.old)]
+    """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
+    computed = change.old is not None and change.old.key.subject.what == "computed"
+    moved = [] if change.old is None or not computed else [change.decades_of(name) for name in _finals(change.old)]
     return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
 
 
@@ -580,7 +581,7 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {plural(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        error = Verdict.WORSE in verdicts and change.decades(finding) is not None
+        error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding) is not None)
         coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)

@@ -1,7 +1,7 @@
 """How much of a noise band a comparison allows, and when a candidate is noisier by more than chance.
 
-What is allowed comes from the baseline: a candidate must not excuse itself.  And a band is rounding noise or it is no
-band: reruns that part by more than rounding makes of them excuse nothing.
+What is allowed comes from the baseline: a candidate must not excuse itself.  And a band excuses no loss beyond what
+step control makes of a rounding, unless rounding explains it.
 
 A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
 wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
@@ -24,6 +24,7 @@ import msgspec
 
 from heavytop.errors import InputError, invalid
 from heavytop.files import read_whole
+from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
 from heavytop.records import Metric, Quantity, Row
 from heavytop.report.document.kind import ReportedKind
@@ -109,7 +110,6 @@ class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The allowance of every metric that no rule is about, and the rules.
 
     flags: whether rows whose flags changed are incomparable.
-    suspicious_digits: a gain of more than that many digits is better, and marked as one to look into.
     """
 
     floor: str | float | None = 4
@@ -117,14 +117,9 @@ class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
     noise: str | float | None = 2
     duration: str | float | None = 0.05
     value: str | float | None = 1e-6
-    suspicious_digits: float = 3
     flags: Literal["incomparable", "ignore"] = "incomparable"
     timings: Timings = msgspec.field(default_factory=Timings)
     rule: tuple[Rule, ...] = ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _not_negative("suspicious_digits", self.suspicious_digits)
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -359,7 +354,7 @@ _LEAST_LOST = 0.3
 near the motion again by chance makes the band."""
 STEP_CONTROL = 1.2
 """Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error
-by that at most; reruns that are no further apart are reproducible, whatever their size."""
+by that at most: no band excuses a larger loss that rounding does not explain."""
 
 
 def allowed_loss(old: Metric, new: Metric) -> float:
@@ -377,31 +372,18 @@ def allowed_gain(old: Metric, new: Metric) -> float:
 
 
 def of_starts(metric: Metric, row: Row) -> Metric:
-    """The metric with its band; over n starts no wider than ½ log10 n, by which one of them can raise a RMS."""
-    widest = math.log10(row.starts) / 2
-    if row.starts == 1 or metric.band is None or metric.band <= widest:
-        return metric
-    return msgspec.structs.replace(metric, band=widest)
+    """The metric with its band; over n starts that of the widest part of its error, for a motion that amplifies one
+    start more than the others carries an error from each part to the others.
 
-
-def seldom_apart(band: float | None) -> bool:
-    """Whether reruns with that band are so close together that nothing need be asked about them."""
-    return band is None or math.sqrt(2) * band <= STEP_CONTROL
-
-
-def irreproducible(metric: Metric, least: float, bound: RoundingBound | None) -> str:
-    """Why the band of a metric is no rounding noise; "" where it is.
-
-    least: log10 of what the error counts as at least.  bound: None for a band that does not come from reruns.
+    No wider than ½ log10 n, by which one start can raise a RMS.
     """
-    if bound is None or not metric.band or metric.log10 is None:
-        return ""
-    gap = math.sqrt(2) * metric.band
-    if metric.kind == "duration":
-        noise = bound.explains_times(metric.value, 10**gap - 1)
-    else:
-        noise = seldom_apart(metric.band) or bound.explains(metric.quantity, apart(max(metric.log10, least), gap))
-    return "" if noise else f"not reproducible within rounding: {gap:.2g} decades between reruns"
+    if row.starts == 1 or metric.band is None:
+        return metric
+    band = metric.band
+    if metric.quantity is not None and metric.quantity.name == SOLUTION_ERROR:
+        parts = (each for each in row.metrics.values() if each.quantity and each.quantity.name == SOLUTION_ERROR)
+        band = max(each.band or 0.0 for each in parts)
+    return msgspec.structs.replace(metric, band=min(band, math.log10(row.starts) / 2))
 
 
 def apart(size: float, gap: float) -> float:

@@ -36,11 +36,9 @@ from heavytop.report.compare.noise import (
     RoundingBound,
     allowed_loss,
     apart,
-    irreproducible,
     noisier,
     of_starts,
     reaches_further,
-    seldom_apart,
 )
 from heavytop.report.compare.verdicts import (
     BAND,
@@ -401,7 +399,6 @@ class RowComparison:
                 and -loss <= metric.log10 - match.log10 <= loss
                 and metric.quantity == match.quantity
                 and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
-                and seldom_apart(metric.band)
             ):
                 if self.list_same:
                     found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
@@ -423,16 +420,14 @@ class RowComparison:
         return found
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
-        """The noise of the baseline first, then the values, then the noise of the candidate, which is worse where it is
-        more than chance and reaches further than that of the baseline.
+        """The values first, then the noise of the candidate, which is worse where it is more than chance and reaches
+        further than that of the baseline.
         """
         if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
             return SAME  # both stopped before there was one
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
         bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
-        if why := irreproducible(metric, least_of[0], bound):
-            return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
         known, found = of_starts(metric, old), of_starts(match, new)
         truncated = self._is_truncation(metric, match, old, new)
         assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
@@ -441,7 +436,7 @@ class RowComparison:
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
         allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
-        judged = judge(known, found, allowed, eps, self.policy.suspicious_digits, least_of, bound)
+        judged = judge(known, found, allowed, eps, least_of, bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
         if changed and self._is_by_rounding(metric, match, old):
             return SAME
@@ -451,11 +446,9 @@ class RowComparison:
             return _ANOTHER
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
-        why = irreproducible(match, least_of[1], bound)
-        if not why and noisier(kind, metric, match, bool(old.reference.until)):
-            why = f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
-        if why and reaches_further(metric, match, least_of, limits.loss):
-            return Verdict.WORSE, why
+        wider = noisier(kind, metric, match, bool(old.reference.until))
+        if wider and reaches_further(metric, match, least_of, limits.loss):
+            return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
         return judged
 
     def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:

@@ -65,21 +65,20 @@ def judge(
     new: Metric,
     limits: Limits,
     eps: float,
-    suspicious: float,
     least: tuple[float, float],
     bound: RoundingBound | None = None,
 ) -> Judged:
     """Two values of one metric.
 
-    eps: log10 of the format's, or of what its roundings add up to.  suspicious: digits.  least: what an error counts as
-    at least, as log10, in each row.  bound: the most that noise makes of it; None where its band says so by itself.
+    eps: log10 of the format's, or of what its roundings add up to.  least: what an error counts as at least, as
+    log10, in each row.  bound: the most that noise makes of it; None where its band says so by itself.
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
     if (word := _no_number(old, new, limits)) is not None:
         return word
     if old.kind == "error":
-        return _errors(old, new, limits, limits.floor + eps, suspicious, least, bound)
+        return _errors(old, new, limits, limits.floor + eps, least, bound)
     if old.kind == "duration":
         return _durations(old, new, limits, bound)
     return _values(old, new, limits)
@@ -111,7 +110,6 @@ def _errors(
     new: Metric,
     limits: Limits,
     floor: float,
-    suspicious: float,
     least: tuple[float, float],
     bound: RoundingBound | None,
 ) -> Judged:
@@ -138,8 +136,7 @@ def _errors(
     beyond = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
     if lost > 0:
         return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{beyond}"
-    odd = "; suspicious: look for a reason" if -lost > suspicious else ""
-    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{beyond}{odd}"
+    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{beyond}"
 
 
 def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:

@@ -385,7 +385,7 @@ def _digits_of_attitude(row: Row) -> str:
     if error is None:
         return f"; {NOT_CARRIED['attitude']}" if _attitude_asked(row) else ""
     most = row.bits * math.log10(2)
-    return f"; {digits_text(most if error.log10 is None else min(most, -error.log10))}"
+    return f"; {digits_text(most if error.log10 is None else min(most, max(0.0, -error.log10)))}"
 
 
 def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:

@@ -1,8 +1,9 @@
-"""Mistakes of convention in files with attitudes, positions or Ω in space, each told by trying it.
+"""Mistakes of convention and of data in files of any columns, each told by trying it.
 
 A supposition is a reading of the columns, of the start, or of both, or other data of the body: the motion that follows
 from it is computed and compared with the columns.  It is told if the error falls by two decades, by three where a
-number was fitted; where several do about as well the simplest is told, and the others are named beside it.
+number was fitted; where several do about as well the simplest is told, and the others are named beside it.  The first
+samples are judged by themselves as well, and where nothing does better a fall by a factor of 30 makes it likely.
 """
 
 from __future__ import annotations
@@ -10,33 +11,55 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from itertools import permutations, product
 
 import numpy
 
 from heavytop.features.score.diagnose.readings import (
-    Array,
-    Beginning,
     BodyData,
     Course,
     Reading,
     Seen,
     Square,
-    error,
+    errors,
     nearest_rotation,
+    rates_off,
     simulate,
     turning,
     with_tensor,
 )
-from heavytop.features.score.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, named, notable
+from heavytop.features.score.diagnose.samples import (
+    ALIKE,
+    DROP,
+    FIRST,
+    FITTED_DROP,
+    FLOOR,
+    LIKELY_DROP,
+    Array,
+    named,
+    notable,
+    principal,
+)
+from heavytop.measure.attitude_error import FORMS
 from heavytop.precision import decimal_text
 from heavytop.top.attitude import SEQUENCES
 
 MOST_SAMPLES = 24
 _TURNS = 60.0
 _FEW = 6
-_WORTH_ASKING = 1e-10
+WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""
+_NEIGHBOURS = 60
+"""Samples whose attitudes are compared with Ω."""
+_CONTRADICTS = 0.1
+"""Ω that is off the rate of the attitude by less, relative to it, may be as right as the method."""
+AS_LIKELY = 3.0
+"""Of likely suppositions whose errors differ by less, the simplest is named."""
+_REFINED = 4
+_ANISOTROPY = 3.0
+"""Factor by which M may grow more than Ω."""
+_NO_SHIFT = Fraction(0)
 _MOST_OTHERS = 3
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
@@ -55,7 +78,7 @@ _GRAVITIES = {
 }
 _INERTIAS = {f"1e{power}": 10.0**power for power in (-9, -7, -6, -4, -3, -2, 2, 3, 4, 6, 7, 9)}
 
-BOTH, COLUMNS, START = "start and columns", "columns", "start"
+BOTH, COLUMNS, START, DATA, RATES = "start and columns", "columns", "start", "data", "rates"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +86,22 @@ class Mistake:
     """What explains the columns.
 
     kind: which; docs/score.md lists them.  numbers: what fits, by name, as text.  error, left: the largest error
-    relative to the size of each quantity, before and after it is mended.  others: kinds that explain them as well.
+    relative to the size of each quantity, before and after it is mended.  looked: how many of the samples.
     """
 
     kind: str
     numbers: dict[str, str]
     error: float
     left: float
-    others: tuple[str, ...] = ()
+    looked: int
 
 
 @dataclass(frozen=True, slots=True)
 class _Try:
-    """One supposition: how columns and start are read, and the body.  drop: how far the error must fall."""
+    """One supposition: how columns and start are read, and the body.  drop: how far the error must fall.
+
+    shift: the file's columns are those of t + shift; of Ω alone where ``rates``.  still: the columns of Ω are 0.
+    """
 
     kind: str
     numbers: dict[str, str] = field(default_factory=dict)
@@ -83,6 +109,9 @@ class _Try:
     start: Reading | None = None
     body: BodyData | None = None
     drop: float = DROP
+    shift: Fraction = Fraction(0)
+    rates: bool = False
+    still: bool = False
 
 
 def sampled(seen: Seen) -> Seen:
@@ -90,7 +119,8 @@ def sampled(seen: Seen) -> Seen:
     rate = turning(seen.body, seen.start.begin(seen.said, seen.body.tensor))
     early = sum(abs(float(time)) * rate <= _TURNS for time in seen.times)
     last = max(early, min(len(seen.times), _FEW))
-    return seen.at(sorted({round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}))
+    spread = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
+    return seen.at(sorted(spread | set(range(min(last, _FEW)))))
 
 
 class _Courses:
@@ -100,71 +130,181 @@ class _Courses:
         self.seen = seen
         self.made: dict[tuple[bytes, ...], Course | None] = {}
 
-    def of(self, start: Reading | None = None, body: BodyData | None = None) -> Course | None:
+    def of(
+        self, start: Reading | None = None, body: BodyData | None = None, shift: Fraction = _NO_SHIFT
+    ) -> Course | None:
         seen = self.seen
         which = body or seen.body
         begin = seen.start.begin(start or seen.said, which.tensor)
-        return self.motion(which, begin)
-
-    def motion(self, body: BodyData, begin: Beginning) -> Course | None:
-        data = numpy.array([body.force])
-        key = tuple(a.tobytes() for a in (body.tensor, body.centre, data, begin.rotation, begin.omega))
+        data = numpy.array([which.force])
+        parts = (which.tensor, which.centre, data, begin.rotation, begin.omega)
+        key = (str(shift).encode(), *(part.tobytes() for part in parts))
         if key not in self.made:
-            self.made[key] = simulate(body, begin, self.seen.times)
+            self.made[key] = simulate(which, begin, [time + shift for time in seen.times])
         return self.made[key]
 
 
-def mistake(seen: Seen) -> Mistake | None:
-    """The simplest mistake among those that explain the columns about as well as the best; None where none does."""
-    with numpy.errstate(all="ignore"):  # what overflows explains nothing
-        courses = _Courses(seen)
-        own = error(seen, courses.of(), seen.said, seen.body)
-        own = own if numpy.isfinite(own) else 1.0
-        if own <= _WORTH_ASKING:
+class Suppositions:
+    """What may be wrong with a file, and the error of each of its samples with it.
+
+    step: of the method, where the file says it.
+    """
+
+    def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
+        self.every, self.seen = seen, sampled(seen)
+        self.courses = _Courses(self.seen)
+        self.early = _Courses(
+            self.seen.at(list(range(min(len(self.seen.times), FIRST[-1] + (not self.seen.times[0])))))
+        )
+        self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
+        self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
+        self.tried: list[tuple[_Try, Array]] = []
+
+    def sure(self, first: int | None = None, drop: float = 0.0) -> Mistake | None:
+        """The simplest mistake among those that explain the columns about as well as the best; None where none does.
+
+        first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
+        """
+        looked = len(self.own) if first is None else first + (not self.seen.times[0])
+        own = float(self.own[:looked].max())
+        if not own > WORTH_ASKING or looked > len(self.own):
             return None
-        tried = [(each, _left(seen, courses, each)) for each in _suppositions(seen, courses)]
-        found = _best(tried, own)
-        if found is None:
-            pairs = [(each, _left(seen, courses, each)) for each in _pairs(seen)]
-            found = _best(pairs, own)
+        own = own if numpy.isfinite(own) else 1.0
+        if not self.tried:
+            self.tried = [(each, self._left(each)) for each in _suppositions(self)]
+        tried = [(each, each_error) for each, each_error in self.tried if first is None or each.drop == DROP]
+        found = _best(tried, own, looked, drop)
+        if found is None and first is None and not drop and _forms(self.seen) & set(FORMS):
+            pairs = [(each, self._left(each)) for each in _pairs(self.seen)]
+            found = _best(pairs, own, looked)
         return found
 
+    def of_rates(self) -> Mistake | None:
+        """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
+        seen = self.every.at(list(range(min(_NEIGHBOURS, len(self.every.times)))))
+        off = rates_off(seen, seen.said)
+        if off is None or not _CONTRADICTS < (own := float(off.max())) < numpy.inf:
+            return None
+        readings = [(name, numbers, rates_off(seen, each)) for name, numbers, each in _readings(seen)]
+        left, kind, numbers = min(
+            ((float(off.max()), kind, numbers) for kind, numbers, off in readings if off is not None),
+            key=lambda each: each[0],
+            default=(own, "", {}),
+        )
+        return Mistake(kind, {**numbers, "of": RATES}, own, left, len(seen.times)) if left * DROP <= own else None
 
-def _left(seen: Seen, courses: _Courses, each: _Try) -> float:
-    body = each.body or seen.body
-    course = courses.of(each.start, body)
-    moved = replace(seen, point=body.centre) if each.body is not None and seen.point is seen.body.centre else seen
-    return error(moved, course, each.columns or seen.said, body)
+    @cached_property
+    def _refused(self) -> float:
+        """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω."""
+        largest = [
+            max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
+            if {"omega", "omega_space"} & seen.columns.keys()
+            else 1.0
+            for seen in (self.early.seen, self.seen)
+        ]
+        own = float(self.own.max())
+        growth = _ANISOTROPY * largest[1] / largest[0] if largest[0] else numpy.inf
+        return growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP
+
+    def _left(self, each: _Try) -> Array:
+        """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
+        if each.start is not None or each.body is not None or each.shift:
+            early = self._error(each, self.early)
+            if not float(early.max()) <= self._refused:
+                return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
+        return self._error(each, self.courses)
+
+    @staticmethod
+    def _error(each: _Try, courses: _Courses) -> Array:
+        seen, body = courses.seen, each.body or courses.seen.body
+        course = courses.of(each.start, body, each.shift)
+        if each.body is not None and seen.point is seen.body.centre:
+            seen = replace(seen, point=body.centre)
+        if each.rates and course is not None and (plain := courses.of()) is not None:
+            in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
+            course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
+        if each.still:
+            seen = replace(seen, columns={k: v for k, v in seen.columns.items() if not k.startswith("omega")})
+        return errors(seen, course, each.columns or seen.said, body)
 
 
-def _best(tried: Sequence[tuple[_Try, float]], own: float) -> Mistake | None:
-    explained = [(each, left) for each, left in tried if left * each.drop <= own]
+def _best(tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0) -> Mistake | None:
+    largest = [(each, float(left[:looked].max())) for each, left in tried]
+    explained = [(each, left) for each, left in largest if left * (drop or each.drop) <= own]
     if not explained:
         return None
     best = min(max(left, FLOOR) for _, left in explained)
-    alike = [(each, left) for each, left in explained if left <= ALIKE * best]
-    first, left = alike[0]
+    alike = [(each, left) for each, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
+    first, _ = alike[0]
+    # of one kind the number that fits best
+    first, left = min((pair for pair in alike if pair[0].kind == first.kind), key=lambda pair: max(pair[1], FLOOR))
     # with a number that was fitted more can be explained
     equal = [each for each, _ in alike if each.drop <= first.drop]
-    others = tuple(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))
-    return Mistake(first.kind, first.numbers, own, left, others[:_MOST_OTHERS])
+    others = list(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))[:_MOST_OTHERS]
+    numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(others)} if others else {})
+    return Mistake(first.kind, numbers, own, left, looked)
 
 
-def _suppositions(seen: Seen, courses: _Courses) -> Iterator[_Try]:
+def _suppositions(given: Suppositions) -> Iterator[_Try]:
     """The simplest first, those with a fitted number last."""
+    seen = given.seen
     for kind, numbers, reading in _readings(seen):
         yield from _scopes(seen, kind, numbers, reading)
     # before the axis that points up: where both fit, the third axis points down
-    yield _Try("gravity_sign", body=replace(seen.body, gravity=-seen.body.gravity))
-    for kind, numbers, reading in _axes_of_space(seen):
-        yield from _scopes(seen, kind, numbers, reading)
     for kind, numbers, body in _bodies(seen):
         yield _Try(kind, numbers, body=body)
+        if kind == "gravity_sign":
+            for other, more, reading in _axes_of_space(seen):
+                yield from _scopes(seen, other, more, reading)
+    yield from _steps(given)
     yield from _positions(seen)
     yield from _renamed(seen)
-    course = courses.of()
+    course = given.courses.of()
     if course is not None:
         yield from _fitted(seen, course)
+        yield from _early_rates(given, course)
+
+
+def _steps(given: Suppositions) -> Iterator[_Try]:
+    """All columns, or Ω alone, half a step or a step of the method early or late; Ω that is 0 throughout."""
+    rates = [values for name, values in given.seen.columns.items() if name.startswith("omega")]
+    if rates and not any(values.any() for values in rates) and len(given.seen.columns) > len(rates):
+        yield _Try("omega_zero", still=True)
+    for part, shift in product((Fraction(1, 2), Fraction(1)), (-1, 1)):
+        if given.step:
+            by = shift * part * given.step
+            whole = _Try("times_shifted", {"shift": _signed(by)}, shift=by)
+            yield whole
+            if rates and len(given.seen.columns) > len(rates):
+                text = f"{'half a step' if part < 1 else 'one step'} {'early' if shift < 0 else 'late'}"
+                yield replace(whole, kind="omega_shifted", numbers={**whole.numbers, "steps": text}, rates=True)
+
+
+def _early_rates(given: Suppositions, course: Course) -> Iterator[_Try]:
+    """Ω alone of other times, by as much as fits."""
+    seen, small = given.seen, Fraction(1, 10**6) / Fraction(turning(given.seen.body, given.start))
+    name = next((name for name in ("omega", "omega_space") if name in seen.columns), None)
+    if name is None or len(seen.columns) < 2 or len(seen.times) < 3:
+        return
+    values = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
+    shift = Fraction(0)
+    for _ in range(_REFINED):
+        here, there = (given.courses.of(shift=at) for at in (shift, shift + small))
+        if here is None or there is None:
+            return
+        at_shift, later = (getattr(each, name) for each in (here, there))
+        slope = (later - at_shift) / float(small)
+        square = float((slope * slope).sum())
+        if not 0 < square < numpy.inf or not numpy.isfinite(values).all():
+            return
+        shift += Fraction(float(((values - at_shift) * slope).sum()) / square)
+        shift = max(-seen.times[-1], min(seen.times[-1], shift)) if seen.times[-1] > 0 else shift
+    numbers = {"shift": _signed(Fraction(decimal_text(shift, 6)))}
+    yield _Try("omega_shifted", numbers, shift=shift, rates=True, drop=FITTED_DROP)
+
+
+def _signed(shift: Fraction) -> str:
+    return f"{'−' if shift < 0 else '+'} {decimal_text(abs(shift), 6)}"
 
 
 def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[_Try]:
@@ -176,6 +316,9 @@ def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) ->
         yield _Try(kind, {**numbers, "of": BOTH}, reading, reading)
     yield _Try(kind, {**numbers, "of": COLUMNS}, reading)
     if moved:
+        if kind == "omega_frame":
+            space = not seen.start.in_space
+            numbers = {"frame": "space" if space else "body", "key": f"omega{'_space' if space else ''} at t = 0"}
         yield _Try(kind, {**numbers, "of": START}, start=reading)
 
 
@@ -222,7 +365,8 @@ def _axes_of_space(seen: Seen) -> Iterator[Named]:
 
 def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
     if forms & {"omega", "omega_space"}:
-        yield "omega_frame", {}, replace(said, swapped=True)
+        frame = "body" if "omega_space" in forms else "space"
+        yield "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, replace(said, swapped=True)
         for unit, factor in _UNITS_OF_OMEGA.items():
             yield f"omega_in_{unit}", {}, replace(said, omega=factor)
         yield "omega_reversed", {}, replace(said, omega=-1.0)
@@ -247,12 +391,22 @@ def _angles(said: Reading) -> Iterator[Named]:
 def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
     """Other data of the body."""
     body = seen.body
+    yield "gravity_sign", {}, replace(body, gravity=-body.gravity)
+    if body.force and body.centre.any():
+        yield "no_gravity", {}, replace(body, gravity=0.0)
+    at_centre = body if body.about_centre else with_tensor(body, body.inertia - body.steiner)
+    if body.mass and body.centre.any():
+        yield "free_about_centre_of_mass", {}, replace(at_centre, gravity=0.0, about_centre=False, mass=None)
     if body.mass and body.steiner.any():
         where = "fixed point" if body.about_centre else "centre of mass"
         yield "inertia_about", {"about": where}, replace(body, about_centre=not body.about_centre)
     off = body.inertia - numpy.diag(numpy.diag(body.inertia))
     if off.any():
         yield "products_of_inertia", {}, with_tensor(body, body.inertia - 2 * off)
+        moments, axes = principal(body.inertia)
+        for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
+            named_so, again = axes @ turn, turn.T * moments @ turn
+            yield "tensor_axes_conjugated", {}, with_tensor(body, named_so.T @ again @ named_so)
     for name, factor in _GRAVITIES.items():
         yield "gravity_unit", {"factor": name}, replace(body, gravity=body.gravity * factor)
     yield "centre_reversed", {}, replace(body, centre=-body.centre)

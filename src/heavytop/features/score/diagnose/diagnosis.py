@@ -9,19 +9,35 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cache
+from itertools import chain
 from sys import float_info
 
 import numpy
 
 from heavytop.features.score.diagnose import hypotheses
-from heavytop.features.score.diagnose.samples import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Examined, Units, examined
-from heavytop.measure.scalar import EXPLAINS, Rounding, explains, rounding
-from heavytop.precision import Precision, decimal_text
+from heavytop.features.score.diagnose.conventions import AS_LIKELY, WORTH_ASKING, Mistake, Suppositions
+from heavytop.features.score.diagnose.readings import Seen, of_states
+from heavytop.features.score.diagnose.samples import (
+    ALIKE,
+    DROP,
+    FIRST,
+    FITTED_DROP,
+    FLOOR,
+    LIKELY_DROP,
+    MOST_AT_ONCE,
+    WITH_ATTITUDE,
+    Array,
+    Examined,
+    FileAxes,
+    Units,
+    examined,
+)
+from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, rounding
+from heavytop.precision import Precision, decimal_text, shown
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
 
-_WORTH_ASKING = 1e-10
-"""Relative errors below it are no mistake of this kind."""
 _WRONG = 1e-3
 """Smaller ones are not those of other equations."""
 _TOO_FAR = 1.0
@@ -40,6 +56,12 @@ _RIGHT = 1e-2
 """... which is off by no more than that, ..."""
 _FEW_OF, _MOST_ALONE = 4, 8
 """... and if they are at most one in four of all, and so many."""
+_GRID = 200
+"""Of times behind the start, within one interval between samples."""
+_BACK, _JUMPS = 0.05, 0.3
+"""A state that is so near to one of those is back at the start; one that is so far from where it should be jumps."""
+_AGAIN, _FOLLOWED = 10.0, 6
+"""The error of so many samples must fall by so much where a motion is said to start again."""
 _LONG = 1.5
 """The last interval between times is no measure of a state if it is so many times the longest other."""
 
@@ -52,6 +74,7 @@ class Diagnosis:
     error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
     of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
     looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
+    likely: whether the error falls by less than a statement asks for.
     """
 
     kind: str
@@ -59,6 +82,7 @@ class Diagnosis:
     error: float | None = None
     left: float | None = None
     looked_at: tuple[int, int, str] | None = None
+    likely: bool = False
 
 
 def diagnose(
@@ -66,29 +90,75 @@ def diagnose(
     start: State,
     system: System,
     times: Sequence[Fraction],
-    states: Sequence[Sequence[Fraction]],
+    states: Sequence[Sequence[Fraction | None]],
     precision: Precision,
     relative_error: float | None,
     errors: Sequence[float] = (),
+    frame: FileAxes | None = None,
+    seen: Seen | None = None,
+    step: Fraction | None = None,
 ) -> list[Diagnosis]:
     """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
 
     relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
     errors: that of each state relative to the size of Ω and γ, up to where the reference ends; empty without one.
+    frame, seen: of a file of other columns, whose states are in its axes, with None for what it does not give.
+    step: of the method, where it is known.
     """
-    measured, written = numpy.array(errors, dtype=float), rounding(states, precision)
-    if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= _WORTH_ASKING:
+
+    def written_so(least: int) -> Rounding | None:
+        return None if frame else rounding([[value for value in row if value] for row in states], precision, least)
+
+    measured, written = numpy.array(errors, dtype=float), written_so(LEAST)
+    if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= WORTH_ASKING:
         return _rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
-        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
-        truth = None if given is None else given.supposed(given.times)
-        if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
+        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
+        if frame is None and _only_rounded(written_so(1), relative_error, None if given is None else given.trusted()):
             return _rounded(written, relative_error)
-        mistake = _still(given, states, relative_error) or _off_alone(given, times, measured)
-        if mistake is None and given is not None and given.rows:
-            error = _TOO_FAR if truth is None else given.error(truth)
-            mistake = _mistake(given, truth, error) if error > _WORTH_ASKING else None
+        mistake = _still(given, states, relative_error) or _reset(given) or _off_alone(given, times, measured)
+        if mistake is None:
+            if seen is None and system in WITH_ATTITUDE:
+                seen = of_states(top, start, times, states)
+            of_columns = None if seen is None else Suppositions(seen, step)
+            mistake = _explanation(given if given is not None and given.rows else None, of_columns, frame is not None)
     return [mistake] if mistake else []
+
+
+def _explanation(given: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
+    """What explains the states, from their motion or from the columns, over all samples or the first ones."""
+
+    @cache
+    def on_samples(first: int | None) -> _Tried:
+        assert given is not None
+        return _tried(given, first)
+
+    def told(first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
+        of_columns = (_of_columns(each, each.sure(first, drop), drop) for each in [columns] if each is not None)
+        of_states = (_mistake(on_samples(first), drop) for _ in [given] if given is not None)
+        found = chain(of_columns, of_states) if columns_first else chain(of_states, of_columns)
+        each_told = (each for each in found if each is not None)
+        if drop:  # a guess is the better one
+            return min(each_told, key=lambda each: (each.left or 0.0) / (each.error or 1.0), default=None)
+        return next(each_told, None)
+
+    exact = told()
+    if exact is None and given is not None:
+        every = given.widened()
+        exact = _looked_at(every, _lost_row(every))
+    exact = exact or next((sure for first in FIRST if (sure := told(first)) is not None), None)
+    if exact is None and columns is not None:
+        exact = _of_columns(columns, columns.of_rates())
+    likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
+    return exact or likely or (None if given is None else _looked_at(given, _integrals_off(given)))
+
+
+def _of_columns(columns: Suppositions, found: Mistake | None, drop: float = 0.0) -> Diagnosis | None:
+    if found is None:
+        return None
+    looked, of = found.looked, len(columns.every.times)
+    until = None if looked == of else (looked, of, shown(columns.seen.times[min(looked, len(columns.seen.times)) - 1]))
+    return Diagnosis(found.kind, found.numbers, found.error, found.left, until, bool(drop))
 
 
 def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
@@ -106,26 +176,80 @@ def _only_rounded(written: Rounding | None, error: float | None, given: Examined
     if given is None or truth is None:
         return error is not None
     units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(given.units.time), given.rate))
-    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * _WORTH_ASKING * sizes
+    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * WORTH_ASKING * sizes
     return bool((numpy.abs(given.states - truth) <= allowed).all())
 
 
-def _mistake(given: Examined, truth: Array | None, error: float) -> Diagnosis | None:
-    """The simplest mistake among those that explain the states about as well as the best."""
-    explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
-    if not explained and error > _WRONG:
-        others = hypotheses.suppositions(given, truth)
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """What was tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
+
+    given: Examined
+    truth: Array | None
+    error: float
+    suppositions: list[Supposition]
+    fitted: bool
+
+
+def _tried(given: Examined, first: int | None) -> _Tried:
+    """All suppositions, or on the first samples those without a fitted number."""
+    given = given if first is None else given.at(given.rows[: first + (not given.times[0])])
+    truth = given.supposed(given.times)
+    error = _TOO_FAR if truth is None else given.error(truth)
+    tried = [*_suppositions(given, truth, first is None)] if error > WORTH_ASKING else []
+    return _Tried(given, truth, error, tried, first is None)
+
+
+def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
+    """The simplest mistake among those that explain the states about as well as the best.
+
+    drop: a smaller one than usual, of suppositions without a fitted number.
+    """
+    given, error = tried.given, tried.error
+    explained = [each for each in tried.suppositions if each[2] * (drop or each[3]) <= error]
+    explained = [each for each in explained if each[3] == DROP or not drop]
+    if not explained and error > _WRONG and tried.fitted and not drop:
+        others = hypotheses.suppositions(given, tried.truth)
         explained = [(*each, FITTED_DROP) for each in others if each[2] * FITTED_DROP <= error]
     if not explained:
-        every = given.widened()
-        return _looked_at(every, _lost_row(every)) or _looked_at(given, _integrals_off(given, error))
+        return None
     best = min(max(left, FLOOR) for *_, left, _ in explained)
-    kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
-    return _looked_at(given, Diagnosis(kind, numbers, error, left))
+    kind, numbers, left, _ = next(each for each in explained if each[2] <= (AS_LIKELY if drop else ALIKE) * best)
+    return _looked_at(given, Diagnosis(kind, numbers, error, left, likely=bool(drop)))
+
+
+def _reset(given: Examined | None) -> Diagnosis | None:
+    """From some sample on, states are those of the motion that starts again there, as a program restarts what it lost.
+
+    They jump, to a state near the start, and go on from it: a motion that comes back to its start does not jump.
+    """
+    if given is None or not given.is_whole or len(given.all_times) < _FEWEST_ROWS:
+        return None
+    every = given.at(range(min(len(given.all_times), MOST_AT_ONCE)))
+    times = numpy.array([float(time) for time in every.times])
+    grid = numpy.linspace(0, numpy.diff(times).max() if times[0] >= 0 else numpy.diff(times).min(), _GRID)
+    truth = every.supposed(every.times)
+    own = None if truth is None else every.errors(truth)
+    orbit = every.supposed([Fraction(value) for value in grid]) if own is not None and own.max() > _JUMPS else None
+    if orbit is None or own is None:
+        return None
+    sizes = numpy.repeat([every.rate, 1.0], [3, orbit.shape[1] - 3])
+    near = numpy.array([numpy.abs((orbit - state) / sizes).max(axis=1).min() for state in every.states])
+    back = numpy.flatnonzero((near[1:-2] <= _BACK) & (own[1:-2] > _JUMPS)) + 1
+    for row in map(int, back):
+        rows = range(row, min(row + _FOLLOWED, len(times)))
+        place = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
+        expected = every.follows(row - 1)
+        again = every.at([every.rows[n] for n in rows])
+        moved = again.supposed([time - every.times[row] + Fraction(grid[place]) for time in again.times])
+        jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
+        if jumps and moved is not None and (left := again.error(moved)) * _AGAIN <= (error := float(own[rows].max())):
+            return Diagnosis("reset", {"t": _text(times[row], every.units.time)}, error, left)
+    return None
 
 
 def _still(
-    given: Examined | None, states: Sequence[Sequence[Fraction]], relative_error: float | None
+    given: Examined | None, states: Sequence[Sequence[Fraction | None]], relative_error: float | None
 ) -> Diagnosis | None:
     """From some time on every state is the same, which are three at least, though the motion moves there."""
     same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
@@ -140,12 +264,14 @@ def _still(
 
 def _moves(given: Examined, row: int) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
-    sizes = numpy.repeat([given.rate, 1.0], 3)
     true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
     pairs = [(here, given.follows(row))] + ([] if true is None else [(true[0], true[1])])
-    return any(
-        after is not None and float((numpy.abs(after - before) / sizes).max()) > _WRONG for before, after in pairs
-    )
+    return any(after is not None and _apart(given, after, before) > _WRONG for before, after in pairs)
+
+
+def _apart(given: Examined, one: Array, other: Array) -> float:
+    """How far two states are apart, relative to the size of Ω and of γ."""
+    return float((numpy.abs(one - other) / numpy.repeat([given.rate, 1.0], [3, len(one) - 3])).max())
 
 
 def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
@@ -174,7 +300,7 @@ def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array)
 
 def _gap(error: float, other: float) -> bool:
     """Whether an error is that of a state that is off, and the other that of one that is right."""
-    return bool(error > _WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
+    return bool(error > WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
 
 
 def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
@@ -185,8 +311,7 @@ def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors:
     expected = given.follows(last - 1)
     if expected is None:
         return False
-    off = numpy.abs(given.all_states[last] - expected) / numpy.repeat([given.rate, 1.0], 3)
-    return bool(off.max() >= errors[last] / 2)
+    return _apart(given, given.all_states[last], expected) >= float(errors[last]) / 2
 
 
 def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
@@ -201,18 +326,20 @@ Supposition = tuple[str, dict[str, str], float, float]
 """Kind, numbers, the error that is left, and how far it must have fallen."""
 
 
-def _suppositions(given: Examined, truth: Array | None) -> Iterator[Supposition]:
-    """The simplest first, those with a fitted number last."""
+def _suppositions(given: Examined, truth: Array | None, fitted: bool) -> Iterator[Supposition]:
+    """The simplest first, those with a fitted number last, if at all."""
     reading = None if truth is None else hypotheses.reading(given, truth)
     if reading is not None and reading[0].changes == 1:
         yield _of_reading(*reading)
     for data, left in hypotheses.without_numbers(given):
         yield data.kind, dict(data.numbers), left, DROP
-    clock = hypotheses.clock(given)
+    clock = hypotheses.clock(given, fitted)
     if clock is not None and not clock[0].fitted:
         yield _of_clock(*clock, given.units)
     if reading is not None and reading[0].changes > 1:
         yield _of_reading(*reading)
+    if not fitted:
+        return
     if truth is not None:
         yield from ((*each, FITTED_DROP) for each in hypotheses.scaled(given, truth))
     if clock is not None and clock[0].fitted:
@@ -275,18 +402,23 @@ def _lost_row(every: Examined) -> Diagnosis | None:
     return None
 
 
-def _integrals_off(given: Examined, error: float) -> Diagnosis | None:
+def _integrals_off(given: Examined) -> Diagnosis | None:
     """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
-    if len(given.rows) < 3:
+    if len(given.rows) < 3 or not given.is_whole:
+        return None
+    truth = given.supposed(given.times)
+    error = _TOO_FAR if truth is None else given.error(truth)
+    if error <= WORTH_ASKING:
         return None
     p = given.system.parameters(given.top, given.start)
     start = [float(value) for value in given.start.flat]
+    vectors = given.states.reshape(len(given.states), -1, 3) @ given.frame.axes
     numbers: dict[str, str] = {}
     for integral in holding(given.top, given.start, given.system):
         if integral.name not in (sizes := _sizes(given)):
             continue
         size, unit = sizes[integral.name]
-        values = numpy.array([float(integral.value(p, list(state))) for state in given.states])
+        values = numpy.array([float(integral.value(p, [*omega, *gamma])) for omega, gamma, *_ in vectors])
         at_start = float(integral.value(p, start))
         off, varies = abs(float(values.mean()) - at_start), float(values.max() - values.min())
         if not varies <= _OFF * size:

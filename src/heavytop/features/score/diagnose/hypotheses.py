@@ -27,11 +27,11 @@ from heavytop.features.score.diagnose.samples import (
     SMALL,
     Array,
     Examined,
-    motion,
+    floats,
     named,
     notable,
 )
-from heavytop.precision import cross, decimal_text
+from heavytop.precision import cross, decimal_text, dot
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -81,11 +81,12 @@ class ColumnsHypothesis:
         signs = sum(axis < 0 for axis in self.axes)
         return bool(self.meaning) + ("_gamma_down" in self.meaning) + self.swapped + moved + signs + (self.of != "both")
 
-    def columns(self, states: Array, inertia: Array) -> Array:
+    def columns(self, states: Array, tensor: Array) -> Array:
         """The columns that a file with this reading has where the states are ``states``."""
         omega_factor, gamma_factor, momentum = _MEANINGS[self.meaning]
         order, signs = [abs(axis) - 1 for axis in self.axes], numpy.sign(self.axes)
-        omega, gamma = states[:, :3] * omega_factor * (inertia if momentum else 1), states[:, 3:] * gamma_factor
+        omega, gamma = states[:, :3] * omega_factor, states[:, 3:] * gamma_factor
+        omega = omega @ tensor if momentum else omega
         if self.of != "gamma":
             omega = omega[:, order] * signs
         if self.of != "omega":
@@ -110,8 +111,9 @@ READINGS = sorted((reading for reading in _readings() if reading.changes), key=l
 
 def reading(given: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
     """The simplest reading of the columns that fits about as well as the best, and its error."""
-    inertia = numpy.array([float(value) for value in given.top.inertia])
-    errors = [given.error(each.columns(truth, inertia)) for each in READINGS]
+    if len(given.frame.columns) < 6:
+        return None
+    errors = [given.error(each.columns(truth[:, :6], given.tensor)) for each in READINGS]
     best = min(errors)
     return next(
         ((each, error) for each, error in zip(READINGS, errors, strict=True) if error <= ALIKE * max(best, FLOOR)), None
@@ -123,6 +125,8 @@ def scaled(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str],
     groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
     groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
     for kind, columns in groups:
+        if not set(range(6)[columns]) <= set(given.frame.columns):
+            continue
         true, whole = truth[:, columns], truth[:, :3] if columns.start < 3 else truth[:, 3:]
         if true.size < _FEWEST or numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
             continue
@@ -147,7 +151,8 @@ def constant_column(given: Examined, truth: Array) -> Iterator[tuple[str, dict[s
     """A column that is the same in every state, and the error of the other five."""
     if len(given.rows) < _FEWEST:
         return
-    for column in numpy.flatnonzero((given.all_states == given.all_states[0]).all(axis=0)):
+    still = (given.all_states == given.all_states[0]).all(axis=0)
+    for column in (column for column in given.frame.columns if still[column]):
         states = given.states.copy()
         states[:, column] = truth[:, column]
         value = Fraction(float(given.states[0, column])) / (given.units.time if column < 3 else 1)
@@ -162,6 +167,10 @@ _NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
 _MOST_CHANGED = 3
 _MARGIN = 30.0
 """How many errors of the samples a fitted number may be off."""
+_BIAS = 0.02
+"""A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
+_SPARSE = 0.05
+"""Of the distance between short decimals, within which a number is none by accident."""
 _AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
@@ -186,6 +195,8 @@ Found = tuple[DataHypothesis, float]
 def without_numbers(given: Examined) -> Iterator[Found]:
     """Suppositions that need no fitted number, the likeliest first."""
     top, start = given.top, given.start
+    if top.weight:
+        yield _tried(given, "no_gravity", replace(top, weight=Fraction(0)))
     yield _tried(given, "weight_sign", replace(top, weight=-top.weight))
     yield _tried(given, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
     yield _tried(given, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
@@ -199,40 +210,44 @@ def without_numbers(given: Examined) -> Iterator[Found]:
     yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
     if top.rotor is not None:
         yield _tried(given, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
-    for a, b, c in list(permutations(range(3)))[1:]:
-        axes = (("axes", f"{a + 1}{b + 1}{c + 1}"),)
-        inertia = [top.inertia[i] for i in (a, b, c)]
-        centre = [top.centre[i] for i in (a, b, c)]
-        rotor = None if top.rotor is None else [top.rotor[i] for i in (a, b, c)]
-        yield _tried(given, "inertia_axes", HeavyTop(inertia, top.weight, top.centre, top.rotor), numbers=axes)
-        yield _tried(given, "centre_axes", HeavyTop(top.inertia, top.weight, centre, top.rotor), numbers=axes)
-        yield _tried(given, "top_axes", HeavyTop(inertia, top.weight, centre, rotor), numbers=axes)
+    tensor, moment, rotor = given.tensor, given.in_file(top.moment), given.in_file(k)
+    for order in list(permutations(range(3)))[1:]:
+        places = list(order)
+        axes = (("axes", "".join(str(i + 1) for i in order)),)
+        turned = tensor[numpy.ix_(places, places)]
+        yield _with_body(given, "inertia_axes", turned, moment, rotor, axes)
+        yield _with_body(given, "centre_axes", tensor, moment[places], rotor, axes)
+        yield _with_body(given, "top_axes", turned, moment[places], rotor[places], axes)
+    centre = given.in_file(top.centre)
     for signs in list(product((1, -1), repeat=3))[1:-1]:
-        centre = [s * r for s, r in zip(signs, top.centre, strict=True)]
-        numbers = (("centre", ", ".join(map(str, centre))),)
-        yield _tried(given, "centre_signs", HeavyTop(top.inertia, top.weight, centre, top.rotor), numbers=numbers)
+        texts = (_text(named(value, 1e-15 * abs(value))) for value in centre * signs)
+        yield _with_body(given, "centre_signs", tensor, moment * signs, rotor, (("centre", ", ".join(texts)),))
 
 
-def _tried(
-    given: Examined,
-    kind: str,
-    top: HeavyTop | None = None,
-    start: State | None = None,
-    numbers: tuple[tuple[str, str], ...] = (),
+def _with_body(
+    given: Examined, kind: str, tensor: Array, moment: Array, rotor: Array, numbers: tuple[tuple[str, str], ...]
 ) -> Found:
+    """The error with a body that has other axes."""
+    same = (given.tensor, given.in_file(given.top.moment), given.in_file(given.top.rotor or (Fraction(0),) * 3))
+    if all(numpy.array_equal(one, other) for one, other in zip((tensor, moment, rotor), same, strict=True)):
+        return DataHypothesis(kind), float("inf")
+    supposed = given.with_body(tensor, moment, rotor)
+    return DataHypothesis(kind, numbers), supposed.error(supposed.supposed(given.times))
+
+
+def _tried(given: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Found:
     tops = (top or given.top, given.top)
-    same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "inertia", "rotor"))
+    same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
     if same and (start is None or start == given.start) and kind != "system":
         return DataHypothesis(kind), float("inf")
-    return DataHypothesis(kind, numbers), given.error(given.supposed(given.times, top, start))
+    return DataHypothesis(kind), given.error(given.supposed(given.times, top, start))
 
 
 def _as_momentum(given: Examined, start: State) -> Found:
     """Start and states give M in place of Ω."""
     truth = given.supposed(given.times, start=start)
     if truth is not None:
-        rotor = numpy.array([*map(float, given.top.rotor or (0, 0, 0)), 0, 0, 0])
-        truth = truth * numpy.array([*map(float, given.top.inertia), 1, 1, 1]) + rotor
+        truth[:, :3] = truth[:, :3] @ given.tensor + given.in_file(given.top.rotor or (Fraction(0),) * 3)
     return DataHypothesis("all_momentum"), given.error(truth)
 
 
@@ -240,7 +255,7 @@ def _all_times(given: Examined, factor: float) -> float:
     """The error where start and states give Ω times ``factor``."""
     start = State([w / Fraction(factor) for w in given.start.omega], given.start.gamma)
     truth = given.supposed(given.times, start=start)
-    return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * 3))
+    return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
 
 
 def all_scaled(given: Examined) -> Found | None:
@@ -260,10 +275,12 @@ def all_scaled(given: Examined) -> Found | None:
 
 def _weight_ratio(given: Examined) -> float | None:
     """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
-    inertia, moment = _floats(given.top.inertia), _floats(given.top.moment)
-    start = _floats(given.start.flat)
-    kinetic = 0.5 * ((given.states[:, :3] ** 2 - start[:3] ** 2) @ inertia)
-    height = (given.states[:, 3:] - start[3:]) @ moment
+    if not given.is_whole:
+        return None
+    tensor, start = given.tensor, given.in_file(given.start.flat)
+    omega = given.states[:, :3]
+    kinetic = 0.5 * (numpy.einsum("ni,ij,nj->n", omega, tensor, omega) - start[:3] @ tensor @ start[:3])
+    height = (given.states[:, 3:6] - start[3:]) @ given.in_file(given.top.moment)
     square = float(height @ height)
     ratio = -float(kinetic @ height) / square if square else float("nan")
     return ratio if isfinite(ratio) else None
@@ -276,8 +293,8 @@ def another_weight(given: Examined) -> Found | None:
         return None
     fitted = ratio * float(old)
     candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
-    tried = [(weight, _with(given, given.top.inertia, [weight * r for r in given.top.centre])) for weight in candidates]
-    weight, error = _roundest(tried)
+    tops = [(weight, replace(given.top, weight=weight)) for weight in candidates]
+    weight, error = _roundest([(weight, given.error(given.supposed(given.times, top))) for weight, top in tops])
     if not notable(weight, old):
         return None
     return DataHypothesis("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
@@ -290,29 +307,34 @@ def another_start(given: Examined) -> Found | None:
     neighbouring motions part quickly, the errors of a method look like those of a start.
     """
     times = given.times
-    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]):
+    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(given.states[0]).any():
         return None
-    first = _as_state(given.states[0])
-    back = motion(given.top, first, given.system, [-times[0]])
+    back = given.starting(given.states[0]).supposed([-times[0]])
     truth = given.supposed(times[:1])
     if back is None or truth is None or not _shows_at_once(given, truth):
         return None
-    start = _as_state(back[0])
-    error = given.error(given.supposed(times, start=start))
-    off = numpy.abs(back[0] - _floats(given.start.flat))
+    start = given.in_file(given.start.flat)
+    error = given.error(given.starting(back[0]).supposed(times))
+    off = numpy.abs(back[0, :6] - start)
     magnified = float(numpy.abs(given.states[0] - truth[0]).max() / (off.max() or 1.0))
-    names = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
     sizes = [max(given.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
     units = [given.units.time] * 3 + [Fraction(1)] * 3
     noise = _MARGIN * max(error, 1e-12)
-    numbers = tuple(
-        (name, _text(named(float(value), noise * size) / unit))
-        for name, value, change, size, unit in zip(names, back[0], off, sizes, units, strict=True)
+    changed = [
+        (name, named(float(value), noise * size), unit, change > _BIAS * size, noise * size)
+        for name, value, change, size, unit in zip(NAMES, back[0], off, sizes, units, strict=False)
         if change > noise * size
-    )
-    return (
-        (DataHypothesis("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
-    )
+    ]
+    # a method of low order carries an error of its first step along as another start
+    if not any(large or _is_round(new, near) for _, new, _, large, near in changed):
+        return None
+    numbers = tuple((name, _text(new / unit)) for name, new, unit, *_ in changed)
+    return DataHypothesis("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+
+
+def _is_round(new: Fraction, near: float) -> bool:
+    """Whether a number is a short decimal, as none is by accident that is known within ``near``."""
+    return new == Fraction(decimal_text(new, SHORT)) and near <= _SPARSE * 10.0**-SHORT * abs(float(new))
 
 
 def _shows_at_once(given: Examined, first: Array) -> bool:
@@ -325,47 +347,63 @@ def _shows_at_once(given: Examined, first: Array) -> bool:
 
 def another_top(given: Examined) -> Found | None:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
-    direction = _conserving(given) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
-    before = [*given.top.inertia, *given.top.moment]
-    if direction is None or not (direction * _floats(before)).any():
+    entries = _PRODUCTS if _is_full(given) else _PRODUCTS[:3]
+    direction = _conserving(given, entries) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
+    before = [Fraction(given.tensor[place]) for place in entries] + [*map(Fraction, given.in_file(given.top.moment))]
+    if direction is None or not (direction * floats(before)).any():
         return None
     scaled = [_scaled(direction, before, near) for near in _NEAR]
-    tried = [(numbers, _with(given, numbers[:3], numbers[3:])) for numbers in scaled]
+    tried = [(numbers, _with(given, numbers[:-3], numbers[-3:])) for numbers in scaled]
     numbers, error = _roundest(tried)
-    units = [given.units.inertia] * 3 + [given.units.moment] * 3
-    entries = zip(_NAMES, before, numbers, units, strict=True)
-    changed = [(name, _text(new * unit)) for name, old, new, unit in entries if new != old]
+    units = [given.units.inertia] * len(numbers[3:]) + [given.units.moment] * 3
+    names = [f"I{i + 1}{j + 1}" if _is_full(given) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
+    entries_of = zip(names, before, numbers, units, strict=True)
+    changed = [(name, _text(new * unit)) for name, old, new, unit in entries_of if new != old]
     told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
     if not told or len(changed) > _MOST_CHANGED:
         return None
     return DataHypothesis("top", tuple(changed), fitted=True), error
 
 
-_NAMES = ("I1", "I2", "I3", "P a", "P b", "P c")
+_PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Entries of a tensor: three of a diagonal one."""
 
 
-def _conserving(given: Examined) -> Array | None:
+def _is_full(given: Examined) -> bool:
+    return bool((given.frame.axes != numpy.eye(3)).any())
+
+
+def _conserving(given: Examined, entries: Sequence[tuple[int, int]]) -> Array | None:
     """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
-    start = _floats(given.start.flat)
-    omega, gamma = given.states[:, :3], given.states[:, 3:]
-    area = omega * gamma - start[:3] * start[3:]
-    energy = numpy.hstack([0.5 * (omega**2 - start[:3] ** 2), gamma - start[3:]])
+    if not given.is_whole:
+        return None
+    start = given.in_file(given.start.flat)
+
+    def products(one: Array, other: Array) -> Array:
+        found = [one[..., i] * other[..., j] + (one[..., j] * other[..., i] if i != j else 0) for i, j in entries]
+        return numpy.stack(found, axis=-1)
+
+    omega, gamma = given.states[:, :3], given.states[:, 3:6]
+    area = products(omega, gamma) - products(start[:3], start[3:])
+    turning = 0.5 * (products(omega, omega) - products(start[:3], start[:3]))
+    energy = numpy.hstack([turning, gamma - start[3:]])
     size = given.rate or 1.0
-    units = numpy.array([size**2] * 3 + [1.0] * 3)
-    rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(area)]), energy]) / units
+    units = numpy.array([size**2] * len(entries) + [1.0] * 3)
+    rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(gamma)]), energy]) / units
     if not numpy.isfinite(rows).all():
         return None
     _, values, directions = numpy.linalg.svd(rows)
-    if len(values) < 6 or values[5] > _SINGULAR * values[4]:
+    if len(values) < len(units) or values[-1] > _SINGULAR * values[-2]:
         return None
-    found: Array = directions[5] / units
+    found: Array = directions[-1] / units
     return found
 
 
 def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[Fraction]:
     """The direction with the factor by which most numbers stay what they are, within ``near`` of the largest."""
-    old = _floats(before)
-    sizes = numpy.repeat([numpy.abs(old[:3]).max(), numpy.abs(old[3:]).max() or numpy.abs(old[:3]).max()], 3)
+    old = floats(before)
+    largest = [numpy.abs(old[:-3]).max(), numpy.abs(old[-3:]).max() or numpy.abs(old[:-3]).max()]
+    sizes = numpy.repeat(largest, [len(old) - 3, 3])
     factors = [o / d for o, d in zip(old, direction, strict=True) if o and d]
     scaled = max((direction * f for f in factors), key=lambda new: int((numpy.abs(new - old) <= near * sizes).sum()))
     return [
@@ -375,12 +413,15 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
 
 
 def _with(given: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
-    """The error with that top."""
+    """The error with those entries of the tensor, and P r."""
+    tensor = numpy.zeros((3, 3))
+    for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
+        tensor[i, j] = tensor[j, i] = value
     try:
-        top = HeavyTop(inertia, 1, moment, given.top.rotor)
+        supposed = given.with_body(tensor, floats(moment))
     except InputError:  # a moment that is not positive
         return float("inf")
-    return given.error(given.supposed(given.times, top))
+    return supposed.error(supposed.supposed(given.times))
 
 
 _Numbers = TypeVar("_Numbers")
@@ -390,14 +431,6 @@ def _roundest(tried: Sequence[tuple[_Numbers, float]]) -> tuple[_Numbers, float]
     """The first, that is the most rounded, whose error is about as small as any."""
     best = min(error for _, error in tried)
     return next(pair for pair in tried if pair[1] <= ALIKE * best)
-
-
-def _as_state(values: Array) -> State:
-    return State([Fraction(v) for v in values[:3]], [Fraction(v) for v in values[3:]])
-
-
-def _floats(values: object) -> Array:
-    return numpy.array([float(value) for value in values])  # type: ignore[attr-defined]
 
 
 def _text(value: Fraction) -> str:
@@ -432,26 +465,34 @@ def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquation
     """Each with the error that is left; one equation with the other sign only where nothing else fits."""
     found: list[FoundEquations] = []
     if truth is not None:
-        found += [_any_order(given, truth), *_axes_of_space(given, truth), *constant_column(given, truth)]
-    if given.system is HEAVY_TOP:
+        found += constant_column(given, truth)
+        found += [_any_order(given, truth), *_axes_of_space(given, truth)] if len(given.frame.columns) == 6 else []
+    if given.system is HEAVY_TOP and given.is_whole:
         found += _signs(given)
     yield from found
     error = given.error(truth)
-    if error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
+    if given.is_whole and error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
         for place, name in enumerate(NAMES):
-            supposed = replace(given, system=_negated(given.system, place)).supposed(given.times)
+            system = _negated(given.system, place, tuple(map(tuple, given.frame.axes.tolist())))
+            supposed = replace(given, system=system).supposed(given.times)
             yield "component_sign", {"column": name}, given.error(supposed)
 
 
 @lru_cache(maxsize=18)
-def _negated(system: System, place: int) -> System:
-    """The same equations with the derivative of one component negated."""
+def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) -> System:
+    """The same equations with the derivative of one component, in the axes of the file, negated."""
+    along, block = axes[place % 3], slice(place - place % 3, place - place % 3 + 3)
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        found = system.field(p, y)
-        return (*found[:place], -1 * found[place], *found[place + 1 :])
+        found = list(system.field(p, y))
+        twice = 2.0 * dot(along, found[block])
+        found[block] = [
+            value - part * twice if part else value for value, part in zip(found[block], along, strict=True)
+        ]
+        return tuple(found)
 
-    return replace(system, name=f"{system.name}_{NAMES[place]}_negated", field=field)
+    name = f"{system.name}_{NAMES[place]}_negated" + "_".join(map(float.hex, along))
+    return replace(system, name=name, field=field)
 
 
 def _signs(given: Examined) -> Iterator[FoundEquations]:
@@ -468,12 +509,12 @@ def _signs(given: Examined) -> Iterator[FoundEquations]:
     yield "kinematic_sign", {}, given.error(other.supposed(given.times))
     for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
         found = replace(given, system=system).supposed(given.times, lifted, reversed_start)
-        yield kind, {}, given.error(None if found is None else found * _OMEGA_BACK)
+        yield kind, {}, given.error(None if found is None else found[:, :6] * _OMEGA_BACK)
 
 
 def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
     """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
-    omega, gamma = given.states[:, :3], given.states[:, 3:]
+    omega, gamma, truth = given.states[:, :3], given.states[:, 3:6], truth[:, :6]
     size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate)
     length = numpy.abs(numpy.linalg.norm(omega, axis=1) - numpy.linalg.norm(truth[:, :3], axis=1)).max() / size
     vertical = (truth[:, :3] * truth[:, 3:]).sum(axis=1)
@@ -487,10 +528,11 @@ def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
 
 def _any_order(given: Examined, truth: Array) -> FoundEquations:
     """Each column as that component, or its negative, that it is nearest to."""
+    truth = truth[:, :6]
     sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate), numpy.abs(truth[:, 3:]).max()], 3)
     both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
     off = numpy.array(
-        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in given.states.T]
+        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in given.states[:, :6].T]
     )
     nearest = off.argmin(axis=1)
     if sorted(nearest % 6) != list(range(6)):
@@ -536,10 +578,10 @@ class TimesHypothesis:
     fitted: bool = False
 
 
-def clock(given: Examined) -> tuple[TimesHypothesis, float] | None:
+def clock(given: Examined, fitted: bool) -> tuple[TimesHypothesis, float] | None:
     """The simplest of the suppositions about the times that are about as good as the best, and its error."""
     found = [(each, at.error(at.supposed(times))) for each, at, times in _without_numbers(given) if len(times)]
-    if len(given.rows) >= 3:
+    if fitted and len(given.rows) >= 3:
         found += _fitted(given)
     best = min((error for _, error in found), default=0.0)
     return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
@@ -587,7 +629,7 @@ def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
     orbit = given.supposed([Fraction(value) for value in grid])
     if orbit is None:
         return
-    sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * 3)
+    sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
     # a method's own lag explains the samples of an oscillation as well as any clock
     slower = list(_refined(given, "time_unit", 1.0, times, sizes))
     lag = min((error for found, error in slower if abs(found.factor - 1) < _NEAR_ONE), default=float("inf"))
@@ -599,7 +641,7 @@ def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
             number = grid[place] - times[0] if kind == "times_shifted" else grid[place] / times[0] if times[0] else 1.0
             supposed = numpy.interp(_moved(kind, number, times), grid, numpy.arange(_GRID))
             off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - given.states) / sizes
-            tried.append((float(numpy.median(off.max(axis=1))), number))
+            tried.append((float(numpy.median(numpy.fmax.reduce(off, axis=1))), number))
         for _, number in sorted(tried)[: _TRIED // 3]:
             for found, error in _refined(given, kind, number, times, sizes):
                 near_one = kind == "time_unit" and abs(found.factor - 1) < _NEAR_ONE
@@ -626,7 +668,7 @@ def _is_short(factor: float) -> bool:
 
 def _near(orbit: Array, state: Array) -> list[int]:
     """Places of the grid where the orbit comes nearest to a state, the nearest first."""
-    far = numpy.abs(orbit - state).max(axis=1)
+    far = numpy.fmax.reduce(numpy.abs(orbit - state), axis=1)
     lower = (far <= numpy.roll(far, 1)) & (far <= numpy.roll(far, -1)) & (far < _WITHIN)
     places = numpy.flatnonzero(lower)
     return [int(place) for place in places[numpy.argsort(far[places])][:_TRIED]]
@@ -648,10 +690,10 @@ def _refined(
         if here is None or there is None:
             return
         slope = (there - here) / small / sizes * (1.0 if kind == "times_shifted" else times[:, None])
-        square = float((slope * slope).sum())
+        square = float((slope * slope)[~numpy.isnan(given.states)].sum())
         if not square:
             return
-        number += float((slope * (given.states - here) / sizes).sum()) / square
+        number += float(numpy.nansum(slope * (given.states - here) / sizes)) / square
         if not abs(_moved(kind, number, times)).max() * given.rate <= FARTHEST:
             return
     error = given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))

@@ -9,13 +9,10 @@ from math import floor, isfinite, log10
 from types import SimpleNamespace
 
 import numpy
-from numpy.typing import NDArray
 
 from heavytop.errors import HeavyTopError
-from heavytop.integrate.heyoka.motions import propagate
-from heavytop.integrate.trajectory import Outcome
+from heavytop.features.score.diagnose.samples import Array, motion, principal
 from heavytop.measure.attitude_error import UPS, Convention
-from heavytop.precision import DOUBLE
 from heavytop.top.attitude import matrix_of_quaternion, rows_of_euler
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -25,9 +22,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 # Numbers are numpy arrays in the units of the file; a motion is computed in units in which its rates are about 1.
 
 
-Array = NDArray[numpy.float64]
-_STEPS = 50_000
-"""Of heyoka, for one supposed motion."""
+_WIDEST = 1.0
+"""Radians between neighbouring samples, up to which the mean of Ω is the rate of the turn, roughly."""
 _LEAST = 1e-12
 """A principal moment below this part of the largest is not that of a body."""
 
@@ -96,13 +92,13 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
-    """The motion at ``times`` of one sign, in their order; None for what is no body, or cannot be computed."""
+    """The motion at ``times``; None for what is no body, or cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
         return None
     if not (numpy.isfinite(start.rotation).all() and numpy.isfinite(start.omega).all()):
         return None
-    moments, axes = _principal((tensor + tensor.T) / 2)
+    moments, axes = principal((tensor + tensor.T) / 2)
     if not moments[0] > _LEAST * moments.max() or moments.min() <= 0:
         return None
     rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
@@ -118,28 +114,14 @@ def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Cou
         system = HEAVY_TOP if whirl is None else HEAVY_GYROSTAT
         state = State([Fraction(w / rate) for w in omega], [Fraction(g) for g in rows[2]])
         xi = (Fraction(rows[0, 0]), Fraction(rows[0, 1]), Fraction(rows[0, 2]))
-        scaled = [time * Fraction(rate) for time in times]
-        later = [t for t in scaled if t]
-        run = propagate(top, state, later, DOUBLE, system=system, xi=xi, step_limit=_STEPS) if later else None
+        values = motion(top, state, system, [time * Fraction(rate) for time in times], xi)
     except (HeavyTopError, OverflowError, ValueError):
         return None
-    if run is not None and run.outcome is not Outcome.SUCCESS:
+    if values is None:
         return None
-    first = [] if all(scaled) else [[*(omega / rate), *rows[2], *rows[0]]]
-    values = numpy.array([*first, *(run.states if run is not None else [])], dtype=float)
     gamma, along = values[:, 3:6], values[:, 6:9]
     rotation = numpy.stack([along, numpy.cross(gamma, along), gamma], axis=1) @ axes.T
     return Course(rotation, values[:, :3] @ axes.T * rate)
-
-
-def _principal(tensor: Array) -> tuple[Array, Array]:
-    """Moments, and principal axes as the columns of a rotation: the axes given where the tensor is diagonal."""
-    if not (tensor - numpy.diag(numpy.diag(tensor))).any():
-        return numpy.diag(tensor), numpy.eye(3)
-    moments, axes = numpy.linalg.eigh(tensor)
-    if numpy.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
-    return moments, axes
 
 
 def _rate(moments: Array, moment: Array, omega: Array) -> float:
@@ -332,31 +314,29 @@ class Seen:
         return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()}, rows=tuple(rows))
 
 
-def error(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> float:
-    """The largest error of the columns, read so, relative to the size of each quantity; infinite without a motion."""
+def errors(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> Array:
+    """The error of each sample, read so, relative to the size of each quantity; infinite without a motion."""
     if course is None:
-        return float("inf")
-    worst = max(_errors(seen, course, reading, body).values())
-    return worst if worst == worst else float("inf")
+        return numpy.full(len(seen.times), numpy.inf)
+    parts = [_error(seen, course, reading, body, name, values) for name, values in seen.columns.items()]
+    largest: Array = numpy.nan_to_num(numpy.max(parts, axis=0), nan=numpy.inf, posinf=numpy.inf)
+    return largest
 
 
-def _errors(seen: Seen, course: Course, reading: Reading, body: BodyData) -> dict[str, float]:
-    found = {}
-    for name, values in seen.columns.items():
-        if name == "position":
-            found[name] = _position_error(seen, course, reading, values)
-            continue
-        if name == "gamma":
-            off = numpy.abs(reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]).max()
-        elif name in ("omega", "omega_space"):
-            off = _omega_error(course, reading, body, name, values)
-        else:
-            off = numpy.abs(reading.rotation(name, values) - course.rotation).max()
-        found[name] = float(off)
-    return found
+def _error(seen: Seen, course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
+    if name == "position":
+        off = _position_error(seen, course, reading, values)
+    elif name == "gamma":
+        off = reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]
+    elif name in ("omega", "omega_space"):
+        off = _omega_error(course, reading, body, name, values)
+    else:
+        off = (reading.rotation(name, values) - course.rotation).reshape(len(values), 9)
+    largest: Array = numpy.abs(off).max(axis=1)
+    return largest
 
 
-def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> float:
+def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
     omega = course.omega
     if reading.momentum:
         omega = omega @ body.tensor
@@ -366,17 +346,44 @@ def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, va
     else:
         true, given = omega, reading.body_vectors(values, True)
     size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
-    return float(numpy.abs(given / reading.omega - true).max()) / size
+    found: Array = (given / reading.omega - true) / size
+    return found
 
 
-def _position_error(seen: Seen, course: Course, reading: Reading, values: Array) -> float:
+def _position_error(seen: Seen, course: Course, reading: Reading, values: Array) -> Array:
     point = seen.point if reading.point is None else numpy.array(reading.point)
     true = course.rotation @ point
     if reading.displaced:
         true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
     size = float(numpy.linalg.norm(point)) or 1.0
     given = reading.vectors(values - seen.pivot)
-    return float(numpy.abs((given - numpy.array(reading.offset)) / reading.scale - true).max()) / size
+    found: Array = ((given - numpy.array(reading.offset)) / reading.scale - true) / size
+    return found
+
+
+def rates_off(seen: Seen, reading: Reading) -> Array | None:
+    """How far Ω is from the rate at which the attitude turns, between neighbouring samples and relative to Ω.
+
+    It needs no motion.  None where the file gives not both; infinite where the body turns too far in between.
+    """
+    form = next((form for form in ("quaternion", "matrix", "euler") if form in seen.columns), None)
+    name = next((name for name in ("omega", "omega_space") if name in seen.columns), None)
+    if form is None or name is None or len(seen.times) < 2:
+        return None
+    rotation = reading.rotation(form, seen.columns[form])
+    turn = rotation[:-1].transpose(0, 2, 1) @ rotation[1:]
+    skew = numpy.stack([turn[:, k, j] - turn[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=1) / 2
+    cosine = (numpy.trace(turn, axis1=1, axis2=2) - 1) / 2
+    angle = numpy.arctan2(numpy.linalg.norm(skew, axis=1), cosine)
+    spans = numpy.diff(numpy.array([float(time) for time in seen.times]))
+    rate = skew * (angle / numpy.maximum(numpy.sin(angle), 1e-300) / spans)[:, None]
+    in_space = (name == "omega_space") != reading.swapped
+    omega = (reading.vectors if in_space else reading.body_vectors)(seen.columns[name], True) / reading.omega
+    if in_space:
+        omega = numpy.einsum("nji,nj->ni", rotation, omega)
+    size = max(float(numpy.linalg.norm(rate, axis=1).max()), 1e-300)
+    off: Array = numpy.abs((omega[:-1] + omega[1:]) / 2 - rate).max(axis=1) / size
+    return numpy.where(angle < _WIDEST, off, numpy.inf)
 
 
 def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
@@ -392,12 +399,28 @@ def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
     first = rows[forms[0]]
     if "gamma" in columns:
         found[forms[0], "gamma"] = numpy.abs(first[:, 2] - columns["gamma"]).max(axis=1)
-    if "position" in columns:
-        size = float(numpy.linalg.norm(seen.point)) or 1.0
-        given = said.vectors(columns["position"] - seen.pivot)
-        found[forms[0], "position"] = numpy.abs(given - first @ seen.point).max(axis=1) / size
     if {"omega", "omega_space"} <= columns.keys():
         true = numpy.einsum("nij,nj->ni", first, columns["omega"])
         size = float(numpy.abs(true).max()) or 1.0
         found["omega", "omega_space"] = numpy.abs(said.vectors(columns["omega_space"]) - true).max(axis=1) / size
     return found
+
+
+def of_states(
+    top: HeavyTop, start: State, times: Sequence[Fraction], states: Sequence[Sequence[Fraction | None]]
+) -> Seen | None:
+    """A file of Ω and γ in principal axes; None where no double holds its numbers."""
+    try:
+        columns = numpy.array(states, dtype=float)
+        centre, rotor = (numpy.array([float(v) for v in part]) for part in (top.centre, top.rotor or (0, 0, 0)))
+        body = BodyData(numpy.diag([float(i) for i in top.inertia]), centre, None, float(top.weight), False, rotor)
+        omega, gamma = (numpy.array([float(v) for v in part]) for part in (start.omega, start.gamma))
+    except OverflowError:
+        return None
+    if not len(columns) or not numpy.isfinite(columns).all():
+        return None
+    along = numpy.cross(gamma, numpy.eye(3)[int(numpy.abs(gamma).argmin())])
+    rows = numpy.array([along, numpy.cross(gamma, along), gamma])
+    given = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
+    split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
+    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3), len(columns))

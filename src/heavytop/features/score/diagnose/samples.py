@@ -7,7 +7,7 @@ of γ along the supposed motion, so that units do not matter.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor
 
@@ -18,10 +18,12 @@ from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, decimal_text, dot, log10
-from heavytop.top.equations import System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 Array = NDArray[numpy.float64]
+WITH_ATTITUDE = (HEAVY_TOP, HEAVY_GYROSTAT)
+"""Systems whose attitude rides along."""
 
 MOST_SAMPLES = 24
 _TURNS = 60.0
@@ -53,7 +55,11 @@ SMALL = 100
 DROP = 100.0
 """Errors must fall by so much for a supposition without a free number, and ..."""
 FITTED_DROP = 1000.0
-"""... by so much for one whose numbers were fitted."""
+"""... by so much for one whose numbers were fitted; ..."""
+LIKELY_DROP = 30.0
+"""... one without a free number by which it falls less is likely."""
+FIRST = (6, 2)
+"""Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +76,27 @@ class Units:
 
 
 @dataclass(frozen=True, slots=True)
+class FileAxes:
+    """Axes of the body in which a file gives its vectors, and what its columns are.
+
+    axes: A with v_file = A v_principal.  xi: the attitude vector at t = 0 in principal axes; None where no attitude is
+    given.  columns: the places of those of Ω1 Ω2 Ω3 γ1 γ2 γ3 that are columns of the file.
+    """
+
+    axes: Array = field(default_factory=lambda: numpy.eye(3))
+    xi: tuple[Fraction, ...] | None = None
+    columns: tuple[int, ...] = tuple(range(6))
+
+
+@dataclass(frozen=True, slots=True)
 class Examined:
     """A motion as it was given, at the samples that are looked at.
 
+    top, start: in principal axes; everything else in the axes of the file.
     all_times, all_states: the whole of it.  rows: the places of those samples in it.
-    states: of these rows, shape (n, 6), in double.
-    units: everything else is in these.  rate: radians per time unit, roughly, at which the motion turns.
+    states: of these rows, shape (n, 6), in double, or (n, 9) with ξ where there is an attitude; nan where the file does
+    not give a vector.
+    units: everything is in these.  rate: radians per time unit, roughly, at which the motion turns.
     """
 
     top: HeavyTop
@@ -87,11 +108,49 @@ class Examined:
     states: Array
     rate: float
     units: Units
+    frame: FileAxes
 
     @property
     def times(self) -> list[Fraction]:
         """Of the rows that are looked at."""
         return [self.all_times[row] for row in self.rows]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether Ω and γ are known in every sample."""
+        return not numpy.isnan(self.states[:, :6]).any()
+
+    @property
+    def tensor(self) -> Array:
+        """The inertia tensor in the axes of the file."""
+        found: Array = self.frame.axes * floats(self.top.inertia) @ self.frame.axes.T
+        return found
+
+    def in_file(self, vector: Sequence[Fraction]) -> Array:
+        """A vector in principal axes, or several one after the other, in the axes of the file."""
+        found: Array = (floats(vector).reshape(-1, 3) @ self.frame.axes.T).reshape(-1)
+        return found
+
+    def starting(self, values: Array) -> Examined:
+        """The same with that start, in the axes of the file."""
+        parts = [tuple(map(Fraction, part)) for part in values.reshape(-1, 3) @ self.frame.axes]
+        return replace(self, start=State(*parts[:2]), frame=replace(self.frame, xi=parts[2] if parts[2:] else None))
+
+    def with_body(self, tensor: Array, moment: Array, rotor: Array | None = None) -> Examined:
+        """The same with another body, in the axes of the file.
+
+        Raises InputError for moments of inertia that are not positive.
+        """
+        moments, axes = principal(tensor)
+        start = self.in_file((*self.start.flat, *(self.frame.xi or ())))
+        carried = None if self.top.rotor is None else self.in_file(self.top.rotor) if rotor is None else rotor
+        top = HeavyTop(
+            [Fraction(m) for m in moments],
+            1,
+            [Fraction(n) for n in axes.T @ moment],
+            rotor=None if carried is None else [Fraction(k) for k in axes.T @ carried],
+        )
+        return replace(self, top=top, frame=replace(self.frame, axes=axes)).starting(start)
 
     def supposed(
         self, times: Sequence[Fraction], top: HeavyTop | None = None, start: State | None = None
@@ -102,7 +161,9 @@ class Examined:
         """
         if any(abs(float(time)) * self.rate > FARTHEST for time in times):
             return None
-        return motion(top or self.top, start or self.start, self.system, times)
+        xi = self.frame.xi if self.system in WITH_ATTITUDE else None
+        found = motion(top or self.top, start or self.start, self.system, times, xi)
+        return None if found is None else (found.reshape(len(found), -1, 3) @ self.frame.axes.T).reshape(len(found), -1)
 
     def at(self, rows: Sequence[int]) -> Examined:
         """The same at other samples."""
@@ -120,10 +181,10 @@ class Examined:
             return self
         top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre, self.top.rotor)
         start = State([w / unit for w in self.start.omega], self.start.gamma)
-        other = motion(top, start, self.system, [time * unit for time in self.times])
+        other = replace(self, rate=self.rate / float(unit)).supposed([time * unit for time in self.times], top, start)
         if other is None:
             return self
-        states = other * ([float(unit)] * 3 + [1.0] * 3)
+        states = other * numpy.array([float(unit)] * 3 + [1.0] * (other.shape[1] - 3))
         far = replace(self, states=states).errors(truth) > _TRUSTED
         return self.at(self.rows[: int(numpy.argmax(far))]) if far.any() else self
 
@@ -132,20 +193,24 @@ class Examined:
         span = self.all_times[row + 1] - self.all_times[row]
         if abs(float(span)) * self.rate > FARTHEST:
             return None
-        values = [Fraction(value) for value in self.all_states[row]]
+        if numpy.isnan(self.all_states[row]).any():
+            return None
         try:
-            found = motion(self.top, State(values[:3], values[3:]), self.system, [span])
+            found = self.starting(self.all_states[row]).supposed([span])
         except HeavyTopError:  # beyond the numbers that a start may have
             return None
         return None if found is None else found[0]
 
     def errors(self, supposed: Array) -> Array:
         """The error of each state relative to the size of Ω and γ in the supposed ones, shape (n,)."""
-        off = numpy.abs(self.states - supposed)
+        width = min(self.states.shape[1], supposed.shape[1])
+        off = numpy.abs(self.states[:, :width] - supposed[:, :width])
         sizes = numpy.abs(supposed)
         omega = max(sizes[:, :3].max(), 1e-3 * self.rate) or 1.0
         gamma = sizes[:, 3:].max() or 1.0
-        found: Array = numpy.maximum(off[:, :3].max(axis=1) / omega, off[:, 3:].max(axis=1) / gamma)
+        # of what the file gives
+        largest = (numpy.fmax.reduce(part, axis=1) for part in (off[:, :3] / omega, off[:, 3:] / gamma))
+        found: Array = numpy.fmax(*largest)
         return found
 
     def error(self, supposed: Array | None) -> float:
@@ -161,13 +226,14 @@ def examined(
     start: State,
     system: System,
     times: Sequence[Fraction],
-    states: Sequence[Sequence[Fraction]],
+    states: Sequence[Sequence[Fraction | None]],
     worst: int | None = None,
+    frame: FileAxes | None = None,
 ) -> Examined | None:
     """At most :data:`MOST_SAMPLES` samples, over the first turns of the body, and ``worst`` where it is among these.
 
     Those where roundings of the start hide the motion are left out if enough remain.  None for numbers that no double
-    holds.
+    holds.  states: in the axes of ``frame``, principal ones without it; None for numbers that are not given.
     """
     units = _units(top, start)
     inertia, force = [i / units.inertia for i in top.inertia], units.inertia / units.time**2
@@ -175,23 +241,26 @@ def examined(
     top = HeavyTop(inertia, top.weight / force, top.centre, rotor)
     start = State([w * units.time for w in start.omega], start.gamma)
     times = [time / units.time for time in times]
-    scaled = [(*(w * units.time for w in state[:3]), *state[3:]) for state in states]
+    scaled = [(*(None if w is None else w * units.time for w in state[:3]), *state[3:]) for state in states]
     try:
-        array = numpy.array([[float(value) for value in state] for state in (start.flat, *scaled)])
+        array = numpy.array([[numpy.nan if value is None else float(value) for value in state] for state in scaled])
+        spin = numpy.linalg.norm(floats(start.omega))
         ends = [float(time) for time in times]
         moment = [float(value) for value in top.moment]
     except OverflowError:
         return None
-    if not len(states) or not numpy.isfinite(array).all():
+    if not len(states) or numpy.isinf(array).any() or numpy.isnan(array).all():
         return None
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
     carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
-    rate = float(max(numpy.linalg.norm(array[0, :3]), fall, carried)) or 1.0
+    rate = float(max(spin, fall, carried)) or 1.0
     early = sum(abs(time) * rate <= _TURNS for time in ends)
     last = max(early, min(len(ends), _FEW))
-    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
+    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | set(range(min(last, _FEW)))
     rows = sorted(some if worst is None or worst >= last else some | {worst})
-    found = Examined(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
+    found = Examined(
+        top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or FileAxes()
+    )
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
 
@@ -217,9 +286,16 @@ def _units(top: HeavyTop, start: State) -> Units:
     return Units(*(Fraction(10) ** round(power) if abs(power) > _USUAL else Fraction(1) for power in (-rate, size)))
 
 
-def motion(top: HeavyTop, start: State, system: System, times: Sequence[Fraction]) -> Array | None:
-    """States of heyoka in double at ``times``, shape (n, 6); None where it does not get there."""
-    found = numpy.empty((len(times), 6))
+def motion(
+    top: HeavyTop,
+    start: State,
+    system: System,
+    times: Sequence[Fraction],
+    xi: tuple[Fraction, ...] | None = None,
+) -> Array | None:
+    """States of heyoka in double at ``times``, shape (n, 6), or (n, 9) with ξ; None where it does not get there."""
+    first = [float(value) for value in (*start.flat, *(xi or ()))]
+    found = numpy.empty((len(times), len(first)))
     for sign in (1, -1):
         asked = {time: [] for time in sorted({t for t in times if sign * t > 0}, key=abs)}  # type: dict[Fraction, list[int]]
         if not asked:
@@ -228,15 +304,30 @@ def motion(top: HeavyTop, start: State, system: System, times: Sequence[Fraction
             if time in asked:
                 asked[time].append(row)
         try:
-            run = propagate(top, start, list(asked), DOUBLE, system=system, step_limit=_STEPS)
+            run = propagate(top, start, list(asked), DOUBLE, system=system, xi=xi, step_limit=_STEPS)
         except HeavyTopError:  # beyond the range of double, or a start that the system does not admit
             return None
         if run.outcome is not Outcome.SUCCESS:
             return None
         for rows, state in zip(asked.values(), run.states, strict=True):
             found[rows] = state
-    found[[row for row, time in enumerate(times) if time == 0]] = [float(value) for value in start.flat]
+    found[[row for row, time in enumerate(times) if time == 0]] = first
     return found
+
+
+def principal(tensor: Array) -> tuple[Array, Array]:
+    """Moments, and principal axes as the columns of a rotation: the axes given where the tensor is diagonal."""
+    if not (tensor - numpy.diag(numpy.diag(tensor))).any():
+        return numpy.diag(tensor), numpy.eye(3)
+    moments, axes = numpy.linalg.eigh((tensor + tensor.T) / 2)
+    if numpy.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes
+
+
+def floats(values: Sequence[Fraction]) -> Array:
+    """Exact numbers in double."""
+    return numpy.array([float(value) for value in values])
 
 
 def named(value: float, near: float) -> Fraction:

@@ -230,7 +230,18 @@ def _rounded_alike(new: Fraction, old: Fraction) -> bool:
 _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps", *observed_columns.KEYS}
-_NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
+_NOT_READ = {
+    "time_reached",
+    "order",
+    "flags",
+    "seconds",
+    "amplification",
+    "digits_lost",
+    "stability",
+    "metrics",
+    "attitude",
+    "angles",
+}
 _NOT_READ |= {
     "times_given",
     "xi",

@@ -1,0 +1,161 @@
+"""Files of engines of low order and of rotated bodies: one mistake named, right files not accused, in the axes of the
+file; the joint and the clock measured by themselves.
+"""
+
+import importlib.util
+import json
+import random
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from heavytop.features.score.measurement import Assessment
+from heavytop.features.score.text import to_json
+from support.in_process import heavytop
+
+FILE = Path(__file__).parents[3] / "validation" / "engine_files.py"
+SPEC = importlib.util.spec_from_file_location("engine_files", FILE)
+engine_files = importlib.util.module_from_spec(SPEC)
+sys.modules["engine_files"] = engine_files
+SPEC.loader.exec_module(engine_files)
+Log = engine_files.Log
+
+COARSE = replace(engine_files.random_engine(random.Random(5), "semi-implicit Euler"), step=1e-3, every=50, samples=12)
+FINE = replace(COARSE, method="Munthe-Kaas", step=0.005, every=40, omega=np.array([0.7, -0.4, 3.0]))
+VECTORS = ("omega", "gamma")
+
+
+def scored(engine: "engine_files.Engine", log: "engine_files.Log", tmp_path: Path) -> Assessment:
+    found = engine_files.scored(engine_files.written(engine, log), tmp_path)
+    json.dumps(to_json(found), allow_nan=False)
+    return found
+
+
+def kinds(found: Assessment) -> list[str]:
+    return [each.kind for each in found.diagnoses if each.kind != "columns_disagree"]
+
+
+def test_a_method_of_first_order_is_not_accused(tmp_path: Path) -> None:
+    found = scored(COARSE, Log(), tmp_path)
+    assert (kinds(found), found.digits_right < 4) == ([], True)
+
+
+@pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "tensor about the other point"])
+def test_a_mistake_in_a_file_of_first_order_is_named(mistake: str, tmp_path: Path) -> None:
+    named, build = engine_files.MISTAKES[mistake]
+    assert set(kinds(scored(*build(COARSE), tmp_path))) & set(named)
+
+
+def column(place: int, change: "engine_files.Change") -> "engine_files.Log":
+    """One component of Ω changed in every row but the start."""
+
+    def spoil(columns: dict, _: object) -> dict:
+        rows = [np.array(row) for row in columns["omega"]]
+        for row in rows:
+            row[place] = change(row[place])
+        return columns | {"omega": rows}
+
+    return Log(VECTORS, spoil=spoil)
+
+
+def of_columns(change: "engine_files.Change", *names: str) -> "engine_files.Log":
+    """Ω and γ, of which the vectors of those names are changed in every row."""
+    return Log(VECTORS, spoil=engine_files.each(change, *names))
+
+
+FRAMES = {
+    "principal": replace(FINE, tensor=np.diag([1.2, 0.9, 0.6]), centre=np.array([0.0, 0.0, 0.4])),
+    "rotated": FINE,
+}
+IN_FILE = {
+    "start": (Log(VECTORS, keys={"omega": "0.701,-0.4,3"}), {"Ω1": "0.7"}),
+    "column_constant": (column(1, lambda value: 0.25), {"column": "Ω2", "value": "0.25"}),
+    "column_scaled": (column(1, lambda value: 1.02 * value), {"column": "Ω2", "factor": "1.02"}),
+    "axes_permuted": (of_columns(lambda w: w[[1, 0, 2]], "omega"), {"of": "omega"}),
+    "no_gravity": (Log(VECTORS, keys={"gravity": "9.81"}), {}),
+    "gamma_down": (of_columns(np.negative, "gamma"), {"of": "columns"}),
+    "omega_reversed": (of_columns(np.negative, "omega"), {"of": "columns"}),
+    "omega_reversed+gamma_down": (of_columns(np.negative, *VECTORS), {"of": "columns"}),
+    "omega_in_degrees": (of_columns(np.degrees, "omega"), {"of": "columns"}),
+    "omega_scaled": (of_columns(lambda w: 1.1 * w, "omega"), {"factor": "1.1"}),
+    "gamma_scaled": (of_columns(lambda gamma: 1.1 * gamma, "gamma"), {"factor": "1.1"}),
+    "column_order": (
+        of_columns(lambda gamma: gamma * [1, -1, 1], "gamma"),
+        {"columns": "Ω1, Ω2, Ω3, γ1, −γ2, γ3"},
+    ),
+    "momentum": (
+        Log(VECTORS, spoil=lambda columns, e: columns | {"omega": [e.about_pivot() @ w for w in columns["omega"]]}),
+        {"of": "columns"},
+    ),
+    "columns_swapped": (
+        Log(VECTORS, spoil=lambda columns, _: {"omega": columns["gamma"], "gamma": columns["omega"]}),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("kind", IN_FILE)
+def test_everything_is_said_in_the_axes_of_the_file(kind: str, frame: str, tmp_path: Path) -> None:
+    log, numbers = IN_FILE[kind]
+    engine = FRAMES[frame]
+    if kind == "no_gravity":
+        engine = replace(engine, gravity=0.0)
+    (told,) = scored(engine, log, tmp_path).diagnoses
+    assert told.kind == kind
+    assert told.numbers.items() >= numbers.items()
+
+
+def test_the_joint_is_measured_without_a_contradiction(tmp_path: Path) -> None:
+    drift = engine_files.each(lambda position: position + 1e-3, "position")
+    found = scored(FINE, Log(("quaternion", "position"), spoil=drift), tmp_path)
+    assert "columns_disagree" not in [each.kind for each in found.diagnoses]
+    assert float(found.row.metrics["joint_violation_max"]) == pytest.approx(1e-3 * 3**0.5, rel=1e-3)
+
+
+def test_a_clock_that_adds_its_steps_up_is_named_and_the_digits_without_it(tmp_path: Path) -> None:
+    fine = replace(FINE, step=0.002, every=100)
+    right, found = (scored(fine, Log(times=times), tmp_path) for times in (Log().times, engine_files.sum_of_steps))
+    assert found.diagnoses[0].kind == "clock"
+    assert found.diagnoses[0].numbers["digits"] == f"{right.digits_right:.1f}"
+    assert found.digits_right < right.digits_right - 0.05
+
+
+@pytest.mark.parametrize("digits", [6, 24])
+def test_rounded_quaternions_are_said_to_be_rounded(digits: int, tmp_path: Path) -> None:
+    change = (lambda q: np.round(q, digits)) if digits == 6 else (lambda q: np.float32(q).astype(float))
+    fine = replace(FINE, step=0.002, every=100)
+    found = scored(fine, Log(("quaternion",), spoil=engine_files.each(change, "quaternion")), tmp_path)
+    assert [each.kind for each in found.diagnoses] == ["rounded"]
+
+
+@pytest.mark.parametrize(("engine", "mistake"), [(FINE, "half a step early"), (COARSE, "axes conjugated")])
+def test_half_a_step_early_and_conjugated_axes_are_named(
+    engine: "engine_files.Engine", mistake: str, tmp_path: Path
+) -> None:
+    named, build = (engine_files.MISTAKES | engine_files.SECOND)[mistake]
+    assert tuple(kinds(scored(*build(engine), tmp_path))) == named
+
+
+def test_a_rounded_quaternion_of_the_start_leaves_the_error_of_the_attitude_resolved(tmp_path: Path) -> None:
+    lines = engine_files.written(FINE, Log()).splitlines()
+    start = engine_files.text([0.0, *engine_files.quaternion(FINE.rotation), *FINE.omega])
+    lines.insert(1 + next(n for n, line in enumerate(lines) if line.startswith("t,")), start)
+    without, found = (
+        engine_files.scored(text, tmp_path) for text in (engine_files.written(FINE, Log()), "\n".join(lines))
+    )
+    for statistic in ("max", "rms"):
+        error = found.row.metrics[f"attitude_error_{statistic}"]
+        assert error.bound is None
+        assert float(error) == pytest.approx(float(without.row.metrics[f"attitude_error_{statistic}"]), rel=0.1)
+
+
+def test_no_digit_is_right_in_json_and_in_the_terminal_alike(tmp_path: Path) -> None:
+    content = engine_files.written(COARSE, of_columns(np.degrees, "omega"))
+    (tmp_path / "log.csv").write_text(content, "utf-8")
+    shown, as_json = (heavytop("score", str(tmp_path / "log.csv"), *options) for options in ((), ("--json",)))
+    assert json.loads(as_json.stdout)["digits_right"] == 0.0
+    assert "0.0 of 1" in shown.stdout

@@ -1,0 +1,374 @@
+"""Methods that keep a memory: orders are those of whole runs, restarts are judged by their error, and faults are found.
+
+Each as a peer and as a program, declared (``one_step = false``) and not: then too nothing false is said.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.cases import CASES
+from heavytop.errors import Unsupported
+from heavytop.features.kinds import KINDS
+from heavytop.features.local_error.kind import _said
+from heavytop.harness import integrator_check
+from heavytop.harness.checkpoint import Saved
+from heavytop.harness.plan import read
+from heavytop.harness.rows import Task, computed, measure
+from heavytop.integrate import registry
+from heavytop.integrate.peers.command import Command, close_all
+from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.registry import of_callable
+from heavytop.precision import DOUBLE
+from heavytop.records import Row, RowKey
+from heavytop.top.attitude import perpendicular
+from support import methods_with_memory as memory
+
+pytestmark = pytest.mark.slow
+FOLDER = Path(__file__).parents[1] / "support"
+CASE = CASES["lagrange"]
+KEPT_APART = ("leapfrog", "extrapolation", "corrected", "ab4")
+"""Whose single steps from a fresh start have the order of the method."""
+
+
+@pytest.fixture(autouse=True)
+def _programs_end():
+    yield
+    close_all()
+
+
+def program(name: str, **declared: object) -> Command:
+    line = (sys.executable, "-S", "-E", str(FOLDER / "methods_with_memory.py"), name)
+    return Command(name=name, command=line, setting="step", order=memory.METHODS[name][1], **declared)
+
+
+def forms(name: str):
+    """A method as it comes: whether it is declared, and the integrator."""
+    yield True, program(name, one_step=False)
+    yield True, of_callable(getattr(memory, f"{name}_declared"))
+    yield False, of_callable(getattr(memory, name))
+
+
+def row(integrator, kind: str = "local_error", times=(Fraction(2),), options=None, **setting: str) -> Row:
+    key = RowKey(kind, CASE.name, CASE.system.name, computed(integrator.name, **setting), "double", horizon="2")
+    task = Task(key, "", integrator.name, CASE, times, times, options, source=integrator)
+    return measure(KINDS[kind], task, Saved())
+
+
+@pytest.mark.parametrize("name", memory.HEALTHY)
+def test_the_order_of_a_method_with_a_memory_is_that_of_its_runs(name: str) -> None:
+    for declared, integrator in forms(name):
+        found = row(integrator)
+        order = str(memory.METHODS[name][1])
+        assert found.outcome == "success", found.reference.reason
+        assert found.metrics["observed_order_runs"].value == order
+        assert ("local_error_ulp_max" in found.metrics) is not declared
+        said = _said(found)
+        assert f"its order is {order}, as it says" in said
+        assert "not the" not in said
+        assert "wrongly" not in said
+        assert ("one_step = false" in said) == (not declared and name not in KEPT_APART)
+
+
+@pytest.mark.parametrize("name", memory.FAULTY)
+def test_a_wrong_order_is_found_whatever_is_declared(name: str) -> None:
+    for _, integrator in forms(name):
+        found = row(integrator)
+        order = memory.METHODS[name][1]
+        assert int(found.metrics["observed_order_runs"].value) < order
+        assert f", not the {order} that it says" in _said(found)
+
+
+@pytest.mark.parametrize("name", memory.HEALTHY)
+def test_the_contract_accuses_no_method_with_a_memory(name: str) -> None:
+    for declared, integrator in forms(name):
+        contract = integrator_check._Contract(integrator)
+        tried = "one time", "times [0]", "restart", "rest", "steps", "between steps"
+        parts = {part: integrator_check._judged(part, call) for part, call in contract.parts() if part in tried}
+        assert {each.verdict for each in parts.values()} <= {"kept", "note"}
+        begins_anew = not declared and name not in ("extrapolation",)
+        assert parts["restart"].verdict == ("note" if begins_anew else "kept")
+        assert ("declare one_step = false" in parts["restart"].text) is begins_anew
+
+
+def test_a_restart_that_its_error_does_not_explain_is_violated() -> None:
+    def solve(given):
+        found = memory.solver(memory.METHODS["ab4"][0])(given)
+        again = given.start[0] != float(CASES["generic"].start.omega[0])
+        return replace(found, states=[[a + 1e-6 * again for a in y] for y in found.states])
+
+    contract = integrator_check._Contract(of_callable(double_peer("mine", 4, solve, "step", one_step=False)))
+    found = integrator_check._judged("restart", contract._restart)
+    assert (found.verdict, "times the error of the first" in found.text) == ("violated", True)
+
+
+def test_what_draws_its_numbers_is_judged_within_its_error() -> None:
+    """A probabilistic solver moves a top at rest, and begins anew with another uncertainty."""
+
+    def solve(given):
+        found = memory.solver(memory.METHODS["ab2"][0])(given)
+        drawn = [1e-6 * ((17 * i) % 7 - 3) for i in range(6)]
+        return replace(found, states=[[a + b for a, b in zip(y, drawn, strict=True)] for y in found.states])
+
+    contract = integrator_check._Contract(of_callable(double_peer("drawn", 2, solve, "step", one_step=False)))
+    assert integrator_check._judged("restart", contract._restart).verdict == "kept"
+    rest = integrator_check._judged("rest", contract._rest)
+    assert (rest.verdict, "its error on a motion explains" in rest.text) == ("note", True)
+
+
+def test_what_keeps_a_memory_under_a_tolerance_has_no_single_steps() -> None:
+    solve = memory.solver(memory.METHODS["ab4"][0])
+    peer = of_callable(double_peer("adaptive", 4, lambda given: solve(replace(given, setting=0.01)), one_step=False))
+    found = row(peer)
+    assert (found.outcome, "there is no order" in found.reference.reason) == ("unsupported", True)
+
+
+def test_work_against_precision_shows_the_order_and_takes_restarts_at_samples_for_what_they_are(tmp_path: Path) -> None:
+    """With a sample each step nothing but the starting method is at work, which is 50 times as right as the run."""
+    module = FOLDER / "methods_with_memory.py"
+    (tmp_path / "mine.py").write_text(module.read_text("utf-8"))
+    (tmp_path / "plan.toml").write_text(
+        'name = "p"\n[[measure]]\nkind = "work_precision"\ncases = ["lagrange"]\nhorizon = "2"\nsamples = 20\n'
+        'ladders = [{ integrator = "./mine.py:ab4_declared", steps = ["1/10", "1/20", "1/40"] }]\n'
+    )
+    tasks = read(str(tmp_path / "plan.toml"), KINDS)[2]
+    rows = [measure(KINDS["work_precision"], task, Saved()) for task in tasks]
+    assert [each.outcome for each in rows] == ["success"] * 3, [each.reference.reason for each in rows]
+    text = "\n".join(str(block) for block in KINDS["work_precision"].document(rows))
+    assert "order seen" in text
+    assert "(declared: 4)" in text
+
+
+# Other declarations.
+
+
+def test_the_steps_of_a_fixed_grid_divide_every_time_or_the_row_is_unsupported() -> None:
+    seen = []
+
+    def solve(given):
+        seen.append((given.setting, given.times.tolist()))
+        return memory.solver(memory.METHODS["ab4"][0])(given)
+
+    peer = registry.ready(
+        of_callable(double_peer("grid", 4, solve, "step", fixed_grid=True)), ("step", Fraction(1, 30))
+    )
+    for times in (
+        [Fraction(i, 5) for i in range(1, 11)],
+        [Fraction(1, 4), Fraction(1), Fraction(3, 2)],
+        [Fraction(2, 7)],
+    ):
+        peer(CASE.top, CASE.start, times, DOUBLE)
+        step, asked = seen[-1]
+        assert 1 / 60 < step <= 1 / 30 + 1e-12
+        assert all(abs(time / step - round(time / step)) < 1e-9 for time in asked)
+    with pytest.raises(Unsupported, match="no multiples of a step near 0"):
+        peer(CASE.top, CASE.start, [Fraction("0.1234"), Fraction(1)], DOUBLE)
+    with pytest.raises(Unsupported, match="no multiples"):
+        registry.ready(program("ab4", fixed_grid=True))(
+            CASE.top, CASE.start, [Fraction("0.12345"), Fraction(1)], DOUBLE
+        )
+
+
+def test_a_start_where_coordinates_are_singular_is_unsupported_and_the_check_takes_another() -> None:
+    down = program("ab4", singular_at=(("0", "0", "1"), (0, 0, -1.0)))
+    case = CASES["pendulum"]
+    with pytest.raises(Unsupported, match="coordinates are singular at this start"):
+        registry.ready(down)(case.top, replace(case.start, gamma=(Fraction(0), Fraction(0), Fraction(1))), [1], DOUBLE)
+    contract = integrator_check._Contract(down)
+    assert contract.axis == (0, 1, 0)
+    assert integrator_check._judged("rest", contract._rest).verdict == "kept"
+    with pytest.raises(Exception, match="the zero vector"):
+        registry.command_of({"name": "a", "command": ["b"], "singular_at": [[0, 0, 0]]}, Path(), "here")
+
+
+QUATERNION = """
+import sys
+from math import ceil
+sys.path.insert(0, {source!r})
+from heavytop.top.attitude import matrix_of_quaternion
+from heavytop.top.equations import HEAVY_TOP, Parameters
+
+given = {{}}
+for line in sys.stdin:
+    key, *words = line.split()
+    given[key] = words
+    if key == "heavytop-integrator":
+        print("ready quaternions 1", flush=True)
+    if key == "go":
+        inertia, moment, y, q = (list(map(float, given[part])) for part in ("inertia", "moment", "state", "quaternion"))
+        p, h, t = Parameters(inertia, moment, 0.0), float(given.get("setting", ["0.01"])[0]), 0.0
+        y = y[:3] + q
+
+        def field(y):
+            w, *v = y[3:]
+            a, b, c = y[:3]
+            rates = HEAVY_TOP.field(p, (*y[:3], *matrix_of_quaternion(y[3:])[2]))[:3]
+            turned = (-v[0]*a - v[1]*b - v[2]*c, w*a + v[1]*c - v[2]*b, w*b + v[2]*a - v[0]*c, w*c + v[0]*b - v[1]*a)
+            return [*rates, *(each / 2 for each in turned)]
+
+        for text in given["times"][1:]:
+            n = max(1, ceil(abs(float(text) - t) / h))
+            d = (float(text) - t) / n
+            for _ in range(n if float(text) != t else 0):
+                k1 = field(y)
+                k2 = field([a + d / 2 * b for a, b in zip(y, k1)])
+                k3 = field([a + d / 2 * b for a, b in zip(y, k2)])
+                k4 = field([a + d * b for a, b in zip(y, k3)])
+                y = [a + d / 6 * (e + 2*f + 2*g + i) for a, e, f, g, i in zip(y, k1, k2, k3, k4)]
+            t = float(text)
+            print("state", text, *map(repr, y))
+        print("done", flush=True)
+    if key == "quit":
+        break
+"""
+
+
+def test_a_program_and_a_peer_that_compute_with_a_quaternion(tmp_path: Path) -> None:
+    (tmp_path / "q.py").write_text(QUATERNION.format(source=str(Path(__file__).parents[2] / "src")))
+    line = (sys.executable, "-S", "-E", str(tmp_path / "q.py"))
+    mine = Command(name="q", command=line, setting="step", order=4, attitude="quaternion")
+
+    def solve(given):
+        found = list(memory.states(rk4, given.field, given.start.tolist(), given.times.tolist(), given.setting))
+        return Solved([y for y, _ in found], given.times[-1], found[-1][1])
+
+    def rk4(f, y, h):
+        while True:
+            y = memory.rk4(f, y, h)
+            yield y
+
+    peer = of_callable(double_peer("q", 4, solve, "step", attitude="quaternion"))
+    case = CASES["generic"]
+    xi = tuple(map(Fraction, perpendicular(case.start.gamma)))
+    for which in (mine, peer):
+        run = registry.ready(which)(case.top, case.start, [1, 2], DOUBLE, xi=xi)
+        known = registry.ready("heyoka")(case.top, case.start, [1, 2], DOUBLE, xi=xi)
+        assert abs(run.to_numpy() - known.to_numpy()).max() < 1e-6
+        found = {each.check: each for each in integrator_check.check(which)}
+        assert not [each for each in found.values() if each.verdict == "violated"], found
+        assert found["times [0]"].text.startswith("Asked for t = 0 it gives the start")
+
+
+def test_a_start_may_be_off_by_the_rounding_of_its_representation_and_a_run_to_0_be_refused() -> None:
+    def refuses(top, start, times, precision, *, system, step=None):
+        if times == (0,):
+            raise ValueError("no time to go")
+        return registry.ready("splitting:2")(top, start, times, precision, system=system)
+
+    contract = integrator_check._Contract(of_callable(refuses))
+    refused = integrator_check._judged("times [0]", contract._start_alone)
+    assert (refused.verdict, "as it may" in refused.text) == ("note", True)
+    given = [float(value) for value in contract._problem().start.flat]
+    assert contract._off_start(given) == ""
+    assert "as its representation rounds it" in contract._off_start([a * (1 + 4e-16) for a in given])
+    with pytest.raises(integrator_check._Violated):
+        contract._off_start([a * (1 + 1e-12) for a in given])
+
+
+# Steps, counts, and what lies between steps.
+
+
+def dopri(given, between, tiny=False):
+    """Of order 5, with a tolerance and an interpolant."""
+    import numpy
+
+    rows = [
+        [],
+        [1 / 5],
+        [3 / 40, 9 / 40],
+        [44 / 45, -56 / 15, 32 / 9],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+    errors = [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+    end = given.times[-1]
+    y, t, h = numpy.array(given.start), 0.0, numpy.copysign(0.01, end)
+    nodes, times, wanted = [(0.0, y)], [], given.times.tolist()
+    while t != end:
+        now = end - t if abs(end - t) <= abs(h) else h
+        k = []
+        for row_ in rows:
+            k.append(numpy.array(given.field((y + now * sum(a * b for a, b in zip(row_, k, strict=True))).tolist())))
+        wrong = abs(now * sum(a * b for a, b in zip(errors, k, strict=True))).max()
+        new = y + now * sum(a * b for a, b in zip(rows[6], k[:6], strict=True))
+        size = max(wrong / given.setting / (1 + abs(y).max()), 1e-8)
+        if size <= 1:
+            t = end if now == end - t else t + now
+            y = new
+            nodes.append((t, y))
+        h = now * min(5, max(0.2, 0.9 * size**-0.2))
+    for at in wanted:
+        n = next(i for i in range(1, len(nodes)) if abs(nodes[i][0]) >= abs(at))
+        times.append(between(given.field, *nodes[n - 1], *nodes[n], at))
+    return Solved(times, end, len(nodes) - 1)
+
+
+def linear(field, t0, y0, t1, y1, at):
+    s = (at - t0) / (t1 - t0)
+    return (1 - s) * y0 + s * y1
+
+
+def cubic(field, t0, y0, t1, y1, at):
+    import numpy
+
+    h, s = t1 - t0, (at - t0) / (t1 - t0)
+    f0, f1 = (numpy.array(field(y.tolist())) for y in (y0, y1))
+    return linear(field, t0, y0, t1, y1, at) + s * (s - 1) * ((1 - 2 * s) * (y1 - y0) + (s - 1) * h * f0 + s * h * f1)
+
+
+@pytest.mark.parametrize(
+    ("between", "order", "verdict"),
+    [(linear, 5, "violated"), (linear, 2, "note"), (cubic, 5, "note"), (linear, 0, "note")],
+)
+def test_what_lies_between_steps_is_tried_beside_the_order(between, order, verdict) -> None:
+    peer = double_peer("dense", order, lambda given: dopri(given, between))
+    found = integrator_check._judged("between", integrator_check._Contract(of_callable(peer))._between_steps)
+    assert (found.verdict, "between steps" in found.text) == (verdict, True)
+
+
+def test_a_count_that_explains_no_error_is_said_and_no_failure() -> None:
+    """Many steps too many make single steps short: a row says so, and accuses nobody."""
+    honest = double_peer("honest", 5, lambda given: dopri(given, cubic))
+    many = double_peer("many", 5, lambda given: replace(found := dopri(given, cubic), steps=1000 * found.steps))
+    said = [_said(row(of_callable(peer), times=(Fraction(1, 4),))) for peer in (honest, many)]
+    assert ["do not explain" in text for text in said] == [False, False]
+
+
+def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
+    """A Lie group method turns a body steadily without an error, in whatever steps."""
+    from heavytop.integrate.heyoka.motions import propagate
+
+    def exactly(top, start, times, precision, *, system, step=None):
+        run = propagate(top, start, times, precision, system=system)
+        return replace(run, order=1, steps=20, flags={})
+
+    found = row(of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), step="1/10")
+    assert found.outcome == "success", found.reference.reason
+    assert found.explained.kind == "steps"
+    assert "it is exact on this motion, or takes more steps than it counts" in found.explained.text
+
+
+def test_a_step_that_underflows_is_a_note_that_says_what_was_asked(tmp_path: Path) -> None:
+    """The motion with |Ω| = 1e150 makes the steps of a textbook method shrink for ever."""
+    text, source = (FOLDER / "methods_with_memory.py").read_text("utf-8"), str(Path(__file__).parents[2] / "src")
+    stuck = "            counts = [0]\n            while max(map(abs, y)) > 1e9:\n                step /= 2\n"
+    assert text.count("            counts = [0]\n") == 1
+    text = text.replace("            counts = [0]\n", stuck).replace(
+        'str(Path(__file__).parents[2] / "src")', repr(source)
+    )
+    (tmp_path / "m.py").write_text(text)
+    which = msgspec.structs.replace(program("ab4"), command=(sys.executable, "-S", "-E", str(tmp_path / "m.py"), "ab4"))
+    contract = integrator_check._Contract(which)
+    assert integrator_check._judged("one", contract._one_time).verdict == "kept"
+    found = integrator_check._judged("huge", contract._huge)
+    assert (found.verdict, found.text) == (
+        "note",
+        "At |Ω| = 1e150, t = 1 it gives no finite state: ab4 did not say done within 2 s",
+    )
