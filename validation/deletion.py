@@ -2,10 +2,10 @@
 
     python -m validation.deletion [FEATURE ...] [--few] [--plant]
 
-Copies the checkout, removes the package of a feature, its line in the registry, its tables in the plans that ship and
-the tests that name it or what it adds.  In the copy every module is imported, the smoke plan is run, and quick tests
-that are left pass; with --few some of the rooms that all share.  --plant lets a shared room import the feature first,
-which has to be found.  Exit 1 where one cannot be deleted.
+Copies the checkout, removes the package of a feature, its line in the registry, its tables and rows in the plans and
+reports that ship, and the tests that name it or what it adds.  In the copy every module is imported, the smoke plan is
+run, and the quick tests that are left pass; with --few some of the rooms that all share.  --plant lets a shared room
+import the feature first, which has to be found.  Exit 1 where one cannot be deleted.
 """
 
 from __future__ import annotations
@@ -20,11 +20,15 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
+
 from heavytop.feature import Feature
 from heavytop.features import FEATURES, NAMES
+from heavytop.features.kinds import KINDS
+from heavytop.report.store import store
 
 ROOT = Path(__file__).parents[1]
-_LINKED = ("docs", "results", "examples", "benchmarks", "validation", "tools", "constraints", "pyproject.toml")
+_LINKED = ("docs", "examples", "benchmarks", "validation", "tools", "constraints", "pyproject.toml")
 _FEW = ("test_layers.py", "test_cli_help.py", "test_one_door.py", "report/test_compare.py", "harness/test_plan.py")
 _IMPORTS = """
 import importlib, pathlib, pkgutil, sys, heavytop
@@ -103,6 +107,15 @@ def delete(copy: Path, name: str, feature: Feature) -> None:
     kinds = {feature.load(kind).name for kind in feature.kinds}
     for plan in (copy / "src/heavytop/harness/plans").glob("*.toml"):
         plan.write_text(without_kinds(plan.read_text("utf-8"), kinds), "utf-8")
+    for report in (ROOT / "results").iterdir():
+        (copy / "results").mkdir(exist_ok=True)
+        if kinds and (report / store.FILE).exists():
+            whole = store.read(report, KINDS)
+            (copy / "results" / report.name).mkdir()
+            left = [row for row in whole.rows if row.key.kind not in kinds]
+            store.write(msgspec.structs.replace(whole, rows=left), copy / "results" / report.name)
+        else:
+            (copy / "results" / report.name).symlink_to(report)
     shutil.rmtree(copy / "tests/features" / name, ignore_errors=True)
     words = "|".join(map(re.escape, added(feature)))
     naming = re.compile(rf"""features\.{name}\b|kind *= *['"]({words})\b|['"]({words})['"]|\bht\.({words})\b""")
