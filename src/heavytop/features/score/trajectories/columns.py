@@ -15,6 +15,12 @@ from flint import arb
 from heavytop import written_numbers
 from heavytop.errors import InputError, quoted
 from heavytop.exact.flint.balls import midpoint, working_precision
+from heavytop.features.score.trajectories.logs import (
+    canonical,
+    quaternions_of,
+    quaternions_of_vectors,
+    require_understood,
+)
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
 from heavytop.precision import Vector, dot, exact, log10, vector
@@ -27,6 +33,8 @@ _PATTERNS = tuple(
     for quantity, pattern in (
         ("quaternion", r"(?:q|quat|quaternion)([wxyz0-4])"),
         ("matrix", r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])"),
+        ("rodrigues", r"(?:sigma|mrp|σ)([xyz123])"),
+        ("rotation_vector", r"(?:rotvec|rotationvector|rv)([xyz123])"),
         ("framed", r"w([xyz])"),
         ("omega_space", r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])"),
         ("omega", r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])"),
@@ -53,7 +61,7 @@ _NAMES = {
 """Names of single components, before :data:`_PATTERNS`."""
 _AXES = {"x": "1", "y": "2", "z": "3"}
 _CLASSIC = ("p", "q", "r")
-_TIME = ("t", "time")
+_TIME = ("t", "time", "timestamp", "stamp")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
 """Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
 _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
@@ -114,8 +122,12 @@ class Header:
         return found
 
 
-def header(names: Sequence[str]) -> Header:
-    """The meaning of every column; raises InputError for one that stands twice."""
+def header(names: Sequence[str], joint: str = "") -> Header:
+    """The meaning of every column; raises InputError for one that stands twice.
+
+    joint: of columns qpos and qvel, "free" or "ball".
+    """
+    names = [canonical(name, joint) for name in names]
     found: dict[str, dict[str, int]] = {}
     time, angles, others = None, set(), []
     units: dict[str, set[Unit]] = {}
@@ -149,6 +161,7 @@ def header(names: Sequence[str]) -> Header:
         found["quaternion"] = together
     for name in others:
         _require_no_quantity(name, found)
+    require_understood(others, [*found])
     return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
 
 
@@ -277,9 +290,13 @@ def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) ->
 
 
 def _words(quantity: str) -> str:
-    return {"omega_space": "angular velocity in space axes", "framed": "angular velocity", "euler": "Euler angles"}.get(
-        quantity, quantity
-    )
+    return {
+        "omega_space": "angular velocity in space axes",
+        "framed": "angular velocity",
+        "euler": "Euler angles",
+        "rodrigues": "modified Rodrigues parameters",
+        "rotation_vector": "rotation vector",
+    }.get(quantity, quantity)
 
 
 def cell(text: str, where: str) -> Fraction | None:
@@ -414,6 +431,9 @@ def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     return found
 
 
+_TO_QUATERNION = {"rodrigues": quaternions_of, "rotation_vector": quaternions_of_vectors}
+
+
 def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     header, cells, lines = document["header"], document["cells"], document["lines"]
     space, last = in_space(document), said.quaternion_order == "xyzw"
@@ -435,13 +455,17 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
         places[name] = ordered
         if quantity in header.units and quantity != "position":  # of which the body decides
             units[name] = header.units[quantity]
-    values: dict[str, list[tuple[Fraction, ...] | None]] = {name: [] for name in WIDTHS if name in places}
+    values: dict[str, list[tuple[Fraction, ...] | None]] = {n: [] for n in (*WIDTHS, *_TO_QUATERNION) if n in places}
     for number, row in zip(lines, cells, strict=True):
         for name in values:
             values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
     texts = [row[place] for row in cells for name in values for _, place in places[name]]
     for name, unit in units.items():
         values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
+    for name in _TO_QUATERNION.keys() & values.keys():
+        if "quaternion" in values:
+            raise InputError(f"A quaternion and the {_words(name)} both give the attitude.", "Give one of them.")
+        values["quaternion"] = _TO_QUATERNION[name](values.pop(name) or [], last)
     return ColumnTable(values, texts, [f"line {number}" for number in lines])
 
 

@@ -18,6 +18,7 @@ from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features.score.trajectories import columns as observed_columns
+from heavytop.features.score.trajectories import logs
 from heavytop.features.score.trajectories.observed import (
     LONGEST_NAME,
     AnyBody,
@@ -95,9 +96,15 @@ class TextTable:
         first = _cells(body[0], separator)
         if not _is_number(first[0]):
             header, body, self.lines = first, body[1:], self.lines[1:]
-        names = self._without_header(len(first)) if header is None else header
+        names = self._without_header(first) if header is None else header
         self.cells = _split(body, self.lines, separator, len(names))
-        found = observed_columns.header(names)
+        names, self.cells, notes = logs.with_one_time(names, self.cells)
+        self.notes += notes
+        if self.keys.get("attitude") == "rotation vector":
+            names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
+        found = observed_columns.header(names, str(self.keys.get("joint", "")))
+        if found.time is not None:
+            self._without_repeats(found.time)
         units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
         said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
         self.notes += [f"as the header says, {', '.join(said)}"] if said else []
@@ -127,8 +134,20 @@ class TextTable:
         self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
         return True
 
-    def _without_header(self, width: int) -> Sequence[str]:
-        """The columns of a table that does not name them."""
+    def _without_repeats(self, place: int) -> None:
+        """Leave out rows that repeat one, and those behind a time that goes back."""
+        times = [time for row in self.cells if (time := logs.number(row[place])) is not None]
+        if len(times) == len(self.cells):
+            kept, notes = logs.without_repeats(times, self.cells, self.lines)
+            self.cells, self.lines = [self.cells[i] for i in kept], [self.lines[i] for i in kept]
+            self.notes += notes
+
+    def _without_header(self, first: Sequence[str]) -> Sequence[str]:
+        """The columns of a table that does not name them, by its first row."""
+        width = len(first)
+        if width == len(logs.TUM) and logs.is_unit(first[-4:]):
+            self.notes.append(f"there is no header; the columns are taken as {' '.join(logs.TUM)}")
+            return logs.TUM
         if width != len(COLUMNS):
             raise InputError(
                 f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
@@ -272,10 +291,12 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     shown_path = str(path)[:LONGEST_NAME]
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"{shown_path} is neither .json nor .csv.", REMEDY)
+        raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
     try:
         content = sys.stdin.buffer.read() if piped else read_whole(path)
-        text = _decoded(content)
+        text = logs.of_arrays(content, suffix) if (suffix := path.suffix.lower()) in _ARRAYS else _decoded(content)
+        if logs.is_ephemeris(text):
+            text = logs.of_ephemeris(text)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", REMEDY) from None
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
@@ -289,7 +310,8 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
 
-_SUFFIXES = (".json", ".csv", ".tsv", ".dat")
+_ARRAYS = (".npy", ".npz", ".parquet")
+_SUFFIXES = (".json", ".csv", ".tsv", ".dat", ".txt", ".tum", ".aem", *_ARRAYS)
 
 
 def _decoded(content: bytes) -> str:
@@ -317,7 +339,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
         raise InputError("This is no text: it holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
-    table = TextTable(text, sorted(_KEYS - {"times", "states"}))
+    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}))
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}

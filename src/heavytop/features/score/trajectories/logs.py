@@ -1,0 +1,270 @@
+"""Logs as robots, spacecraft and simulators write them, as the tables that this package reads.
+
+TUM trajectories, exports of ROS, Foxglove and MuJoCo, attitude ephemeris messages (CCSDS 504.0-B, KVN), arrays of NumPy
+and Parquet.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from fractions import Fraction
+from io import BytesIO
+from typing import Any
+
+from heavytop.errors import InputError, quoted
+from heavytop.precision import decimal_text, exact_text
+
+TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
+_STAMP = re.compile(r"(?:.*[./])?(?:header[./])?stamp[./](secs?|n(?:ano)?secs?)", re.IGNORECASE)
+_EPOCHS = ("timestamp", "stamp", "epoch")
+"""Columns of times that are counted from their first row."""
+_ALIASES = tuple(
+    (re.compile(rf"(?:.*[./])?{pattern}", re.IGNORECASE), name)
+    for pattern, name in (
+        (r"(?:quat(?:ernion)?|orientation|rotation|attitude)[._]([wxyz])", "q{}"),
+        (r"(?:position|translation|pos)[._]([xyz])|t([xyz])", "p{}"),
+        (r"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?)[._]([xyz])", "w{}"),
+        (r"(?:sim_?time|time_?s|elapsed)", "t"),
+        (r"(?:timestamp|stamp)", "timestamp"),
+    )
+)
+_JOINTS = {"free": (3, 3), "ball": (0, 0)}
+"""Where the quaternion stands in qpos of MuJoCo, and the angular velocity, of the body, in qvel."""
+_INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
+_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+_LOOKS = re.compile(r"quat|orient|attitude|omega|angular_?vel|angvel|gyro|rodrigues", re.IGNORECASE)
+_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_|desired|target|cmd|ref)", re.IGNORECASE)
+
+
+def canonical(name: str, joint: str = "") -> str:
+    """The name of a column as this program writes it; the name itself where it is no alias.
+
+    joint: "free" or "ball", of the columns qpos and qvel of MuJoCo.
+    """
+    text = name.strip()
+    if (match := _INDEX.fullmatch(text)) and joint in _JOINTS:
+        number = int(match[2]) - _JOINTS[joint][match[1].lower() == "qvel"]
+        if match[1].lower() == "qpos":
+            return f"q{'wxyz'[number]}" if 0 <= number < 4 else f"p{'xyz'[number + 3]}" if -3 <= number < 0 else text
+        return f"omega{number + 1}" if 0 <= number < 3 else text
+    for pattern, plain in _ALIASES:
+        if match := pattern.fullmatch(text):
+            return plain.format(next((group.lower() for group in match.groups() if group), ""))
+    return text
+
+
+def require_understood(others: Sequence[str], quantities: Sequence[str]) -> None:
+    """Raises InputError for a column that looks like an attitude or Ω and is not read, where no other gives one."""
+    if any(quantity in quantities for quantity in ("quaternion", "matrix", "euler", "omega", "omega_space", "framed")):
+        return
+    for name in others:
+        if _LOOKS.search(name) and not _OTHER.match(name):
+            raise InputError(
+                f"The column {quoted(name)} looks like an attitude or an angular velocity, and is not understood.",
+                "Call quaternions qw,qx,qy,qz, Ω omega1,omega2,omega3 and matrices R11 to R33.",
+            )
+        if _INDEX.fullmatch(name):
+            raise InputError(
+                f"The column {quoted(name)} is of a joint that is not said.",
+                "Add the line `# joint: free` or `# joint: ball` above the columns.",
+            )
+
+
+def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]], list[str]]:
+    """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row."""
+    names = list(names)
+    parts = {
+        match[1].lower()[0]: place for place, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
+    }
+    if parts.keys() == {"s", "n"}:
+        seconds, nano = parts["s"], parts["n"]
+        for row in cells:
+            row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
+        names[seconds], names[nano] = "timestamp", "nanosec"
+    place = next((place for place, name in enumerate(names) if canonical(name) in _EPOCHS), None)
+    if place is None:
+        return names, cells, []
+    names[place] = "t"
+    first = number(cells[0][place])
+    if not first:
+        return names, cells, []
+    for row in cells:
+        if (value := number(row[place])) is not None:
+            row[place] = exact_text(value - first)
+    return names, cells, [f"times are counted from the first row, {decimal_text(first, 20)}"]
+
+
+def number(text: str) -> Fraction | None:
+    """A decimal number; None for any other text, of which the reading of the column says what is wrong."""
+    return Fraction(text.strip()) if _DECIMAL.fullmatch(text.strip()) else None
+
+
+def is_unit(texts: Sequence[str]) -> bool:
+    """Whether four numbers are of length 1, to 1 %: those of a quaternion."""
+    values = [number(text) for text in texts]
+    return None not in values and abs(sum(float(value or 0) ** 2 for value in values) - 1) < 0.02
+
+
+def without_repeats(
+    times: Sequence[Fraction], rows: list[list[str]], lines: Sequence[int]
+) -> tuple[list[int], list[str]]:
+    """Which rows are kept, and notes: of rows that repeat one the first; none behind a time that goes back.
+
+    Raises InputError for two rows at one time that differ.
+    """
+    kept: list[int] = []
+    repeated = 0
+    for index, time in enumerate(times):
+        if kept and time == times[kept[-1]]:
+            if rows[index] != rows[kept[-1]]:
+                raise InputError(
+                    f"Lines {lines[kept[-1]]} and {lines[index]} are of one time and differ.",
+                    "Give one row for each time: before an event, or behind it.",
+                )
+            repeated += 1
+            continue
+        if len(kept) > 1 and (time - times[kept[-1]]) * (times[kept[1]] - times[kept[0]]) < 0:
+            note = f"the time goes back at line {lines[index]}: what came before is scored, {len(kept)} rows"
+            return kept, [*_repeats(repeated), note]
+        kept.append(index)
+    return kept, _repeats(repeated)
+
+
+def _repeats(count: int) -> list[str]:
+    return [f"{count} rows that repeat the one before are left out"] if count else []
+
+
+def quaternions_of(parameters: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
+    """Of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²), exact; the shadow set gives the same rotation."""
+    return [None if s is None else _ordered(_of_rodrigues(s), scalar_last) for s in parameters]
+
+
+def _of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    square = sum((value * value for value in s), Fraction(0))
+    return ((1 - square) / (1 + square), *(2 * value / (1 + square) for value in s))
+
+
+def quaternions_of_vectors(vectors: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
+    """Of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
+    from flint import arb, fmpq
+
+    from heavytop.exact.flint.balls import midpoint, working_precision
+
+    def quaternion(v: Sequence[Fraction]) -> tuple[Fraction, ...]:
+        if not any(v):
+            return Fraction(1), Fraction(0), Fraction(0), Fraction(0)
+        with working_precision(240):
+            half = arb(sum(fmpq(x.numerator, x.denominator) ** 2 for x in v)).sqrt() / 2
+            sine = midpoint(half.sin() / (2 * half))
+            return midpoint(half.cos()), *(sine * x for x in v)
+
+    return [None if v is None else _ordered(quaternion(v), scalar_last) for v in vectors]
+
+
+def _ordered(q: tuple[Fraction, ...], scalar_last: bool) -> tuple[Fraction, ...]:
+    return (*q[1:], q[0]) if scalar_last else q
+
+
+def is_ephemeris(text: str) -> bool:
+    """Whether a text is an attitude ephemeris message."""
+    return text.lstrip().startswith("CCSDS_AEM_VERS")
+
+
+def of_ephemeris(text: str) -> str:
+    """An attitude ephemeris message of quaternions as a table; its COMMENT lines are comments.
+
+    Raises InputError for several segments, another kind of attitude, and an epoch that is none.
+    """
+    if text.count("META_START") != 1:
+        raise InputError(f"The message has {text.count('META_START')} segments.", "Give one.")
+    meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
+    kind = meta.get("ATTITUDE_TYPE", "").upper()
+    if not kind.startswith("QUATERNION"):
+        raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not read.", "Write the message with QUATERNION.")
+    first = meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
+    order = ["qw", "qx", "qy", "qz"] if first else ["qx", "qy", "qz", "qw"]
+    if kind == "QUATERNION/RATE":
+        order += ["omega1", "omega2", "omega3"]
+    inertial_first = meta.get("ATTITUDE_DIR", "A2B").upper() == "A2B"
+    lines = [f"# {line.strip()[7:].strip()}" for line in text.splitlines() if line.strip().startswith("COMMENT")]
+    if not inertial_first:
+        lines.append("# quaternion: space_to_body")
+    data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
+    rows = [line.split() for line in data if line.strip() and not line.strip().startswith("COMMENT")]
+    start = _epoch(rows[0][0]) if rows else Fraction(0)
+    lines.append(",".join(["t", *order]))
+    lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
+    return "\n".join(lines)
+
+
+def _epoch(text: str) -> Fraction:
+    """Seconds of an epoch, calendar date or day of the year, exactly."""
+    whole, _, part = text.rstrip("Z").partition(".")
+    for pattern in ("%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S"):
+        try:
+            seconds = int(datetime.strptime(whole, pattern).replace(tzinfo=UTC).timestamp())
+        except ValueError:
+            continue
+        return seconds + Fraction(f"0.{part or 0}")
+    raise InputError(f"{quoted(text)} is not an epoch.", "Write it as 2026-01-31T12:00:00.5.")
+
+
+def of_arrays(content: bytes, suffix: str) -> str:
+    """A .npy of seven columns, a .npz of arrays of one length by their names, or a Parquet table, as CSV.
+
+    Numbers are written so that they are read back the same.  Raises InputError for other shapes.
+    """
+    import numpy
+
+    if suffix == ".parquet":
+        import pyarrow.parquet
+
+        table = pyarrow.parquet.read_table(BytesIO(content))
+        columns = {name: numpy.asarray(table[name]) for name in table.column_names}
+    else:
+        try:
+            loaded = numpy.load(BytesIO(content), allow_pickle=False)
+        except ValueError as error:
+            raise InputError(f"This is no array: {error}.", "Save plain numbers, without pickle.") from None
+        columns = {"": loaded} if suffix == ".npy" else {name: loaded[name] for name in loaded.files}
+    names: list[str] = []
+    parts: list[Any] = []
+    comments = []
+    for name, array in columns.items():
+        if array.ndim == 0 or array.dtype.kind in "US":
+            comments.append(f"# {name}: {', '.join(map(str, numpy.ravel(array)))}")
+        elif array.ndim <= 2 and array.dtype.kind in "fiu":
+            block = array.reshape(len(array), -1)
+            names += _names_of(name, block.shape[1])
+            parts.append(block)
+        elif array.ndim == 3 and array.dtype.kind == "f":
+            parts.append(array.reshape(len(array), -1))
+            names += _names_of(name, parts[-1].shape[1])
+    if not parts or len({len(part) for part in parts}) != 1:
+        lengths = ", ".join(str(len(part)) for part in parts) or "none"
+        raise InputError(f"The arrays have {lengths} rows.", "Give arrays of one length, one row for each time.")
+    rows = [",".join(repr(value) for part in parts for value in part[i].tolist()) for i in range(len(parts[0]))]
+    return "\n".join([*comments, ",".join(names), *rows])
+
+
+_WIDE = {
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "matrix": tuple(f"R{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
+    "state": ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
+    "": ("t", "omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
+}
+
+
+def _names_of(name: str, width: int) -> list[str]:
+    """The names of the columns of one array."""
+    base = {"quaternions": "quaternion", "quat": "quaternion", "matrices": "matrix", "states": "state"}.get(name, name)
+    if len(_WIDE.get(base, ())) == width:
+        return list(_WIDE[base])
+    if width == 1:
+        return [{"times": "t", "time": "t"}.get(name, name)]
+    plain = {"positions": "p", "position": "p", "omegas": "omega", "gammas": "gamma"}.get(name, name)
+    if not name:
+        raise InputError(f"The array has {width} columns.", "Give t, omega1 to omega3, gamma1 to gamma3: seven.")
+    return [f"{plain}{'xyz'[i] if plain == 'p' else i + 1}" for i in range(width)]

@@ -1,0 +1,170 @@
+"""Logs of robots, spacecraft and simulators: one motion in every form is scored as the plain file of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy
+import pytest
+
+import heavytop as ht
+from support.in_process import heavytop
+
+BODY = ht.Body("2", "9.81", ("0.3", "-0.2", "0.4"), ("1.2", "0.9", "0.6"), "centre of mass")
+HEAD = """# mass: 2
+# gravity: 9.81
+# centre: 0.3, -0.2, 0.4
+# inertia: 1.2, 0.9, 0.6
+# about: centre of mass
+# omega: 1, 2, 6
+"""
+TIMES = [k / 10 for k in range(11)]
+
+
+@cache
+def run() -> ht.Trajectory:
+    start = ht.State(omega=(1, 2, 6), attitude=ht.Attitude.quaternion("0.8", 0, "0.6", 0))
+    return ht.propagate(BODY, start, [str(time) for time in TIMES], ht.DOUBLE)
+
+
+def quaternions() -> numpy.ndarray:
+    return run().quaternions()
+
+
+def omegas() -> numpy.ndarray:
+    return run().to_numpy()[:, :3]
+
+
+def rows(*columns: Iterable[object], separator: str = ",") -> str:
+    flat = [numpy.asarray(column).reshape(len(TIMES), -1) for column in columns]
+    return "\n".join(separator.join(repr(float(v)) for part in flat for v in part[i]) for i in range(len(TIMES)))
+
+
+def mrp() -> numpy.ndarray:
+    """σ = v/(1 + w), of the shadow set where |σ| > 1."""
+    q = quaternions()
+    sigma = q[:, 1:] / (1 + q[:, :1])
+    square = (sigma**2).sum(axis=1, keepdims=True)
+    return numpy.where(square > 1, -sigma / square, sigma)
+
+
+def vectors() -> numpy.ndarray:
+    q = quaternions()
+    length = numpy.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    return 2 * numpy.arctan2(length, q[:, :1]) * q[:, 1:] / length
+
+
+def ros() -> str:
+    names = [f"pose.orientation.{a}" for a in "xyzw"] + [f"twist.angular.{a}" for a in "xyz"]
+    stamps = [f"{1700000000 + int(k >= 10)},{k % 10 * 100000000}" for k in range(11)]
+    body = rows(quaternions()[:, [1, 2, 3, 0]], omegas()).splitlines()
+    head = ",".join(["header.stamp.sec", "header.stamp.nanosec", *names])
+    return HEAD + "\n".join([head, *(f"{stamp},{line}" for stamp, line in zip(stamps, body, strict=True))])
+
+
+def mujoco(joint: str) -> str:
+    shift = 3 if joint == "free" else 0
+    names = [f"qpos[{k + shift}]" for k in range(4)] + [f"qvel[{k + shift}]" for k in range(3)]
+    return HEAD + f"# joint: {joint}\n" + ",".join(["time", *names]) + "\n" + rows(TIMES, quaternions(), omegas())
+
+
+def tum(header: bool) -> str:
+    shifted = [1.5e9 + time for time in TIMES]
+    positions = numpy.zeros((len(TIMES), 3)) + run().positions()
+    comment = "# timestamp tx ty tz qx qy qz qw\n" if header else ""
+    return HEAD + comment + rows(shifted, positions, quaternions()[:, [1, 2, 3, 0]], separator=" ")
+
+
+def ephemeris() -> str:
+    meta = "ATTITUDE_TYPE = QUATERNION\nQUATERNION_TYPE = LAST\nATTITUDE_DIR = A2B"
+    body = rows(quaternions()[:, [1, 2, 3, 0]], separator=" ").splitlines()
+    lines = [f"2026-001T00:00:{time:04.1f} {line}" for time, line in zip(TIMES, body, strict=True)]
+    comments = HEAD.replace("# ", "COMMENT ")
+    parts = ("CCSDS_AEM_VERS = 1.0", comments, "META_START", meta, "META_STOP", "DATA_START", *lines, "DATA_STOP")
+    return "\n".join(parts)
+
+
+FORMS: dict[str, tuple[str, Callable[[], str]]] = {
+    "modified Rodrigues parameters": ("csv", lambda: HEAD + "t,sigma1,sigma2,sigma3\n" + rows(TIMES, mrp())),
+    "rotation vector": (
+        "csv",
+        lambda: HEAD + "# attitude: rotation vector\nt,rx,ry,rz\n" + rows(TIMES, vectors()),
+    ),
+    "ROS": ("csv", ros),
+    "MuJoCo, free joint": ("csv", lambda: mujoco("free")),
+    "MuJoCo, ball joint": ("csv", lambda: mujoco("ball")),
+    "TUM": ("txt", lambda: tum(True)),
+    "TUM without a header": ("tum", lambda: tum(False)),
+    "ephemeris": ("aem", ephemeris),
+    "underscores": (
+        "csv",
+        lambda: (
+            HEAD
+            + "sim_time,quat_w,quat_x,quat_y,quat_z,angvel_x,angvel_y,angvel_z\n"
+            + rows(TIMES, quaternions(), omegas())
+        ),
+    ),
+}
+
+
+def scored(path: Path, *options: str) -> dict[str, object]:
+    done = heavytop("score", path, "--json", *options)
+    assert done.returncode in (0, 1), done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_of_one_motion_is_right(name: str, tmp_path: Path) -> None:
+    suffix, text = FORMS[name]
+    path = tmp_path / f"log.{suffix}"
+    path.write_text(text())
+    document = scored(path)
+    digits = 6 if name.startswith("TUM") else 13  # epochs of 1.5e9 s in double have 2e-7 s
+    assert document["digits_right"] > digits, document  # type: ignore[operator]
+
+
+def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    comments = {"mass": "2", "gravity": "9.81", "about": "centre of mass"}
+    lists = {"centre": [0.3, -0.2, 0.4], "inertia": [1.2, 0.9, 0.6], "omega": [1, 2, 6]}
+    texts = {key: numpy.array(", ".join(map(str, value))) for key, value in lists.items()}
+    numpy.savez(path, t=TIMES, quaternions=quaternions(), **comments, **texts)  # type: ignore[arg-type]
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+
+
+def plain(lines: Sequence[str]) -> str:
+    return HEAD + "t,qw,qx,qy,qz\n" + "\n".join(lines)
+
+
+def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_path: Path) -> None:
+    lines = rows(TIMES, quaternions()).splitlines()
+    path = tmp_path / "log.csv"
+    path.write_text(plain([*lines[:5], lines[4], *lines[5:]]))
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    other = lines[4].replace(",0.", ",-0.", 1)
+    path.write_text(plain([*lines[:5], other, *lines[5:]]))
+    refused = heavytop("score", path)
+    assert refused.returncode == 2
+    assert "Lines 12 and 13 are of one time and differ" in refused.stderr
+    path.write_text(plain([*lines[:8], *lines[:3]]))
+    shown = heavytop("score", path)
+    assert shown.returncode == 0
+    assert "the time goes back at line 16" in shown.stdout + shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
+        ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "joint that is not said"),
+    ],
+)
+def test_half_a_file_is_never_scored(header: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(HEAD + header + "\n" + rows(TIMES, quaternions()))
+    refused = heavytop("score", path)
+    assert refused.returncode == 2
+    assert says in refused.stderr
