@@ -51,6 +51,15 @@ def test_an_order_leads_then_failures_digits_laws_and_that_nothing_else_changed(
     assert len(said) == 5
 
 
+def test_the_order_of_whole_runs_of_a_method_with_a_memory_leads_too() -> None:
+    def runs(order: str) -> Row:
+        return replace(step(), metrics={"observed_order_runs": of_fraction(exact(order), "value")})
+
+    said = found([runs("4")], [runs("1")])
+    assert said[0] == "Order observed 4 → 1 in whole runs on euler (mine:rk5, double)."
+    assert said[-1] == "Nothing else changed."
+
+
 def test_a_report_against_itself_has_one_sentence() -> None:
     assert found([row()], [row()]) == ["Nothing changed: 2 metrics are the same within rounding noise."]
 

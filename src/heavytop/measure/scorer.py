@@ -211,6 +211,8 @@ ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final"
 """Distance in one number: the largest over the samples, and that at the end."""
 OBSERVED_ORDER = Quantity("observed_order")
 """Of a method, by its errors of single steps."""
+ORDER_OF_RUNS = Quantity("observed_order", "runs")
+"""Of a method, by the errors of whole runs at h, h/2, h/4."""
 COMPONENTS = ("omega", "gamma", "along", "across")
 
 Errors = tuple[list[Sums], bool]

@@ -12,7 +12,6 @@ from heavytop.errors import OutOfReach, Unsupported
 from heavytop.features.local_error import measurement as local_error
 from heavytop.features.local_error.field_faults import field_fault
 from heavytop.features.local_error.measurement import (
-    ORDER_OF_RUNS,
     error_at_end,
     order_of_runs,
     single_calls,
@@ -27,7 +26,7 @@ from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
-from heavytop.measure.scorer import OBSERVED_ORDER
+from heavytop.measure.scorer import OBSERVED_ORDER, ORDER_OF_RUNS
 from heavytop.precision import exact, parse, time_text
 from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short

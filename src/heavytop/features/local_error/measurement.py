@@ -39,7 +39,6 @@ _NEAR, _FAR = 2, 3
 _ABOVE_ROUNDING = 1000
 """Times eps and the size of the state: an error from which the order of a rounded step is read."""
 LOCAL_ERROR = Quantity("local_error_ulp")
-ORDER_OF_RUNS = Quantity("observed_order", "runs")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain, groupby, pairwise
+from itertools import chain, groupby, pairwise, product
 from typing import NamedTuple
 
 import msgspec
@@ -18,7 +18,7 @@ import msgspec
 from heavytop.display import plural
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import digits_kept, digits_text
-from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, SOLUTION_ERROR
+from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
@@ -385,13 +385,16 @@ def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
     yield from sorted(largest.values(), key=lambda each: each[0])
 
 
+_SHOW_ORDER = {OBSERVED_ORDER: "single steps", ORDER_OF_RUNS: "whole runs"}
+
+
 def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
-    """Integrator, change and sentence, of the order that single steps show."""
-    for change in changes.rows:
-        metrics = [change.metric(row, OBSERVED_ORDER.text) for row in (change.old, change.new)]
+    """Integrator, change and sentence, of the order that single steps or whole runs show."""
+    for change, (order, shown_by) in product(changes.rows, _SHOW_ORDER.items()):
+        metrics = [change.metric(row, order.text) for row in (change.old, change.new)]
         before, after = (math.nan if metric is None else float(metric) for metric in metrics)
         if abs(after - before) > 0:
-            said = f"Order observed {before:g} → {after:g} in single steps on {_where(change.identity, at=False)}."
+            said = f"Order observed {before:g} → {after:g} in {shown_by} on {_where(change.identity, at=False)}."
             yield change.identity.key.subject.name, after - before, Sentence(said, frozenset({change.identity}))
 
 
@@ -589,7 +592,7 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
 
 def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
     """Whether other sentences say it: whole rows, laws, orders, and what the digits right sum up."""
-    if not finding.metric or finding.of == "growth" or finding.metric == OBSERVED_ORDER.text:
+    if not finding.metric or finding.of == "growth" or finding.metric in {order.text for order in _SHOW_ORDER}:
         return True
     if change.digits is None or abs(change.lost) < _DIGITS_MOVED:
         return False
