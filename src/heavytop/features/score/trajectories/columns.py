@@ -19,7 +19,6 @@ from heavytop.features.score.trajectories.logs import (
     canonical,
     quaternions_of,
     quaternions_of_vectors,
-    require_understood,
 )
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
@@ -161,7 +160,6 @@ def header(names: Sequence[str], joint: str = "") -> Header:
         found["quaternion"] = together
     for name in others:
         _require_no_quantity(name, found)
-    require_understood(others, [*found])
     return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
 
 

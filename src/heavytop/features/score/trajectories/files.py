@@ -103,6 +103,7 @@ class TextTable:
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
         found = observed_columns.header(names, str(self.keys.get("joint", "")))
+        logs.require_understood(found.others, [*found.places])
         if found.time is not None:
             self._without_repeats(found.time)
         units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
