@@ -63,7 +63,7 @@ def capacity(runs: int) -> None:
             grid = grid_of(words) if bits is None else Grid(words, bits)
             run = Fixed(scaled, grid, True)
             status = run.advance(span, 10**4)
-            sample = run.sample(span) if status is Status.FINE else None
+            sample = run.sample(span) if status is Status.OK else None
             fired = "fired, " if run.redone else ""
             if sample is None:
                 found[words, bits]["ended as an outcome"] += 1

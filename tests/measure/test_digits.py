@@ -84,14 +84,14 @@ def test_numbers_bounds_and_words() -> None:
         return digits_kept(row(metrics={RELATIVE.text: metric}))
 
     assert kept(error("1e-10")) == 10
-    assert kept(error("1e2")) == -2
+    assert kept(error("1e2")) == 0
     assert kept(Metric("unresolved", None, "error", "1e-12")) == 12
     assert kept(Metric("unresolved", None, "error", "1e-18")) == pytest.approx(FULL, abs=0.005)
     assert kept(error("1e-18")) == kept(Metric("0", None)) == pytest.approx(FULL, abs=0.005)
     for word in ("nan", "missing", "unresolved"):
         assert kept(Metric(word, None)) is None
     assert digits_kept(row(metrics={})) is None
-    assert [digits_text(value) for value in (9.96, 8.94, -2.0)] == ["10.0", "8.9", "0.0"]
+    assert [digits_text(value) for value in (9.96, 8.94, 0.0)] == ["10.0", "8.9", "0.0"]
 
 
 def command(*arguments: object) -> str:

@@ -203,7 +203,7 @@ def test_steps_are_those_of_whole_numbers(words: int, name: str, forwards: bool)
     assert rows_of(grid) is DigitRows
     run, known = Fixed(given, grid, forwards), IntegerMotion(given, 64 * (grid.total // 64 + 2), forwards)
     for each in (run, known):
-        assert each.advance(span, 10**4) is Status.FINE
+        assert each.advance(span, 10**4) is Status.OK
     assert run.redone == 0 or name == "an entire function"  # which allows any step
     found, truth = run.sample(span), known.sample(span)
     assert found is not None
@@ -217,7 +217,7 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
     given, grid = MOTIONS[name], grid_of(8)
     run = Fixed(given, grid, True)
     for _ in range(3):
-        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        assert run.advance(Fraction(10**6), 1) is Status.OK
         count, row = digits_of(grid), size_of(grid, run.vectors).row
         for n in range(run.order + 1):
             digits = run.rows[row * n : row * (n + 1)].reshape(-1, LANES)
@@ -233,7 +233,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
     given = problem(1, attitude=True)
     runs = [Fixed(given, grid_of(8), True, processor=each) for each in (None, processor)]
     for run in runs:
-        assert run.advance(Fraction(2), 10**6) is Status.FINE
+        assert run.advance(Fraction(2), 10**6) is Status.OK
     own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(2))) for run in runs)
     assert own == other
 

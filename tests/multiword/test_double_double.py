@@ -42,7 +42,7 @@ PLAIN = Processor("x86-64")
 def bits_on(processor: Processor | None, attitude: bool, tolerance: Fraction) -> tuple[object, ...]:
     """All that a run knows at t = 30, in code for that processor."""
     run = Floating(problem(1, attitude), OrderSchedule.of(tolerance), True, processor=processor)
-    assert run.advance(Fraction(30), 10**6) is Status.FINE
+    assert run.advance(Fraction(30), 10**6) is Status.OK
     return run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))
 
 
@@ -70,7 +70,7 @@ def test_simple_fractions_round_without_a_bias() -> None:
     errors: list[list[float]] = []
     for _ in range(states):
         began = alone.time
-        assert alone.advance(Fraction(10**9), 1) is Status.FINE
+        assert alone.advance(Fraction(10**9), 1) is Status.OK
         lanes.advance(1)
         row: list[float] = []
         for before, found in (

@@ -138,7 +138,7 @@ def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: 
         known = Fixed(scaled, grid_of(2 * words), True)
         run = Fixed(scaled, grid, True)
         for each in (known, run):
-            assert each.advance(span, 10**4) is Status.FINE
+            assert each.advance(span, 10**4) is Status.OK
         truth = known.sample(span)
         assert truth is not None
         assert run.redone == 0
@@ -154,15 +154,15 @@ def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
     for _ in range(30):
         scaled = random_problem(random)
         known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
-        assert known.advance(span, 10**4) is Status.FINE
+        assert known.advance(span, 10**4) is Status.OK
         truth = known.sample(span)
         assert truth is not None
         status = run.advance(span, 10**4)
         redone += run.redone
-        if status is Status.FINE and run.sample(span) is not None:
+        if status is Status.OK and run.sample(span) is not None:
             assert error_in_ulp(run, truth, span) < WRONG_ULP
         else:
-            assert status in (Status.CAPACITY, Status.FINE)
+            assert status in (Status.CAPACITY, Status.OK)
     assert redone > 0 or bits < 50
 
 
@@ -189,7 +189,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
     scaled = problem(1, attitude=True)
     runs = [Fixed(scaled, grid_of(3), True, processor=each) for each in (None, processor)]
     for run in runs:
-        assert run.advance(Fraction(8), 10**6) is Status.FINE
+        assert run.advance(Fraction(8), 10**6) is Status.OK
     own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(8))) for run in runs)
     assert own == other
 
@@ -201,7 +201,7 @@ def test_steps_grow_and_shrink_with_the_motion() -> None:
     run, lengths = Fixed(Scaled.of(HEAVY_TOP, p, y, bounded=True), grid_of(3), True), set()
     for _ in range(300):
         before = run.time
-        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        assert run.advance(Fraction(10**6), 1) is Status.OK
         lengths.add(run.time - before)
     assert len(lengths) > 1
     assert all(length.numerator == 1 or length.denominator == 1 for length in lengths)
@@ -212,7 +212,7 @@ def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
     """Terms below the last bit of the sum are not lost one by one, which would err in the same way at every step."""
     run = Fixed(problem(), grid_of(3), True)
     for _ in range(100):
-        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        assert run.advance(Fraction(10**6), 1) is Status.OK
         total = [sum(column) for column in zip(*map(run.coefficients, range(run.order + 1)), strict=True)]
         last = Fraction(run.grid.unit(1)) / 2**50
         for value, exact_sum in zip(run.state[:3], total[:3], strict=True):
@@ -226,7 +226,7 @@ def test_a_sample_is_the_sum_of_the_coefficients_and_zeros_that_are_passed_over_
 ) -> None:
     run, random = Fixed(problem(), grid_of(words), True), Random(words)
     for _ in range(3):
-        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        assert run.advance(Fraction(10**6), 1) is Status.OK
     began, length = run._began, run.time - run._began
     coefficients = [run.coefficients(n) for n in range(run.order + 1)]
     at, rows = doubles(words * 40), [doubles(sample_row(run.grid, 1) * 40) for _ in range(2)]
@@ -255,7 +255,7 @@ def test_products_of_second_words_count_where_a_leading_word_is_small(words: int
     grids = Grid(words, 44), Grid(words + 2, 44)
     short, wide = (Fixed(scaled, grid, True) for grid in grids)
     for run in (short, wide):
-        assert run.advance(Fraction(1, 100), 1) is Status.FINE
+        assert run.advance(Fraction(1, 100), 1) is Status.OK
     unit = Fraction(short.grid.unit(words - 1))
     pairs = [(short.coefficients(n), wide.coefficients(n)) for n in range(short.order)]
     of_one_word = [(a, b) for a, b in pairs if max(map(abs, b)) < 2**44 * unit]
@@ -274,7 +274,7 @@ def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
     assert grid is not None
     runs, span = [Fixed(scaled, each, True) for each in (grid, finer)], 160 * scaled.rate
     for run in runs:
-        assert run.advance(span, 10**5) is Status.FINE
+        assert run.advance(span, 10**5) is Status.OK
     coarse, fine = (run.sample(span) for run in runs)
     assert coarse is not None
     assert fine is not None

@@ -280,4 +280,4 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
     file.write_text("\n".join([*lines, "t,qw,qx,qy,qz", "0,1,0,0,0", "0.01,0.73,0,0.68,0"]) + "\n", "utf-8")
     told = [text for text in read(file, None, True).warnings() if "no rigid body's" in text]
     assert len(told) == (about == "pivot")
-    assert all('give about = "centre of mass"' in text for text in told)
+    assert all("is about the centre of mass, and was read as about the pivot" in text for text in told)
