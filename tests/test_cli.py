@@ -98,11 +98,9 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
     answer = json.loads(done.stdout)
     assert answer["outcome"] == "step_limit"
     assert len(answer["states"]) == len(answer["times"]) == 2
+    assert "stopped" in run("propagate", *top_options(times="1,2,900"), "--max-steps", "40").stdout
     done = run("propagate", *top_options(omega="1e140,1e140,1", times="8e-140"), "--json")
-    assert done.returncode == 3
-    assert json.loads(done.stdout)["outcome"] == "non_finite"
-    assert json.loads(done.stdout)["states"] == []
-    assert "stopped" in run("propagate", *top_options(omega="1e140,1e140,1", times="8e-140")).stdout
+    assert (done.returncode, json.loads(done.stdout)["outcome"]) == (0, "success")
 
 
 @pytest.mark.parametrize(

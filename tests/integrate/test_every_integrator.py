@@ -184,7 +184,7 @@ def what_is_not_finite_is_no_success(name: str) -> None:
         ends_well(run, [exact(number(1 / size, DOUBLE))])
         assert np.isfinite(run.states).all()
         # the weight does nothing in so short a time
-        other = {"heyoka": "multiword", "multiword": "heyoka"}[name]
+        other = "heyoka" if name == "multiword" else "multiword"
         free = call(other, HeavyTop(GENERIC.top.inertia, 0, (0, 0, 0)), State([1] * 3, wild.gamma), [F(1)])
         agree(name, run.states / np.repeat([1e200, 1], 3), free.states)
         return

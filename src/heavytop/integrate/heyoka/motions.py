@@ -13,7 +13,7 @@ import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
 from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, TaylorStep, Trajectory, sampled
-from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, exact_text, number, numbers
+from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, number, numbers
 from heavytop.top.amplification import rate
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, RoundedTimes, State, check_times
@@ -284,7 +284,7 @@ def integrate_to_samples(
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
     unit = _unit(problem)
-    if unit != 1 and place is None:
+    if unit != 1 and place is None and len(engine.pars):  # constants compiled in have the unit given
         scaled, seen = _in_unit(problem, unit), observer and _seen_in(observer, unit)
         factor = number(unit, problem.precision)
         run = integrate_to_samples(
@@ -297,7 +297,7 @@ def integrate_to_samples(
             times=times,
             states=numpy.array(states).reshape(-1, len(engine.state)),
             time_reached=run.time_reached / unit,
-            flags={**run.flags, "unit": exact_text(unit)},
+            flags={**run.flags, "unit": f"2^{unit.numerator.bit_length() - unit.denominator.bit_length()}"},
         )
     if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
         found = _in_one_call(tool, engine, problem, targets, step_limit)
