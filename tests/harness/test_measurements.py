@@ -10,6 +10,7 @@ import pytest
 from heavytop.features.homoclinic.break_away_law import break_away_law
 from heavytop.harness.rows import Task
 from heavytop.integrate import registry
+from heavytop.integrate.heyoka import motions
 from heavytop.precision import time_text
 from support.reports import expand, load, measure
 
@@ -77,6 +78,7 @@ def test_the_verdict_on_the_claim_is_a_row() -> None:
 @pytest.mark.slow
 def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(motions, "_FASTEST", 10**400)  # and in the unit of time given
     given = task("drift lagrange double")
     assert given.case is not None
     wild = replace(given.case.start, omega=(Fraction(10) ** 140, Fraction(10) ** 140, Fraction(1)))

@@ -6,6 +6,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate import registry
+from heavytop.integrate.heyoka import motions
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
@@ -126,6 +127,7 @@ def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Rep
 
 def test_a_run_that_failed_has_no_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(motions, "_FASTEST", 10**400)  # and in the unit of time given
     task = expand(PLAN, 0)[-1]
     wild = replace_dataclass(task.case.start, omega=tuple(exact(x) for x in ("1e140", "1e140", "1")))
     key = replace(task.key, precision="double")

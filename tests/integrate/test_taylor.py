@@ -125,7 +125,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal() -> None:
 
 
 def test_an_overflow_is_an_outcome_and_not_numbers() -> None:
-    run = propagate(TOP, State((10**140, 10**140, 1), (0, 0, 1)), [1], DOUBLE)
+    run = propagate(TOP, State((10**300, 10**300, 1), (0, 0, 1)), [1], EXTENDED)
     assert run.outcome is Outcome.NON_FINITE
     assert len(run.states) == 0
     assert run.time_reached == 0
