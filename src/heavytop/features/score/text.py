@@ -12,8 +12,8 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES, Diagnosis
-from heavytop.features.score.diagnose.samples import FLOOR
+from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES
+from heavytop.features.score.diagnose.samples import FLOOR, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
 from heavytop.measure.attitude_error import JOINT_VIOLATION
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text

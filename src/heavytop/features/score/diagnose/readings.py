@@ -140,11 +140,6 @@ def turning(body: BodyData, start: Beginning) -> float:
     return _rate(numpy.asarray(moments, dtype=numpy.float64), body.force * body.centre, start.omega) or 1.0
 
 
-def with_tensor(body: BodyData, inertia: Array) -> BodyData:
-    """The body with another tensor."""
-    return replace(body, inertia=inertia)
-
-
 _NUMPY = SimpleNamespace(sin=numpy.sin, cos=numpy.cos)
 _DEGREE = numpy.pi / 180
 _EYE = tuple(map(tuple, numpy.eye(3).tolist()))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor
+from typing import NamedTuple
 
 import numpy
 from numpy.typing import NDArray
@@ -60,6 +61,34 @@ LIKELY_DROP = 30.0
 """... one without a free number by which it falls less is likely."""
 FIRST = (6, 2)
 """Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """A mistake that explains the states.
+
+    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
+    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
+    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
+    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
+    likely: whether the error falls by less than a statement asks for.
+    """
+
+    kind: str
+    numbers: dict[str, str] = field(default_factory=dict)
+    error: float | None = None
+    left: float | None = None
+    looked_at: tuple[int, int, str] | None = None
+    likely: bool = False
+
+
+class Hypothesis(NamedTuple):
+    """A mistake that was tried: its kind, the numbers that fit, the error that it leaves, how far this must fall."""
+
+    kind: str
+    numbers: dict[str, str]
+    left: float
+    drop: float = DROP
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,15 +283,21 @@ def examined(
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
     carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
     rate = float(max(spin, fall, carried)) or 1.0
-    early = sum(abs(time) * rate <= _TURNS for time in ends)
-    last = max(early, min(len(ends), _FEW))
-    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | set(range(min(last, _FEW)))
-    rows = sorted(some if worst is None or worst >= last else some | {worst})
+    rows = looked_at(ends, rate)
+    if worst is not None and worst < rows[-1]:
+        rows = sorted({*rows, worst})
     found = Examined(
         top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or FileAxes()
     )
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
+
+
+def looked_at(times: Sequence[float], rate: float) -> list[int]:
+    """At most :data:`MOST_SAMPLES` samples over the first turns of the body, or a few where they lie far apart."""
+    early = sum(abs(time) * rate <= _TURNS for time in times)
+    last = max(early, min(len(times), _FEW))
+    return sorted({round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | {*range(min(last, _FEW))})
 
 
 def turning_rate(top: HeavyTop, start: State) -> Fraction:
@@ -345,3 +380,9 @@ def notable(new: Fraction, old: Fraction) -> bool:
     """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
     off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
     return off or new.denominator <= SMALL or new == Fraction(decimal_text(new, SHORT))
+
+
+def in_units(value: float | Fraction, unit: Fraction) -> str:
+    """A number of the data's own units, to six digits."""
+    text = decimal_text(Fraction(value) * unit, 6)
+    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
