@@ -353,7 +353,7 @@ def _own(plan: Plan) -> dict[str, Case]:
 
 
 def warnings(plan: Plan) -> list[str]:
-    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    """Warnings of data that no rigid body can have, though the equations do not mind, of the plan's own tops."""
     return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 

@@ -31,7 +31,7 @@ NAME = "drift"
 
 
 class Extent(NamedTuple):
-    """What is measured of a run beside the usual, or not."""
+    """Measurements of a run beside the usual."""
 
     attitude: bool = False
     noise: bool = True
@@ -60,7 +60,7 @@ class DriftTable(PlanTable, tag=NAME):
     noise: bool = True
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         runs = []
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")
@@ -98,8 +98,8 @@ class DriftKind(Kind):
         return (0.8 if task.options.noise else 0.1) + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
-        place reached with other flags.
+        """Measure one run.  Raises Contradiction where two proofs of the motion exclude each other, InputError for
+        a place reached with other flags.
         """
         if task.options.attitude and task.integrator.carries_attitude:
             return _with_attitude(task)
@@ -157,7 +157,7 @@ def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
 
 
 def _with_attitude(task: Task) -> Row:
-    """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
+    """The row of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
     case, precision, integrator = task.given, task.precision, task.integrator
     times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
     xi = resolve(case.body or case.top, case.given_start or case.start).xi

@@ -28,7 +28,7 @@ _BUDGET = 'Give a number of motions, "5000", or seconds, "60s".'
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """What a hunt came to; prints as `heavytop hunt` does.
+    """The result of a hunt; prints as `heavytop hunt` does.
 
     found: a dict each, worst first: exact texts of ``inertia``, ``weight``, ``centre``, ``omega`` and ``gamma`` after
     shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one was aborted),
@@ -47,7 +47,7 @@ class Hunt:
         return hunt_text(self.hunted, self.found, self.again)
 
     def document(self) -> dict[str, Any]:
-        """What `heavytop hunt --json` prints."""
+        """The document of `heavytop hunt --json`."""
         return {"found": self.found, "motions": self.motions, "seed": self.seed}
 
 
@@ -122,13 +122,9 @@ def asked_for(
         raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
     if other is not None and other == which:
         raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
-    one, two = _integrator(which), None if other is None else _integrator(other)
+    one, two = ChosenIntegrator.of(which), None if other is None else ChosenIntegrator.of(other)
     families: dict[str, Family] = {each: each for each in FAMILIES}
     return Asked(one, form, time, families[family], two, beyond, number, seconds, _seed(seed))
-
-
-def _integrator(which: str | IntegratorSource) -> ChosenIntegrator:
-    return ChosenIntegrator(which) if isinstance(which, str) else ChosenIntegrator(which.name, source=which)
 
 
 def _seed(value: int) -> int:

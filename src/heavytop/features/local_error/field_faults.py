@@ -170,7 +170,7 @@ class _Steps:
 
 
 def _weights(order: int) -> dict[int, float]:
-    """Of the ends after h, 2 h and 4 h: 1 for what is proportional to the length, 0 for its powers p + 1 and p + 2."""
+    """Weights of the ends after h, 2 h and 4 h: 1 of what is linear in the length, 0 of its powers p + 1 and p + 2."""
     n = numpy.array(_LENGTHS, dtype=float)
     found = numpy.linalg.solve(numpy.array([n, n ** (order + 1), n ** (order + 2)]), [1.0, 0.0, 0.0])
     return dict(zip(_LENGTHS, found.tolist(), strict=True))

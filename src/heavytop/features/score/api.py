@@ -149,7 +149,7 @@ class Summary(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Score(Tabular):
-    """What a motion is worth.
+    """The score of a motion.
 
     outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
     drift: |I(t) − I(0)| by the name of the first integral, in its units.
@@ -313,7 +313,7 @@ def score(
 def read_trajectory(
     path: PathLike, case: str | None = None, *, require: Number | None = None, normalize: bool = False
 ) -> tuple[GivenTrajectory, Fraction | None]:
-    """What :func:`scored` takes, from the file of a trajectory (`heavytop docs score`).
+    """The arguments of :func:`scored`, from the file of a trajectory (`heavytop docs score`).
 
     Arguments:
         path: a .json or .csv file; ``-`` for standard input.

@@ -119,7 +119,7 @@ class _Courses:
 
 
 class Suppositions:
-    """What may be wrong with a file, and the error of each of its samples with it.
+    """Mistakes that a file may have, and the error of each of its samples with them.
 
     step: of the method, where the file says it.
     """
@@ -357,7 +357,7 @@ def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
 
 
 def _angles(said: Reading) -> Iterator[Named]:
-    """Of Euler angles: another unit, another sequence, about axes of space, other signs, and two of these."""
+    """Euler angles in another unit, another sequence, about axes of space, with other signs, and two of these."""
     yield "degrees", {"unit": "radians" if said.degrees else "degrees"}, replace(said, degrees=not said.degrees)
     yield "extrinsic", {"sequence": said.sequence}, replace(said, extrinsic=True)
     yield "angles_negated", {}, replace(said, negated=True)

@@ -1,4 +1,4 @@
-"""What went wrong in a motion that is off, told by trying it: a supposition counts only if it explains the states.
+"""Mistakes in a motion that is off, told by trying them: a supposition counts only if it explains the states.
 
 Every supposition is a motion that is computed and compared with the states.  It is told if the error falls by two
 decades with it, by three where a number was fitted to the states; otherwise nothing is said.
@@ -49,7 +49,7 @@ _CONSTANT = 100.0
 _OFF = 1e-3
 """... and by so much of what they may be; they vary if they vary by as much."""
 VARIES, AS_AT_START = "varies", "that of the start"
-"""What is said of first integrals that do not keep another value."""
+"""Words for first integrals that do not keep another value."""
 _FEWEST_ROWS = 4
 _FEWEST_STILL = 3
 _ALONE = 1000.0
@@ -81,7 +81,7 @@ def diagnose(
     seen: Seen | None = None,
     step: Fraction | None = None,
 ) -> list[Diagnosis]:
-    """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
+    """The explanation of the states of a motion: one mistake, or the digits they are written with; empty without any.
 
     relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
     errors: that of each state relative to the size of Ω and γ, up to where the reference ends; empty without one.
@@ -109,7 +109,7 @@ def diagnose(
 
 
 def _explanation(given: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
-    """What explains the states, from their motion or from the columns, over all samples or the first ones."""
+    """The explanation of the states, from their motion or from the columns, over all samples or the first ones."""
 
     @cache
     def on_samples(first: int | None) -> _Tried:
@@ -157,7 +157,7 @@ def _only_rounded(written: Rounding | None, error: float | None, given: Examined
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
-    """What was tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
+    """Hypotheses tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
 
     given: Examined
     truth: Array | None
@@ -290,7 +290,7 @@ def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors:
 
 
 def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
-    """The same, with how many of the states it was found in, where that is not all of them."""
+    """The diagnosis with how many of the states it was found in, where that is not all of them."""
     looked, all_of_them = len(given.rows), len(given.all_times)
     if found is None or looked == all_of_them:
         return found
@@ -372,7 +372,7 @@ def _integrals_off(given: Examined) -> Diagnosis | None:
 
 
 def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
-    """What the integrals that are looked at may be, and their units."""
+    """Sizes of the integrals that are looked at, and their units."""
     p = given.system.parameters(given.top, given.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
     rotor = max(abs(float(value)) for value in given.top.rotor or (0,))

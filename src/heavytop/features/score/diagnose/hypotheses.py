@@ -65,7 +65,7 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 
 @dataclass(frozen=True, slots=True)
 class ColumnsHypothesis:
-    """What the six columns may be.
+    """A meaning of the six columns.
 
     meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
     of: "both", "omega" or "gamma", the vectors whose axes these are.  swapped: γ stands before Ω.
@@ -467,7 +467,7 @@ def of_equations(given: Examined, truth: Array | None) -> Iterator[Hypothesis]:
 
 @lru_cache(maxsize=18)
 def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) -> System:
-    """The same equations with the derivative of one component, in the axes of the file, negated."""
+    """The equations with the derivative of one component, in the axes of the file, negated."""
     along, block = axes[place % 3], slice(place - place % 3, place - place % 3 + 3)
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""What the columns of a file with attitudes may mean: one reading of its conventions, and its error beside a motion."""
+"""Meanings of the columns of a file with attitudes: one reading of its conventions, and its error beside a motion."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class BodyData:
 
     @property
     def steiner(self) -> Array:
-        """What moving the tensor from the centre of mass to the fixed point adds to it."""
+        """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
         c = self.centre
         found: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
         return found
@@ -148,7 +148,7 @@ Square = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the columns mean, or the start.
+    """A meaning of the columns, or of the start.
 
     scalar_last, conjugate: of quaternions.  transposed: of matrices.  sequence, extrinsic, negated, degrees: of angles.
     up: the axis that points up.  swapped: Ω said to be in body axes is in space axes, and the other way round.
@@ -182,7 +182,7 @@ class Reading:
 
     @classmethod
     def of(cls, said: Convention) -> Reading:
-        """What a file says of itself."""
+        """The reading that a file declares."""
         return cls(
             scalar_last=said.quaternion_order == "xyzw",
             conjugate=said.quaternion == "space_to_body",
@@ -304,7 +304,7 @@ class Seen:
     rows: tuple[int, ...] = field(default=())
 
     def at(self, rows: list[int]) -> Seen:
-        """The same at some of its samples."""
+        """This file at some of its samples."""
         times = tuple(self.times[row] for row in rows)
         return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()}, rows=tuple(rows))
 

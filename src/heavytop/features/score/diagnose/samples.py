@@ -141,7 +141,7 @@ class Examined:
 
     @property
     def times(self) -> list[Fraction]:
-        """Of the rows that are looked at."""
+        """Times of the rows that are looked at."""
         return [self.all_times[row] for row in self.rows]
 
     @property
@@ -161,12 +161,12 @@ class Examined:
         return found
 
     def starting(self, values: Array) -> Examined:
-        """The same with that start, in the axes of the file."""
+        """This motion with that start, in the axes of the file."""
         parts = [tuple(map(Fraction, part)) for part in values.reshape(-1, 3) @ self.frame.axes]
         return replace(self, start=State(*parts[:2]), frame=replace(self.frame, xi=parts[2] if parts[2:] else None))
 
     def with_body(self, tensor: Array, moment: Array, rotor: Array | None = None) -> Examined:
-        """The same with another body, in the axes of the file.
+        """This motion with another body, in the axes of the file.
 
         Raises InputError for moments of inertia that are not positive.
         """
@@ -195,16 +195,16 @@ class Examined:
         return None if found is None else (found.reshape(len(found), -1, 3) @ self.frame.axes.T).reshape(len(found), -1)
 
     def at(self, rows: Sequence[int]) -> Examined:
-        """The same at other samples."""
+        """This motion at other samples."""
         return replace(self, rows=tuple(rows), states=self.all_states[list(rows)])
 
     def widened(self) -> Examined:
-        """The same with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
+        """This motion with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
         reached = [abs(float(time)) * self.rate <= FARTHEST for time in self.all_times[:MOST_AT_ONCE]]
         return self.at(range(sum(reached))).trusted()
 
     def trusted(self) -> Examined:
-        """The same up to where the motion makes more of roundings than an error that is asked about."""
+        """This motion up to where it makes more of roundings than an error that is asked about."""
         truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
         if truth is None:
             return self
