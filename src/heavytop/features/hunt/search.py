@@ -75,9 +75,9 @@ def complexity(motion: Motion) -> tuple[int, int, int]:
     return sum(map(digits, values)), odd + len(set(top.inertia)), sizes
 
 
-def shrunk(motion: Motion, shows: Shows, rounds: int = _MOST_ROUNDS) -> Motion:
+def shrunk(motion: Motion, shows: Shows) -> Motion:
     """A motion that shows the same and of which no single change that is tried makes a simpler one that does."""
-    for _ in range(rounds):
+    for _ in range(_MOST_ROUNDS):
         before = complexity(motion)
         for change in _CHANGES:
             motion = _first(motion, change(motion), shows)

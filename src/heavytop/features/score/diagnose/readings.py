@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor, isfinite, log10
 from types import SimpleNamespace
@@ -290,7 +290,7 @@ class Seen:
     """The samples of a file that are looked at.
 
     times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as the file says.
-    point, pivot: of positions.  of: how many samples the file has.
+    point, pivot: of positions.
     """
 
     times: tuple[Fraction, ...]
@@ -300,13 +300,11 @@ class Seen:
     said: Reading
     point: Array
     pivot: Array
-    of: int
-    rows: tuple[int, ...] = field(default=())
 
     def at(self, rows: list[int]) -> Seen:
         """This file at some of its samples."""
         times = tuple(self.times[row] for row in rows)
-        return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()}, rows=tuple(rows))
+        return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()})
 
 
 def errors(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> Array:
@@ -418,4 +416,4 @@ def of_states(
     rows = numpy.array([along, numpy.cross(gamma, along), gamma])
     given = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
     split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
-    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3), len(columns))
+    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3))
