@@ -259,8 +259,6 @@ _SHOWN = 15
 _WIDE, _ENDS = 52, 2
 """Characters of a number in a row, and times at either end that are shown of many."""
 
-Evaluate = Callable[[Fraction, int], Sequence[Any]]
-
 
 class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
     """Proven states; its JSON is that of ``heavytop reference``.
@@ -481,7 +479,8 @@ def reference(
         stability=steady,
     )
     if not attitude:
-        states = [ball_texts(known.state, known.method, time, digits) for time in instants]
+        bits = bits_of(digits)
+        states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
         return msgspec.structs.replace(found, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
     method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
@@ -505,12 +504,7 @@ def start_texts(gamma: Vector, digits: int) -> list[str]:
         return [value_text(value, digits + 1)[0] for value in initial_xi(gamma)]
 
 
-def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> list[Ball]:
-    """The balls of ``evaluate(time, bits)`` as text; raises OutOfReach as :meth:`Ball.proven` does."""
-    return known_texts(evaluate(time, bits_of(digits)), method, time, digits)
-
-
 def known_texts(values: Sequence[Any], method: str, time: Fraction, digits: int) -> list[Ball]:
-    """:func:`ball_texts` of balls that are known already."""
+    """The balls of a state as text; raises OutOfReach as :meth:`Ball.proven` does."""
     source = f", by {method}"
     return [Ball.proven(value, digits, f"Component {i}", time, source) for i, value in enumerate(values, 1)]

@@ -21,7 +21,7 @@ import numpy
 
 from heavytop.features.local_error.measurement import Call
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import Array, decimal_text, exact
+from heavytop.precision import Array, decimal_text, exact, plain_decimal
 from heavytop.records import Explained
 from heavytop.top.equations import NAMES, Parameters, System
 
@@ -204,7 +204,7 @@ def field_fault(problem: Problem, calls: Sequence[Call], order: int) -> Explaine
 
 def _plainness(fit: tuple[_Factor, Fraction, float]) -> tuple[bool, int]:
     """Smaller of a simpler explanation: what is left out or negated before what is multiplied, few digits first."""
-    return fit[1] not in (0, -1), len(_text(fit[1], 12))
+    return fit[1] not in (0, -1), len(plain_decimal(fit[1], 12))
 
 
 def _rounded(steps: _Steps, factor: _Factor, s: float, left: float) -> tuple[Fraction, float]:
@@ -216,14 +216,9 @@ def _rounded(steps: _Steps, factor: _Factor, s: float, left: float) -> tuple[Fra
     return (number, rounded) if rounded <= _ALIKE * left else (Fraction(s), left)
 
 
-def _text(number: Fraction, digits: int = 8) -> str:
-    text = decimal_text(number, digits)
-    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
-
-
 def _said(factor: _Factor, number: Fraction) -> str:
     if number == 0:
         return f"{factor.text} is left out"
     if number == -1:
         return f"{factor.text} has the other sign"
-    return f"{factor.text} is {_text(number)} times what it is"
+    return f"{factor.text} is {plain_decimal(number, 8)} times what it is"

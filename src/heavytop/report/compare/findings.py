@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, groupby, pairwise, product
@@ -94,10 +94,6 @@ class Change(NamedTuple):
             return self.digits[0] - self.digits[1]
         return max((moved for each in self.findings if (moved := self.decades(each.metric)) is not None), default=0.0)
 
-    def set_off(self, mended: Collection[tuple[str, str]]) -> Change:
-        """Without the slight losses of those integrators."""
-        return self._replace(findings=[each for each in self.findings if each.set_off(mended) is each])
-
     def decades(self, name: str) -> float | None:
         """Decades by which the error of that name grew; None for what is no error, or not a number in both rows."""
         old, new = (self.metric(row, name) for row in (self.old, self.new))
@@ -172,10 +168,11 @@ class Changes:
             key = _curve(old.identity)
             self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
 
-    def mended(self) -> set[tuple[str, str]]:
-        """The integrators that gained more than their slight losses, which are the same then and left out.
+    def excused(self) -> Callable[[Finding], bool]:
+        """Which findings are no verdict; their rows are taken out.
 
-        Of two methods of which each is slightly better somewhere, that with the largest loss is worse.
+        Slight losses of an integrator that gained more than these: of two methods of which each is slightly better
+        somewhere, that with the largest loss is worse.  And what changed of heyoka beside a third-party integrator.
         """
         gained: dict[tuple[str, str], float] = {}
         lost: dict[tuple[str, str], float] = {}
@@ -184,18 +181,18 @@ class Changes:
                 if each.slight or (each.verdict is Verdict.BETTER and not each.of):
                     side, moved = (lost if each.slight else gained), change.decades(each.metric)
                     side[each.method] = max(side.get(each.method, 0.0), math.inf if moved is None else abs(moved))
-        found = {method for method, most in lost.items() if gained.get(method, 0.0) > most}
-        if found:
-            left = (change.set_off(found) for change in self.rows)
-            self.rows = [change for change in left if change.findings]
-        return found
 
-    def take_yardstick(self) -> bool:
-        """Sets apart what changed of heyoka beside a third-party integrator; whether anything did."""
-        if self._third_party:
-            self.yardstick = [change for change in self.rows if change.findings[0].of_yardstick]
-            self.rows = [change for change in self.rows if not change.findings[0].of_yardstick]
-        return bool(self.yardstick)
+        def is_mended(finding: Finding) -> bool:
+            return finding.slight and gained.get(finding.method, 0.0) > lost[finding.method]
+
+        def is_yardstick(finding: Finding) -> bool:
+            return self._third_party and finding.of_yardstick
+
+        rows = (c._replace(findings=[each for each in c.findings if not is_mended(each)]) for c in self.rows)
+        verdicts = [change for change in rows if change.findings]
+        self.yardstick = [change for change in verdicts if is_yardstick(change.findings[0])]
+        self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
+        return lambda finding: is_mended(finding) or is_yardstick(finding)
 
     def coarser(self, change: Change) -> str:
         """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from statistics import median
 from typing import Any, Literal
@@ -255,10 +255,6 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
     def method(self) -> tuple[str, str]:
         """Whose it is: the integrator and its format."""
         return self.row.key.subject.name, self.row.key.precision
-
-    def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
-        """The finding; where it is slight and its integrator gained more than that, the same."""
-        return self.as_same() if self.slight and self.method in mended else self
 
     def as_same(self) -> Finding:
         """The finding, but that it is none."""

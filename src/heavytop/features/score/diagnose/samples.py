@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, decimal_text, dot, log10
+from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -384,5 +384,4 @@ def notable(new: Fraction, old: Fraction) -> bool:
 
 def in_units(value: float | Fraction, unit: Fraction) -> str:
     """A number of the data's own units, to six digits."""
-    text = decimal_text(Fraction(value) * unit, 6)
-    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
+    return plain_decimal(Fraction(value) * unit, 6)
