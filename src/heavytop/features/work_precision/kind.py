@@ -57,7 +57,7 @@ _OF_OTHERS = 0.6
 with other roundings, CVODE and splitting methods move by up to a decade."""
 
 
-class Extent(NamedTuple):
+class Options(NamedTuple):
     """What is measured of a run beside the usual."""
 
     timings: bool = False
@@ -114,7 +114,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
                 f"{subject.name} {subject.setting}",
                 case,
                 *times,
-                Extent(self.timings, self.attitude),
+                Options(self.timings, self.attitude),
             )
             for case in map(find, self.cases)
             for precision, subject in points

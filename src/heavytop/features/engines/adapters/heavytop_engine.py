@@ -19,7 +19,7 @@ ANSWERS: TextIO = os.fdopen(os.dup(1), "w", encoding="utf-8")
 os.dup2(2, 1)  # what engines print, when they are imported or from C++, goes to standard error
 
 
-class Body:
+class RigidBody:
     """What the engine is given, in body axes, SI or any units that fit together.
 
     mass, gravity (it points down, −z of space), centre (from the pivot), inertia (3 × 3, about the centre of mass),
@@ -61,14 +61,14 @@ def serve(name: str, engine: Any) -> None:
     for line in sys.stdin:
         key, *words = line.split()
         if key == "heavytop-integrator":
-            print("ready", name, file=ANSWERS, flush=True)
+            _say("ready", name)
         elif key == "body":
             request[f"body {words[0]}"] = words[1:]
         elif key == "go":
             try:
-                print(*_answers(engine, request), sep="\n", file=ANSWERS, flush=True)
+                _say("\n".join(_answers(engine, request)))
             except (ArithmeticError, RuntimeError, ValueError) as error:
-                print("failed", *str(error).split()[:40], file=ANSWERS, flush=True)
+                _say("failed", *str(error).split()[:40])
             request = {}
         elif key == "quit":
             break
@@ -76,11 +76,16 @@ def serve(name: str, engine: Any) -> None:
             request[key] = words
 
 
+def _say(*words: str) -> None:
+    ANSWERS.write(" ".join(words) + "\n")
+    ANSWERS.flush()
+
+
 def _answers(engine: Any, request: dict[str, list[str]]) -> list[str]:
     control, times = float(request.get("setting", ["0"])[0]), [float(text) for text in request["times"][1:]]
     if not times:
         return ["done steps 0"]
-    run, now, steps, off, lines = engine(Body(request)), 0.0, 0, 0.0, []
+    run, now, steps, off, lines = engine(RigidBody(request)), 0.0, 0, 0.0, []
     began = time.perf_counter()
     for end in times:
         if hasattr(run, "reach"):
