@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import reduce, wraps
+from functools import partial, reduce, wraps
 from inspect import Parameter, Signature, signature
 from operator import or_
 from pathlib import Path
@@ -60,38 +60,6 @@ def require_one_output(csv: Path | None, latex: Path | None, json: bool) -> None
         raise InputError(f"{' and '.join(on_screen)} both print on standard output.", "Give a file for one of them.")
     if csv is not None and csv == latex != _SCREEN:
         raise InputError(f"{csv} is asked for as CSV and as LaTeX.", "Give two files.")
-
-
-def write_motion(
-    document: Callable[[], dict[str, Any]],
-    make_table: Callable[[], MotionTable],
-    text: Callable[[MotionTable], RenderableType],
-    options: _Options,
-) -> None:
-    """Write the files asked for, and one document on standard output: JSON, CSV, LaTeX or the table.
-
-    Raises InputError for a file that cannot be written.
-    """
-    only_json = options.json and options.csv is None and options.latex is None
-    table = None if only_json else make_table().of_case(options.case)
-    screen = None
-    for path, make in ((options.csv, "csv"), (options.latex, "latex")):
-        if path is None or table is None:
-            continue
-        content = getattr(table, make)()
-        if path == _SCREEN:
-            screen = content
-        else:
-            with writing():
-                replace(path, content.encode())
-            say(f"wrote {path}")
-    if options.json:
-        command, version = made_by()
-        print_json({**document(), "command": command, "version": version})
-    elif screen is not None:
-        print(screen, end="")
-    elif table is not None:
-        show_on_terminal(text(table))
 
 
 def farthest(times: Sequence[str]) -> Fraction:
@@ -214,21 +182,37 @@ class _Asked:
     def write(
         self,
         document: Callable[[], dict[str, Any]],
-        table: Callable[[], MotionTable],
+        make_table: Callable[[], MotionTable],
         text: Callable[[MotionTable], RenderableType],
         beside: Sequence[Any],
     ) -> None:
-        """The motion, with what was measured of it behind, as asked for."""
+        """Write the files asked for, and one document on standard output: JSON, CSV, LaTeX or the table, with what was
+        measured beside the motion behind.
 
-        def whole_text(shown: MotionTable) -> RenderableType:
-            from rich.console import Group
-
-            return Group(text(shown), *(each.text() for each in beside)) if beside else text(shown)
-
-        def whole_document() -> dict[str, Any]:
-            return reduce(or_, (each.to_json() for each in beside), document())
-
-        write_motion(whole_document, table, whole_text, self.options)
+        Raises InputError for a file that cannot be written.
+        """
+        options, on_screen = self.options, None
+        only_json = options.json and options.csv is None and options.latex is None
+        table = None if only_json else make_table().of_case(options.case)
+        for path, make in ((options.csv, "csv"), (options.latex, "latex")):
+            if path is None or table is None:
+                continue
+            content = getattr(table, make)()
+            if path == _SCREEN:
+                on_screen = content
+            else:
+                with writing():
+                    replace(path, content.encode())
+                say(f"wrote {path}")
+        if options.json:
+            command, version = made_by()
+            whole = reduce(or_, (each.to_json() for each in beside), document())
+            print_json({**whole, "command": command, "version": version})
+        elif on_screen is not None:
+            print(on_screen, end="")
+        elif table is not None:
+            for each in (text(table), *(each.text() for each in beside)):
+                show_on_terminal(each)
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
@@ -277,6 +261,7 @@ def propagate(
     Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop.api.motions import motion as computed_motion
+    from heavytop.report.render.motion import motion_text, of_motion
 
     say_former([integrator])
     _warn_of_cost(precision, integrator)
@@ -294,17 +279,8 @@ def propagate(
             **settings,
         )
 
-    def table() -> MotionTable:
-        from heavytop.report.render.motion import of_motion
-
-        return of_motion(motion, *made_by())
-
-    def text(shown: MotionTable) -> RenderableType:
-        from heavytop.report.render.motion import motion_text
-
-        return motion_text(motion, shown)
-
-    asked.write(motion.to_json, table, text, asked.beside(_PROPAGATE_SECONDS, precision=precision, **settings))
+    beside = asked.beside(_PROPAGATE_SECONDS, precision=precision, **settings)
+    asked.write(motion.to_json, lambda: of_motion(motion, *made_by()), partial(motion_text, motion), beside)
     return ExitCode.GOOD if motion.complete else ExitCode.INCOMPLETE
 
 
@@ -328,6 +304,7 @@ def reference(
     with M = IΩ; γ points up.
     """
     from heavytop.api.motions import watched_reference
+    from heavytop.report.render.motion import of_reference, reference_text
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
@@ -336,17 +313,9 @@ def reference(
         found = watched_reference(*where, **options)
         found.require_outputs(asked.outputs)
 
-    def table() -> MotionTable:
-        from heavytop.report.render.motion import of_reference
-
-        return of_reference(found, asked.outputs, *made_by())
-
-    def text(shown: MotionTable) -> RenderableType:
-        from heavytop.report.render.motion import reference_text
-
-        return reference_text(found, shown)
-
-    asked.write(lambda: found.document(asked.outputs), table, text, asked.beside(_REFERENCE_SECONDS, digits=digits))
+    beside = asked.beside(_REFERENCE_SECONDS, digits=digits)
+    document, text = partial(found.document, asked.outputs), partial(reference_text, found)
+    asked.write(document, lambda: of_reference(found, asked.outputs, *made_by()), text, beside)
     return ExitCode.GOOD
 
 

@@ -85,11 +85,11 @@ def _toml(data: dict[str, Any]) -> str:
     kind, _, angles = data.get("start_attitude", "").partition(" ")
     if kind == "axis_angle":
         angles = ":".join(angles.rsplit(",", 1))
-    given = {key: data.get(f"start_{key}") for key in ("quaternion", "matrix")} if not kind else {kind: angles}
-    given = {key: value for key, value in given.items() if value}
-    if given:
+    attitude = {key: data.get(f"start_{key}") for key in ("quaternion", "matrix")} if not kind else {kind: angles}
+    attitude = {key: value for key, value in attitude.items() if value}
+    if attitude:
         named.pop("gamma")
-    named |= given
+    named |= attitude
     return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in named.items())])
 
 
@@ -182,5 +182,5 @@ def _draw(case: Case, seed: int, index: int) -> State:
 
 def _kind(case: Case, start: State) -> type | None:
     """The closed form that a random start of the top has as well, or the special one it has not."""
-    found = next(matches(case.top, start, case.system), None)
-    return None if found is None else type(found)
+    solution = next(matches(case.top, start, case.system), None)
+    return None if solution is None else type(solution)

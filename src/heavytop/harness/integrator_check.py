@@ -103,9 +103,9 @@ def check(which: str | IntegratorSource) -> list[Checked]:
 def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> Iterator[Checked]:
     """Each part; where one of the first is violated, or one ends its process, no other is tried."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
-        found, ended = (_part(which, place), False) if process is None else _in_child(process, which, place, name)
-        yield found
-        if found.verdict == "violated" and (ended or place < _FIRST):
+        checked, ended = (_part(which, place), False) if process is None else _in_child(process, which, place, name)
+        yield checked
+        if checked.verdict == "violated" and (ended or place < _FIRST):
             yield Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
             return
 
@@ -216,8 +216,8 @@ class _Contract:
         **more: Any,
     ) -> Trajectory:
         sign = -1 if self.backward_only else 1
-        asked = [sign * Fraction(time) for time in times]
-        about = (top or self.top, start or self.start, asked, precision or self.precision)
+        instants = [sign * Fraction(time) for time in times]
+        about = (top or self.top, start or self.start, instants, precision or self.precision)
         run = registry.ready(self.which)(*about, system=system or self.system, **more)
         if run.outcome is not Outcome.SUCCESS:
             raise _Violated(f"It ends as {run.outcome.value} at t = {decimal_text(run.time_reached, 6)}.")
@@ -297,10 +297,10 @@ class _Contract:
         if self.program and set(self.program.directions) != {"forward", "backward"}:
             return f"It declares {self.program.directions[0]} alone."
         back = self._run([-1])
-        found = self._right(back, "At t = -1 it")
+        sentence = self._right(back, "At t = -1 it")
         if self.system is HEAVY_TOP:
             self._require_as_right(back)
-        return found
+        return sentence
 
     def _require_as_right(self, back: Trajectory) -> None:
         """The heavy top is reversible: from (−Ω, γ) forwards is the same motion, and a method as right on it."""
@@ -420,11 +420,11 @@ class _Contract:
         both = [Session(self.program) for _ in range(2)]
         try:
             with ThreadPoolExecutor(2) as threads:
-                found = list(threads.map(lambda each: each.ask(request), both))
+                replies = list(threads.map(lambda each: each.ask(request), both))
         finally:
             for each in both:
                 each.close()
-        if any([list(state) for state in reply.states] != alone for reply in found):
+        if any([list(state) for state in reply.states] != alone for reply in replies):
             raise _Violated("Two of its processes at once do not answer as one alone: they share something.")
         return "Two of its processes at once answer as one alone."
 

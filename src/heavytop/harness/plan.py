@@ -90,8 +90,8 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
         about, system = "from the plan", system_of(self.system, body)
         if isinstance(body, HeavyTop) and start.attitude is None:
             return require_possible(Case(self.name, about, system, body, start))
-        found = resolve(body, start)
-        case = Case(self.name, about, system, found.top, found.start)
+        resolved = resolve(body, start)
+        case = Case(self.name, about, system, resolved.top, resolved.start)
         return require_possible(replace(case, body=body if isinstance(body, Body) else None, given_start=start))
 
 
@@ -194,18 +194,18 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
     """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
     one name.
     """
-    found: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
+    sources: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
     for text in plan.integrators:
         if text.endswith(".toml"):
-            found += commands_in(folder / text)
+            sources += commands_in(folder / text)
         elif isinstance(source := named(text, folder), str):
             raise InputError(f"integrators = {quoted(text)} is no file.", "Give FILE.toml or FILE.py:FUNCTION.")
         else:
-            found.append(source)
-    defined = {each.name: each for each in found}
+            sources.append(source)
+    defined = {each.name: each for each in sources}
     for name in (name for name in defined if name in known_integrators()):
         raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
-    if len(defined) < len(found):
+    if len(defined) < len(sources):
         raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
     if plan.row_timeout != "":
         seconds_of(plan.row_timeout, "row_timeout")
@@ -260,8 +260,8 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     _require_keys(document, tables)
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
-    whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
-    plan: Plan = msgspec.convert(records.of_document(document), cast(type[Plan], whole))
+    plan_type = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
+    plan: Plan = msgspec.convert(records.of_document(document), cast(type[Plan], plan_type))
     return plan
 
 
@@ -303,8 +303,8 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     own, swept = _own(plan), _swept(plan)
     sweeps = list(zip(plan.sweep, swept.values(), strict=True))
     known = own | {name: cases[0] for name, cases in swept.items()}
-    asked = {name for table in plan.measure for name in getattr(table, "cases", [])}
-    if unused := known.keys() - asked:
+    measured = {name for table in plan.measure for name in getattr(table, "cases", [])}
+    if unused := known.keys() - measured:
         raise InputError(
             f"The plan {plan.name} does not measure {', '.join(sorted(unused))}.",
             "Name it in the cases of a [[measure]], or take it out.",
@@ -386,8 +386,8 @@ def _require_name(name: str, what: str) -> None:
 
 def _exactly(key: RowKey) -> RowKey:
     """The key with its setting as fractions: 1e-3 and 0.001 are the same work."""
-    asked = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
-    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in asked.items()}
+    settings = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
+    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in settings.items()}
     return msgspec.structs.replace(key, subject=msgspec.structs.replace(key.subject, **exactly))
 
 

@@ -269,8 +269,8 @@ def _amplification(problem: Problem, horizon: Fraction) -> float | None:
         start = tuple(map(_in_double, problem.start.flat))
     except OverflowError:
         return None
-    found = amplification(problem.system, parameters, start, horizon)
-    return float(f"{found:.3g}") if math.isfinite(found) else None
+    factor_of_motion = amplification(problem.system, parameters, start, horizon)
+    return float(f"{factor_of_motion:.3g}") if math.isfinite(factor_of_motion) else None
 
 
 def _in_double(value: Fraction) -> Fraction:
@@ -304,9 +304,9 @@ def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Ro
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
     """The largest relative rounding of the data that the run was given: not charged to it, but said."""
-    given = problem.system.parameters(top, start)
+    exact_parameters = problem.system.parameters(top, start)
     rounded = problem.parameters.numbers, problem.start.flat
-    pairs = zip((*given.mapped(Fraction).numbers, *start.flat), sum(rounded, ()), strict=True)
+    pairs = zip((*exact_parameters.mapped(Fraction).numbers, *start.flat), sum(rounded, ()), strict=True)
     return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)
 
 

@@ -111,7 +111,7 @@ def _on_cluster(
             return _AHEAD * len(client.nthreads())
 
         try:
-            for index, future in _windowed(waiting, {}, submit, at_once, lambda i: begun(tasks[i])):
+            for index, future in _windowed(waiting, submit, at_once, lambda i: begun(tasks[i])):
                 try:
                     row, seconds = future.result()
                 except KilledWorker as error:
@@ -134,7 +134,6 @@ def _on_cluster(
 
 def _windowed(
     queue: deque[int],
-    under_way: dict[Future[T], int],
     submit: Callable[[int], Future[T]],
     at_once: Callable[[], int],
     begun: Callable[[int], None],
@@ -143,7 +142,7 @@ def _windowed(
 
     begun: called with the task that is under way for longest, whenever that changes.
     """
-    first = None
+    first, under_way = None, dict[Future[T], int]()
     while queue or under_way:
         limit = at_once()
         for _ in range(min(len(queue), max(limit, 1) - len(under_way))):

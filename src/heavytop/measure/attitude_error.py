@@ -97,9 +97,9 @@ class Convention:
         """
         if form == "quaternion":
             w, x, y, z = values if self.quaternion_order == "wxyz" else (values[3], *values[:3])
-            found = matrix_of_quaternion((w, x, y, z))
+            rows = matrix_of_quaternion((w, x, y, z))
             square = w * w + x * x + y * y + z * z
-            return _directed([[entry / square for entry in row] for row in found], self.quaternion)
+            return _directed([[entry / square for entry in row] for row in rows], self.quaternion)
         if form == "matrix":
             return _directed([values[0:3], values[3:6], values[6:9]], self.matrix)
         angles = [value * lib.pi / 180 for value in values] if self.angles == "degrees" else values
@@ -197,23 +197,22 @@ class ObservedErrors(Statistics):
         self.point = posed.centre if said.point is None else said.point
         self.distance_squared = dot(self.point, self.point)
         self.running = {quantity: Running() for quantity in self._quantities(names)}
-        self.last = 0.0
-        self.apart: dict[tuple[str, str], Fraction] = {}
+        self._last = 0.0
 
     def _quantities(self, names: Sequence[str]) -> list[Quantity]:
-        found = []
+        quantities = []
         if {"omega", "omega_space"} & set(names):
-            found.append(Quantity(SOLUTION_ERROR, "omega"))
+            quantities.append(Quantity(SOLUTION_ERROR, "omega"))
         if "gamma" in names or self.form:
-            found.append(Quantity(SOLUTION_ERROR, "gamma"))
+            quantities.append(Quantity(SOLUTION_ERROR, "gamma"))
         if gives_state(names):
-            found += [Quantity(SOLUTION_ERROR, "along"), Quantity(SOLUTION_ERROR, "across")]
+            quantities += [Quantity(SOLUTION_ERROR, "along"), Quantity(SOLUTION_ERROR, "across")]
         if self.form:
-            found.append(Quantity(ATTITUDE_ERROR))
+            quantities.append(Quantity(ATTITUDE_ERROR))
         if "position" in names:
-            found.append(Quantity(POSITION_ERROR))
-            found += [Quantity(POSITION_ERROR, "relative")] if self.distance_squared else []
-        return [*found, Quantity(SOLUTION_ERROR, "relative")]
+            quantities.append(Quantity(POSITION_ERROR))
+            quantities += [Quantity(POSITION_ERROR, "relative")] if self.distance_squared else []
+        return [*quantities, Quantity(SOLUTION_ERROR, "relative")]
 
     @whole_evaluation
     def __call__(self, time: Fraction, values: Values, state: Sequence[arb] | None) -> None:
@@ -229,7 +228,11 @@ class ObservedErrors(Statistics):
                 found |= {Quantity(SOLUTION_ERROR, "along"): along, Quantity(SOLUTION_ERROR, "across"): across}
             for quantity, running in self.running.items():
                 running.take(time, running.following(found[quantity]), time in self.keep)
-            self.last = float(found[Quantity(SOLUTION_ERROR, "relative")].abs_upper())
+            self._last = float(found[Quantity(SOLUTION_ERROR, "relative")].abs_upper())
+
+    def last(self, rate: Fraction) -> float:
+        """The largest error of a column in the last sample."""
+        return self._last
 
     def _errors(self, values: Values, true: Sequence[arb]) -> dict[Quantity, arb]:
         """Each error at one sample, at the working precision."""
@@ -260,14 +263,14 @@ class ObservedErrors(Statistics):
             return _vector_error("omega", self.said.upright(part), rotated(rows, omega))
         if name == "position":
             return self._position(part, rows)
-        found = self.said.upright(self.said.rotation(name, part, ball_functions()))
-        entries = largest(a - b for u, v in zip(found, rows, strict=True) for a, b in zip(u, v, strict=True))
+        computed = self.said.upright(self.said.rotation(name, part, ball_functions()))
+        entries = largest(a - b for u, v in zip(computed, rows, strict=True) for a, b in zip(u, v, strict=True))
         if name == "quaternion":
             entries = largest((entries, (sum((c * c for c in part), arb(0)) - 1) / 2))
-        third = largest(a - b for a, b in zip(found[2], rows[2], strict=True))
+        third = largest(a - b for a, b in zip(computed[2], rows[2], strict=True))
         return {
             relative: entries,
-            Quantity(ATTITUDE_ERROR): attitude_angle(found, rows),
+            Quantity(ATTITUDE_ERROR): attitude_angle(computed, rows),
             Quantity(SOLUTION_ERROR, "gamma"): third,
         }
 
@@ -310,15 +313,15 @@ def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[
     if not gives_state(list(values)):
         return None
     with working_precision(bits):
-        given = {name: [ball(value) for value in part] for name, part in values.items()}
-        form = next((each for each in FORMS if each in given), None)
-        rows = None if form is None else said.upright(said.rotation(form, given[form], ball_functions()))
-        gamma = given["gamma"] if "gamma" in given else (rows or [])[2]
-        if "omega" in given:
-            omega = given["omega"]
+        columns = {name: [ball(value) for value in part] for name, part in values.items()}
+        form = next((each for each in FORMS if each in columns), None)
+        rows = None if form is None else said.upright(said.rotation(form, columns[form], ball_functions()))
+        gamma = columns["gamma"] if "gamma" in columns else (rows or [])[2]
+        if "omega" in columns:
+            omega = columns["omega"]
         else:
             assert rows is not None
-            omega = list(space_to_body(rows, said.upright(given["omega_space"])))
+            omega = list(space_to_body(rows, said.upright(columns["omega_space"])))
         axes = [[ball(entry) for entry in row] for row in posed.axes]
         return [*space_to_body(axes, omega), *space_to_body(axes, gamma)]
 

@@ -46,13 +46,13 @@ class Ball(msgspec.Struct, frozen=True):
 
         Raises OutOfReach where the radius exceeds 10^-digits, relative to a value above 1.
         """
-        found = cls(*value_text(value, digits + 1))
-        if exact(found.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(found.value))):
+        printed = cls(*value_text(value, digits + 1))
+        if exact(printed.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(printed.value))):
             raise OutOfReach(
-                f"{name} at t = {shown(time)} is known within {found.radius} only, not to {digits} digits{source}.",
+                f"{name} at t = {shown(time)} is known within {printed.radius} only, not to {digits} digits{source}.",
                 "Ask for fewer digits.",
             )
-        return found
+        return printed
 
 
 class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -72,12 +72,12 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
         """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
         import numpy
 
-        found = {
+        arrays = {
             name: numpy.array([[[float(ball.value) for ball in row] for row in rows] for rows in part])
             for name, part in (("start", self.start), ("data", self.data))
             if part is not None
         }
-        return found["start"] if self.data is None else found
+        return arrays["start"] if self.data is None else arrays
 
 
 def which_derivatives(value: object) -> str | None:

@@ -151,10 +151,10 @@ def law(ensemble: Ensemble) -> Law:
         return unresolved
     times, rms = ensemble.times[used], ensemble.rms()[used]
     shares = (errors[:, used] / rms) ** 2
-    found = _exponential(times, rms, shares) or _power(times, rms, shares)
-    if found is None:
+    fit = _exponential(times, rms, shares) or _power(times, rms, shares)
+    if fit is None:
         return unresolved
-    growth, first, slope, (low, high), bend = found
+    growth, first, slope, (low, high), bend = fit
     logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
     return Law(
         growth,
@@ -253,8 +253,8 @@ def _levelled(shares: Array, weights: Array) -> Array:
     for _ in range(_ROUNDS):
         own = (1 / mean) @ shares.T
         mean = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0) @ shares
-    found: Array = numpy.log(mean) / 2
-    return found
+    levelled: Array = numpy.log(mean) / 2
+    return levelled
 
 
 def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:

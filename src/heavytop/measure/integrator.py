@@ -160,8 +160,8 @@ class ChosenIntegrator:
             runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
             return runs
         if options.keys() == {"tolerance"}:
-            given = replace(self, control=("tolerance", options["tolerance"]))
-            return given.propagate_many(problems, times, observer, finished, threads)
+            controlled = replace(self, control=("tolerance", options["tolerance"]))
+            return controlled.propagate_many(problems, times, observer, finished, threads)
         if options:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
         runs = []
@@ -526,26 +526,26 @@ def growing(
     """
     steps = sum(motion.steps for motion in motions) / len(motions)
     step = float(times[-1]) / steps if steps else 0.0
-    found = Growing({}, {}, {})
+    results = Growing({}, {}, {})
     quantities = _drifts(scorers, len(times), motions)
     known = any(scorer.error for scorer in scorers) and reference.samples
     if known:
         quantities |= _errors(starts, motions, reference, distance)
     for quantity, measured in quantities.items():
-        _add(found, quantity, measured, times[: measured.values.shape[1]], step, time_text)
+        _add(results, quantity, measured, times[: measured.values.shape[1]], step, time_text)
     if known:
         values = _values(RELATIVE.over(""), reference.samples, motions)
         # over the starts that reached the end, of the largest of their values
-        found.metrics[RELATIVE] = _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
-    return found
+        results.metrics[RELATIVE] = _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
+    return results
 
 
 def _drifts(scorers: Sequence[Scorer], samples: int, motions: Sequence[Ended]) -> dict[Quantity, _Measured]:
-    found = {}
+    drifts = {}
     for quantity in scorers[0].drift.quantities():
         sizes = numpy.array([float(scorer.drift.initial[quantity.component]) for scorer in scorers])
-        found[quantity] = _Measured(_values(quantity, samples, motions), sizes, 1)
-    return found
+        drifts[quantity] = _Measured(_values(quantity, samples, motions), sizes, 1)
+    return drifts
 
 
 def _errors(
@@ -568,11 +568,11 @@ def _errors(
 
 def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array:
     """Errors at the samples, shape (starts, samples); NaN where a motion did not come that far."""
-    found = numpy.full((len(motions), samples), numpy.nan)
-    for row, motion in zip(found, motions, strict=True):
+    errors = numpy.full((len(motions), samples), numpy.nan)
+    for row, motion in zip(errors, motions, strict=True):
         values = motion.values.get(quantity.text, [])
         row[: len(values)] = values
-    return found
+    return errors
 
 
 def _add(

@@ -30,32 +30,32 @@ def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, 
 
     digits: of γ, and of Ω that was given in space axes, where the attitude is irrational.
     """
-    found: dict[str, Any] = {}
+    texts: dict[str, Any] = {}
     if isinstance(body, HeavyTop):
-        found |= {"inertia": _texts(body.inertia), "weight": exact_text(body.weight)}
+        texts |= {"inertia": _texts(body.inertia), "weight": exact_text(body.weight)}
     else:
         tensor = [value for row in body.tensor for value in row]
-        found |= {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity)}
-        found |= {"inertia": _texts(tensor), "about": PIVOT}
-    found["centre"] = _texts(body.centre)
+        texts |= {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity)}
+        texts |= {"inertia": _texts(tensor), "about": PIVOT}
+    texts["centre"] = _texts(body.centre)
     if body.rotor is not None:
-        found["rotor"] = _texts(body.rotor)
+        texts["rotor"] = _texts(body.rotor)
     attitude = start.attitude
     exact = attitude is None or attitude.exact_rows() is not None
 
     def rounded(values: Sequence[Fraction], known: bool) -> list[str]:
         return _texts(values) if known else [decimal_text(value, digits + 1) for value in values]
 
-    found["omega"] = rounded(start.omega, exact or start.omega_space is None)
-    found["gamma"] = rounded(start.gamma, exact)
+    texts["omega"] = rounded(start.omega, exact or start.omega_space is None)
+    texts["gamma"] = rounded(start.gamma, exact)
     if attitude is not None and attitude.kind in ("quaternion", "matrix"):
-        found[f"start_{attitude.kind}"] = _texts(attitude.numbers)
+        texts[f"start_{attitude.kind}"] = _texts(attitude.numbers)
     elif attitude is not None:
         # read back by score, which takes it for the rotation next to it
         near = attitude.rational_rows(8 * digits + 128)
-        found["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in near for value in row]
-        found["start_attitude"] = f"{attitude.kind} {attitude}"
-    return found
+        texts["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in near for value in row]
+        texts["start_attitude"] = f"{attitude.kind} {attitude}"
+    return texts
 
 
 def _texts(values: Sequence[Fraction]) -> list[str]:

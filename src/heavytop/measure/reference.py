@@ -98,15 +98,15 @@ class KnownMotion:
         Raises OutOfReach where the digits cannot be proven.
         """
         narrow = self._narrow(output)
-        found = [self._value(place, output, narrow) for place in range(len(self.times))]
-        if output.name == "quaternion" and found:
-            turns = self.signs(found)
+        outputs = [self._value(place, output, narrow) for place in range(len(self.times))]
+        if output.name == "quaternion" and outputs:
+            turns = self.signs(outputs)
             # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
             return [
                 [part.neg(exact=True) if part is not None and sign < 0 else part for part in q]
-                for q, sign in zip(found, turns, strict=True)
+                for q, sign in zip(outputs, turns, strict=True)
             ]
-        return found
+        return outputs
 
     def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:
         """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and from it backwards."""
@@ -245,10 +245,10 @@ def as_written(
         start = vector(gamma, "gamma")
         at_start = [ball(value) for value in (*start, *start, *vector(start_xi, "xi"))]
     instants = [exact(str(time)) for time in times]
-    found = {Fraction(0): at_start, **dict(zip(instants, lines, strict=True))}
+    states_at = {Fraction(0): at_start, **dict(zip(instants, lines, strict=True))}
 
     def whole(time: Fraction, bits: int) -> Sequence[Any]:
-        return found[time]
+        return states_at[time]
 
     return KnownMotion(whole, instants, digits, vector(centre, "centre"), start, "the printed balls", as_written=True)
 
@@ -339,8 +339,8 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
     def _in_double(self, what: Output) -> NDArray[np.float64]:
         import numpy
 
-        found = numpy.array(self._outputs(what, nearest), dtype=float)
-        return found.reshape(-1, *what.shape)
+        values = numpy.array(self._outputs(what, nearest), dtype=float)
+        return values.reshape(-1, *what.shape)
 
     def _outputs(self, what: Output, write: Callable[[Any], Any]) -> list[Any]:
         """The output at every time in its shape, each number as ``write`` makes it of a ball, or of None."""
@@ -349,17 +349,17 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
 
     def _known(self) -> KnownMotion:
         """The motion behind the states; of a reference that was read or copied, the balls that are written in it."""
-        found: KnownMotion | None = self.__dict__.get("_motion")
-        if found is None:
+        motion: KnownMotion | None = self.__dict__.get("_motion")
+        if motion is None:
             if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
                 raise InputError(
                     "The attitude was not computed: gamma alone does not fix it.",
                     "Give attitude=True: xi then starts where `heavytop docs outputs` says.",
                 )
             start = self.centre, self.gamma, self.xi
-            found = as_written(self.states, self.attitude, self.times, self.digits, *start)
-            self.__dict__["_motion"] = found
-        return found
+            motion = as_written(self.states, self.attitude, self.times, self.digits, *start)
+            self.__dict__["_motion"] = motion
+        return motion
 
     def to_numpy(self) -> NDArray[np.float64]:
         """The values rounded to double, shape (n, 6)."""
@@ -391,12 +391,12 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
         derivatives with respect to the start were not asked for.
         """
-        found = self._derivatives().lyapunov
-        if found is None:
+        exponents = self._derivatives().lyapunov
+        if exponents is None:
             raise InputError(
                 "This reference has no derivatives with respect to the start.", 'Ask for derivatives="start" or "all".'
             )
-        return found
+        return exponents
 
     def _derivatives(self) -> Derivatives:
         if self.derivatives is None:

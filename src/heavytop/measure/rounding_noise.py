@@ -203,5 +203,5 @@ def banded(run: Trajectory, metrics: Metrics, reruns: Sequence[Metrics]) -> Metr
         name: metric if metric.log10 is None else replace_struct(metric, log10=metric.log10 + coarser)
         for name, metric in metrics.items()
     }
-    found = bands(reruns, _FLOOR, own)
-    return {name: replace_struct(metric, band=found.get(name)) for name, metric in metrics.items()}
+    widths = bands(reruns, _FLOOR, own)
+    return {name: replace_struct(metric, band=widths.get(name)) for name, metric in metrics.items()}

@@ -127,8 +127,8 @@ def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
 
 def digits_kept(row: Row) -> float | None:
     """The digits of :func:`digits_right` to two places."""
-    found = digits_right(row)
-    return None if found is None else round(found, 2)
+    right = digits_right(row)
+    return None if right is None else round(right, 2)
 
 
 def digits_right(row: Row) -> float | None:

@@ -40,11 +40,6 @@ DRIFT = "drift"
 """The name of the quantity; its components are the first integrals."""
 
 
-def drift_of(integral: str) -> Quantity:
-    """The drift of the first integral of that name."""
-    return Quantity(DRIFT, integral)
-
-
 class Running:
     """Maximum, mean square and last of a stream of balls, and its values at chosen times."""
 
@@ -152,7 +147,8 @@ class Drift(Statistics):
         self.keep = frozenset(keep)
         self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
         if problem.xi is not None:
-            self.functions |= {"xi_squared": _xi_squared, "xi_dot_gamma": _xi_dot_gamma}
+            self.functions["xi_squared"] = lambda _, y: dot(y[6:9], y[6:9])
+            self.functions["xi_dot_gamma"] = lambda _, y: dot(y[6:9], y[3:6])
         self.parameters = parameter_balls(problem, self.bits)
         self.initial = self._values((*problem.start.flat, *(problem.xi or ())))
         self.running = {name: Running() for name in self.functions}
@@ -187,7 +183,7 @@ class Drift(Statistics):
 
     def quantities(self) -> dict[Quantity, Running]:
         """The running values by what they are of."""
-        return {drift_of(name): values for name, values in self.running.items()}
+        return {Quantity(DRIFT, name): values for name, values in self.running.items()}
 
 
 @whole_evaluation
@@ -195,14 +191,6 @@ def parameter_balls(problem: Problem, bits: int) -> Parameters:
     """I, P r and the rotor of a problem as balls of ``bits`` bits."""
     with working_precision(bits):
         return problem.parameters.mapped(ball)
-
-
-def _xi_squared(_: Parameters, y: Any) -> Any:
-    return dot(y[6:9], y[6:9])
-
-
-def _xi_dot_gamma(_: Parameters, y: Any) -> Any:
-    return dot(y[6:9], y[3:6])
 
 
 # Distance of a computed motion from a known one that starts from the same rounded data.

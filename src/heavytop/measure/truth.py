@@ -102,11 +102,11 @@ class ComputedReference:
 
     def beyond(self, part: Fraction) -> set[Fraction]:
         """The times at which Ω or γ is uncertain by more than this part of the largest that it becomes."""
-        found: set[Fraction] = set()
+        uncertain: set[Fraction] = set()
         for group in (slice(0, 3), slice(3, 6)):
             largest = max(abs(midpoint(value)) for state in self.balls.values() for value in state[group])
-            found |= {t for t, state in self.balls.items() if radius(state[group][0]) > part * largest}
-        return found
+            uncertain |= {t for t, state in self.balls.items() if radius(state[group][0]) > part * largest}
+        return uncertain
 
 
 def agreement(found: Sequence[ComputedReference]) -> Against:
@@ -128,8 +128,8 @@ def of_rounded(
     Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
     """
     bits = problems[0].precision.bits
-    given = [partial(_in_format, problem) for problem in problems]
-    return compute(given, times, max(least, bits + MORE_BITS), bits, effort)
+    motions = [partial(_in_format, problem) for problem in problems]
+    return compute(motions, times, max(least, bits + MORE_BITS), bits, effort)
 
 
 def _in_format(problem: Problem, precision: Precision) -> Problem:
@@ -263,13 +263,13 @@ def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[
 
 def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
     one, two = ([exact(value) for value in state] for state in (coarse, fine))
-    found: list[arb] = []
+    balls: list[arb] = []
     for k in range(0, len(one), 3):
         group = two[k : k + 3]
         apart = max(abs(b - a) for a, b in zip(one[k : k + 3], group, strict=True))
         apart += max(map(abs, group)) * Fraction(2) ** -bits
-        found += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
-    return found
+        balls += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
+    return balls
 
 
 CHEAP = 1.0
@@ -367,12 +367,12 @@ def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
 
 def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
     try:
-        (found,) = of_rounded([problem], times, effort=effort)
+        (computed,) = of_rounded([problem], times, effort=effort)
     except (InputError, OutOfReach) as error:
         return clause(error)
-    if found.ends == times[0]:
-        return f"all significant digits of the format are lost at t = {time_text(found.ends)}, the first sample"
-    return Truth(found.against, found.state, found.ends)
+    if computed.ends == times[0]:
+        return f"all significant digits of the format are lost at t = {time_text(computed.ends)}, the first sample"
+    return Truth(computed.against, computed.state, computed.ends)
 
 
 def clause(error: HeavyTopError) -> str:
@@ -410,12 +410,12 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     """
     bits = problem.precision.bits + GUARD_BITS
     try:
-        found = closed_form(problem)
-        if found is None:
-            found = Validated(problem.top, problem.start, problem.system)
-            if abs(horizon) > _ALWAYS_ENCLOSED and found.cost(horizon, bits, CHEAP) > CHEAP:
+        solution = closed_form(problem)
+        if solution is None:
+            solution = Validated(problem.top, problem.start, problem.system)
+            if abs(horizon) > _ALWAYS_ENCLOSED and solution.cost(horizon, bits, CHEAP) > CHEAP:
                 return f"no closed form, and an enclosure to |t| = {time_text(abs(horizon))} takes too long"
-        known = certified(found, horizon, bits)
+        known = certified(solution, horizon, bits)
     except OutOfReach as error:
         return clause(error)
     return known or "certified to fewer digits than the format has"

@@ -32,7 +32,6 @@ from heavytop.report.render.plots import digits
 from heavytop.report.render.plots import growth as over_time
 from heavytop.report.render.terminal import laws_in_short
 from heavytop.top.attitude import perpendicular
-from heavytop.top.heavy_top import HeavyTop, State
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
@@ -149,7 +148,8 @@ class Growth(Kind):
         members = ensemble_of(case, run.starts, run.seed)
         true = [Problem.of(*member, precision, case.system) for member in members]
         turned = run.attitude and task.integrator.carries_attitude
-        posed = [_posed(problem, *member) if turned else problem for problem, member in zip(true, members, strict=True)]
+        # with the ξ that a start without attitude has
+        posed = [Problem.of(*m, precision, case.system, perpendicular(m[1].gamma)) for m in members] if turned else true
         given = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]
         before = saved.load()
@@ -202,11 +202,6 @@ def _cells(row: Row, law: Law) -> list[Cell]:
         short(law.detects or "-", 2),
         short(law.lost_at or "-", 2),
     ]
-
-
-def _posed(problem: Problem, top: HeavyTop, start: State) -> Problem:
-    """The problem with the ξ that a start without attitude has."""
-    return Problem.of(top, start, problem.precision, problem.system, perpendicular(start.gamma))
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:

@@ -112,10 +112,10 @@ def hunt(
 
 
 def _seed(value: int) -> int:
-    found = as_integer(value, "seed")
-    if not 0 <= found <= 10**9:
-        raise InputError(f"There is no seed {quoted(found)}.", "Give a number from 0 to 1000000000.")
-    return found
+    number = as_integer(value, "seed")
+    if not 0 <= number <= 10**9:
+        raise InputError(f"There is no seed {quoted(number)}.", "Give a number from 0 to 1000000000.")
+    return number
 
 
 def _budget(value: int | str) -> tuple[int | None, float | None]:

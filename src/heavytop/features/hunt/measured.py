@@ -201,12 +201,12 @@ def is_plain(index: int) -> bool:
 def changed(one: Motion, other: Motion, seed: str, family: Family, horizon: Fraction) -> Motion:
     """``one`` with one to three changes; ``other`` may give it its body or its start."""
     dice = Dice(seed)
-    found = one
+    motion = one
     for _ in range(1 + dice.below(3)):
-        found = _crossed(found, other, dice) if dice.below(8) == 0 else dice.pick(_CHANGES)(found, dice)
-    if found[0].rotor is not None and dice.below(3) == 0:
-        found = _rotored(found, dice)
-    return possible(found, family, horizon) or one
+        motion = _crossed(motion, other, dice) if dice.below(8) == 0 else dice.pick(_CHANGES)(motion, dice)
+    if motion[0].rotor is not None and dice.below(3) == 0:
+        motion = _rotored(motion, dice)
+    return possible(motion, family, horizon) or one
 
 
 def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None:
@@ -229,8 +229,8 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
     sizes = [abs(value) for value in (*inertia, weight, *centre, *omega, *(rotor or ())) if value]
     if max(sizes) > _LARGEST or min(sizes) * _LARGEST < 1:
         return None
-    found = HeavyTop(inertia, weight, centre, rotor), State(omega, start.gamma)
-    return found if turns(found, horizon) <= MOST_TURNS else None
+    rounded = HeavyTop(inertia, weight, centre, rotor), State(omega, start.gamma)
+    return rounded if turns(rounded, horizon) <= MOST_TURNS else None
 
 
 def turns(motion: Motion, horizon: Fraction) -> float:
@@ -470,17 +470,17 @@ class Meter:
         truths = self._truths(problems, rates)
         runs = self._runs(self.integrator, problems, motions, self._apart)
         others = [] if self.against is None else self._runs(self.against, problems, motions, None)
-        found = []
+        measured = []
         for i, (motion, unit, (true, grown), run) in enumerate(zip(motions, rates, truths, runs, strict=True)):
             turns = float(unit * abs(self.horizon))
             other = self._error(others[i], true, unit) if others and true else None
             if not true:
-                found.append(MeasuredMotion(motion, "", 0.0, grown, turns))
+                measured.append(MeasuredMotion(motion, "", 0.0, grown, turns))
             else:
                 error = self._error(run, true, unit)
                 outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
-                found.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
-        return found
+                measured.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
+        return measured
 
     def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> IntegratedRun:
         """One run of the integrator that is hunted, or of another."""
@@ -513,15 +513,15 @@ class Meter:
             replace(each, start=_moved(each.start, unit, self._shift)) for each, unit in zip(fine, rates, strict=True)
         ]
         runs = self._finely([*fine, *moved])
-        found: list[tuple[list[list[Fraction]] | None, float]] = []
+        truths: list[tuple[list[list[Fraction]] | None, float]] = []
         for i, unit in enumerate(rates):
             one, two = runs[i], runs[len(fine) + i]
             if one is None:
-                found.append((None, math.inf))
+                truths.append((None, math.inf))
                 continue
             grown = math.inf if two is None else _growth(one, two, unit, self._shift)
-            found.append((one, max(1.0, grown)))
-        return found
+            truths.append((one, max(1.0, grown)))
+        return truths
 
     def _finely(self, problems: Sequence[Problem]) -> list[list[list[Fraction]] | None]:
         times = [number(time, self._fine) for time in self.times]
@@ -585,10 +585,10 @@ _FAST = 20.0
 def class_of(top: HeavyTop, start: State) -> str:
     """The closed form that the motion has."""
     try:
-        found = next(matches(top, start, system_of(None, top)), None)
+        solution = next(matches(top, start, system_of(None, top)), None)
     except HeavyTopError:
         return NO_CLASS
-    return NO_CLASS if found is None else found.method
+    return NO_CLASS if solution is None else solution.method
 
 
 def special(found: MeasuredMotion) -> list[str]:
@@ -598,7 +598,7 @@ def special(found: MeasuredMotion) -> list[str]:
 
 
 def _moments(top: HeavyTop) -> list[str]:
-    said = []
+    sentences = []
     for i, j in ((0, 1), (1, 2), (0, 2)):
         a, b = sorted((top.inertia[i], top.inertia[j]), reverse=True)
         ratio = round(a / b)
@@ -606,14 +606,14 @@ def _moments(top: HeavyTop) -> list[str]:
         if ratio <= 3 and abs(off) < _NEAR * 20:
             names = (i, j) if top.inertia[i] == a else (j, i)
             near = "" if off == 0 else f" but for {abs(off):.1g}"
-            said.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{near}")
+            sentences.append(f"I{names[0] + 1}/I{names[1] + 1} = {ratio}{near}")
     slack = float((sum(top.inertia) - 2 * max(top.inertia)) / max(top.inertia))
     if slack < _NEAR * 20:
-        said.append("at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""))
+        sentences.append("at the edge of the triangle inequality" + (f", {slack:.1g} from it" if slack else ""))
     stiff = float(max(top.inertia) / min(top.inertia))
     if stiff > _FAST:
-        said.append(f"moments of very different size, 1 : {stiff:.3g}")
-    return said
+        sentences.append(f"moments of very different size, 1 : {stiff:.3g}")
+    return sentences
 
 
 def _start(top: HeavyTop, start: State) -> list[str]:
@@ -622,32 +622,31 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     pull = dot(top.moment, top.moment)
     spin = math.sqrt(dot(start.omega, start.omega))
     own = math.sqrt(math.sqrt(pull) / float(min(top.inertia)))
-    said = []
+    sentences = []
     if spin == 0 or own == 0:
-        said.append("Ω = 0" if spin == 0 else "no torque of the weight")
+        sentences.append("Ω = 0" if spin == 0 else "no torque of the weight")
     elif spin > _FAST * own:
-        said.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
+        sentences.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
     elif own > _FAST * spin:
-        said.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
+        sentences.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
     field = [abs(value) for value in system.field(parameters.mapped(Fraction), start.flat)]
     unit = spin + own or 1.0
     speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
     if not any(field):
-        said.append("an equilibrium")
+        sentences.append("an equilibrium")
     elif speed < _NEAR:
-        said.append(f"near an equilibrium: the field is {speed:.1g} of what it could be")
+        sentences.append(f"near an equilibrium: the field is {speed:.1g} of what it could be")
     energy = dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma)
     height = math.sqrt(pull)
     if height and abs(float(energy) / height - 1) < _NEAR:
-        said.append("near a separatrix: its energy is that of rest with the centre of mass above")
-    return [*said, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
+        sentences.append("near a separatrix: its energy is that of rest with the centre of mass above")
+    return [*sentences, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
 
 
 def _growth_text(found: MeasuredMotion) -> list[str]:
-    eaten = digits_eaten(found.amplification)
     chaotic = found.amplification > 100 * (1 + found.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
-    said = [f"{found.turns:.3g} radians until the horizon"]
-    return (
-        [*said, f"the motion itself amplifies by {found.amplification:.2g}{kind}"] if eaten >= _FEW or chaotic else said
-    )
+    sentences = [f"{found.turns:.3g} radians until the horizon"]
+    if digits_eaten(found.amplification) >= _FEW or chaotic:
+        sentences.append(f"the motion itself amplifies by {found.amplification:.2g}{kind}")
+    return sentences

@@ -191,7 +191,7 @@ def _directions() -> Any:
     """Unit vectors with numerators and denominators of at most three digits: integers, shape (n, 4), each the common
     denominator, in order, and three numerators.
     """
-    found: dict[tuple[int, int, int, int], None] = {}
+    directions: dict[tuple[int, int, int, int], None] = {}
     for n in range(1, _MOST_DENOMINATOR + 1):
         for a, b in product(range(-n, n + 1), repeat=2):
             norm = n * n + a * a + b * b
@@ -200,21 +200,21 @@ def _directions() -> Any:
                 common = gcd(u, v, w, norm)
                 u, v, w, norm = u // common, v // common, w // common, norm // common
                 for part in (w, -w):
-                    found |= dict.fromkeys([(norm, u, v, part), (norm, v, part, u), (norm, part, u, v)])
-    return numpy.array(sorted(found, key=lambda each: each[0]))
+                    directions |= dict.fromkeys([(norm, u, v, part), (norm, v, part, u), (norm, part, u, v)])
+    return numpy.array(sorted(directions, key=lambda each: each[0]))
 
 
 def _simpler(value: Fraction) -> list[Fraction]:
     """Simpler numbers: 0, ±1, integers, halves, fractions and decimals of one, two and three digits."""
-    found = {Fraction(0), Fraction(1), Fraction(-1), abs(value)}
+    candidates = {Fraction(0), Fraction(1), Fraction(-1), abs(value)}
     if abs(value) < 1000:
-        found |= {Fraction(round(value) + k) for k in (-1, 0, 1)}
-        found |= {value.limit_denominator(most) for most in (2, 3, 5, 9, 30, 99)}
+        candidates |= {Fraction(round(value) + k) for k in (-1, 0, 1)}
+        candidates |= {value.limit_denominator(most) for most in (2, 3, 5, 9, 30, 99)}
     if value:
-        found |= {Fraction(decimal_text(value, n)) for n in (1, 2, 3)}
+        candidates |= {Fraction(decimal_text(value, n)) for n in (1, 2, 3)}
         power = Fraction(10) ** len(str(int(abs(value)))) if abs(value) >= 1 else Fraction(1)
-        found |= {power * (1 if value > 0 else -1), power / 10 * (1 if value > 0 else -1)}
-    return [each for each in found if digits(each) <= digits(value) and each != value]
+        candidates |= {power * (1 if value > 0 else -1), power / 10 * (1 if value > 0 else -1)}
+    return [each for each in candidates if digits(each) <= digits(value) and each != value]
 
 
 _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
@@ -267,7 +267,7 @@ def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) 
         return math.inf
     bits = problem.precision.bits + GUARD_BITS
     unit = rate(problem.system, problem.parameters, problem.start.flat) or 1
-    found = 0.0
+    distance = 0.0
     with working_precision(bits):
         for time, state in zip(meter.times, run.states, strict=True):
             if not known.covers(time):
@@ -279,8 +279,8 @@ def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) 
             if not all(each.is_finite() for each in apart):
                 return math.inf
             scaled: arb = largest((largest(apart[:3]) / rational(unit), largest(apart[3:])))
-            found = max(found, float(scaled.abs_lower()))
-    return found
+            distance = max(distance, float(scaled.abs_lower()))
+    return distance
 
 
 FIRST = 64
@@ -469,12 +469,12 @@ class _Hunt:
 
     def _shrunk(self) -> list[MeasuredMotion]:
         """The worst found, shrunk; of several that shrink to the same one."""
-        found: dict[object, MeasuredMotion] = {}
+        simplest: dict[object, MeasuredMotion] = {}
         worst = sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]
         for hit in worst:
             simple = hit if hit.outcome == OUT_OF_TIME else self._simple(hit)
-            found.setdefault(_shape(simple.motion), simple)
-        return sorted(found.values(), key=self._score, reverse=True)[:_SHOWN]
+            simplest.setdefault(_shape(simple.motion), simple)
+        return sorted(simplest.values(), key=self._score, reverse=True)[:_SHOWN]
 
     def _simple(self, hit: MeasuredMotion) -> MeasuredMotion:
         """The simplest that shows the same; the amplification over all directions is asked at the end, and on the way

@@ -39,10 +39,10 @@ def worst_lines(hunted: Hunted) -> list[str]:
     lines = []
     for m in hunted.worst:
         part = m.error / max(hunted.law * m.explained(eps), 1e-300)
-        said = "; ".join([class_of(*m.motion), *special(m)])
+        about = "; ".join([class_of(*m.motion), *special(m)])
         lines.append(
             f"{digits_lost(m.error, eps)} digits lost, {m.error / hunted.asked.unit:.2g} eps T^1.5, "
-            f"{part:.2g} of what is explained: {said}."
+            f"{part:.2g} of what is explained: {about}."
         )
     return lines
 
@@ -66,10 +66,10 @@ def _nothing(hunted: Hunted) -> list[str]:
         beyond = f"an error of {asked.limit:.3g} eps T^1.5"
     else:
         beyond = f"an error two decades beyond what explains it: {law_text(hunted)}"
-    said = [fill(f"Nothing was found: no run failed, and none has {beyond}.", _WIDTH)]
+    lines = [fill(f"Nothing was found: no run failed, and none has {beyond}.", _WIDTH)]
     if hunted.worst:
-        said += ["The worst:", *_folded(worst_lines(hunted))]
-    return said
+        lines += ["The worst:", *_folded(worst_lines(hunted))]
+    return lines
 
 
 def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion, p: Proof) -> list[str]:

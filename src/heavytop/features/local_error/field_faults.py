@@ -63,15 +63,15 @@ def _terms(system: System) -> _Terms:
     parts = [sympy.symbols(" ".join(f"{letter}{i}" for i in (1, 2, 3))) for letter in "Ink"]
     p = Parameters(parts[0], parts[1], parts[2] if len(_rotors(system)) == 3 else sympy.Symbol("λ"))
     y = sympy.symbols(" ".join(NAMES))
-    found = [
+    terms = [
         (place, term)
         for place, derivative in enumerate(system.field(p, y))
         for term in sympy.Add.make_args(sympy.expand(derivative))
     ]
-    values = sympy.lambdify([[*p.numbers], [*y]], [term for _, term in found], "numpy")
-    texts = [str(term).replace("*", " ").removeprefix("-") for _, term in found]
-    monomials = [str(sympy.Mul(*(f for f in sympy.Mul.make_args(t) if f.free_symbols & {*y}))) for _, t in found]
-    return _Terms(values, tuple(place for place, _ in found), tuple(monomials), tuple(texts))
+    values = sympy.lambdify([[*p.numbers], [*y]], [term for _, term in terms], "numpy")
+    texts = [str(term).replace("*", " ").removeprefix("-") for _, term in terms]
+    monomials = [str(sympy.Mul(*(f for f in sympy.Mul.make_args(t) if f.free_symbols & {*y}))) for _, t in terms]
+    return _Terms(values, tuple(place for place, _ in terms), tuple(monomials), tuple(texts))
 
 
 def _rotors(system: System) -> tuple[int, ...]:
@@ -129,8 +129,8 @@ class _Steps:
 
     def _field(self, numbers: Array, weights: Array, y: Array) -> Array:
         values = numpy.array(numpy.broadcast_arrays(*self.terms.values(numbers, y.T)))
-        found: Array = (self.sums * weights @ values).T
-        return found
+        field: Array = (self.sums * weights @ values).T
+        return field
 
     def of(self, factor: _Factor | None, s: float) -> Array:
         """The combined ends of motions of the field with that factor, by the classical Runge-Kutta method."""
@@ -138,7 +138,7 @@ class _Steps:
         if factor is not None:
             numbers[list(factor.numbers)] *= s
             weights[list(factor.terms)] = s
-        y, found = self.starts, numpy.zeros_like(self.starts)
+        y, ends = self.starts, numpy.zeros_like(self.starts)
         count = max(1, math.ceil(self.length * self.rate / _RADIANS))
         h = self.length / count
         for n in range(1, max(self.weights) + 1):
@@ -148,8 +148,8 @@ class _Steps:
                 k3 = self._field(numbers, weights, y + h / 2 * k2)
                 k4 = self._field(numbers, weights, y + h * k3)
                 y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            found = found + self.weights.get(n, 0.0) * y
-        return found
+            ends = ends + self.weights.get(n, 0.0) * y
+        return ends
 
     def left(self, factor: _Factor, s: float) -> float:
         """The largest error that remains with that factor; infinite where a motion is not finite."""
@@ -172,8 +172,8 @@ class _Steps:
 def _weights(order: int) -> dict[int, float]:
     """Weights of the ends after h, 2 h and 4 h: 1 of what is linear in the length, 0 of its powers p + 1 and p + 2."""
     n = numpy.array(_LENGTHS, dtype=float)
-    found = numpy.linalg.solve(numpy.array([n, n ** (order + 1), n ** (order + 2)]), [1.0, 0.0, 0.0])
-    return dict(zip(_LENGTHS, found.tolist(), strict=True))
+    weights = numpy.linalg.solve(numpy.array([n, n ** (order + 1), n ** (order + 2)]), [1.0, 0.0, 0.0])
+    return dict(zip(_LENGTHS, weights.tolist(), strict=True))
 
 
 def _floats(states: Sequence[Any]) -> Array:

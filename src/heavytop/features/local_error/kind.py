@@ -112,10 +112,10 @@ class LocalErrorKind(Kind):
         """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
         where there are any; then a line a row.
         """
-        told = _told(rows)
-        if told:
-            yield Headline(_said(max(told, key=_size)))
-        yield from (Note(_said(row), shown=In.SHORT) for row in told)
+        shown = _told(rows)
+        if shown:
+            yield Headline(_said(max(shown, key=_size)))
+        yield from (Note(_said(row), shown=In.SHORT) for row in shown)
         columns = "case", "format", "steps", "largest", "rms", "order seen", "of runs", "declared", "outcome"
         title = "Single steps, each against the proven motion from where it starts"
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
@@ -149,8 +149,8 @@ def _with_fault(row: Row, error: local_error.LocalError) -> Row:
     seen = row.metrics.get(ORDER_OF_RUNS.text) or row.metrics.get(OBSERVED_ORDER.text)
     if not error.calls or (seen is not None and row.order and float(seen) >= row.order):
         return row
-    found = field_fault(error.problem, error.calls, row.order or 0)
-    return msgspec.structs.replace(row, explained=found) if found else row
+    fault = field_fault(error.problem, error.calls, row.order or 0)
+    return msgspec.structs.replace(row, explained=fault) if fault else row
 
 
 def _cells(row: Row) -> list[Cell]:

@@ -87,7 +87,7 @@ class LocalError:
         """The sums of the errors with this step, and the order seen in it, if any."""
         with working_precision(self.bits):
             scale = ball(self.problem.precision.eps * size)
-            gaps = {n: _largest_gap(_end(step, n), true) for n, true in truths.items()}
+            gaps = {n: largest(a - b for a, b in zip(_end(step, n), true, strict=True)) for n, true in truths.items()}
             least = ball(0) if isinstance(step, TaylorStep) else _ABOVE_ROUNDING * scale
             seen = [n for n, gap in gaps.items() if n > 1 and resolved(gap) and gap > least][:2]
             order: tuple[float, ...] = ()
@@ -116,10 +116,6 @@ class LocalError:
                 found[OBSERVED_ORDER] = Metric("missing", None, "value")
         found.pop(LOCAL_ERROR.over("final"))
         return by_name(found)
-
-
-def _largest_gap(state: Sequence[arb], truth: Sequence[arb]) -> arb:
-    return largest(value - true for value, true in zip(state, truth, strict=True))
 
 
 def _end(step: TaylorStep | Call, n: int) -> list[arb]:
@@ -262,9 +258,9 @@ def order_of_runs(integrator: ChosenIntegrator, whole: Trajectory) -> float | No
     def error(place: int) -> Fraction | None:
         """At the step h 2^place; None where the run fails, or rounding may have made it."""
         taken = step * Fraction(2) ** place
-        asked = replace(integrator, control=("step", taken))
+        refined = replace(integrator, control=("step", taken))
         try:
-            run = asked.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
+            run = refined.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
         except PeerFailed:
             return None
         if run.outcome is not Outcome.SUCCESS:

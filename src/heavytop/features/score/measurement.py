@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -63,13 +63,12 @@ _WORDS = {
 
 
 def exact_problem(given: GivenTrajectory) -> Problem:
-    """The problem in the format of the trajectory, whose principal data are exact: the body was rounded before."""
-    found = observed_of(given)
-    top, start = found.posed.top, found.posed.start
-    attitude = set(found.columns) - {"omega", "gamma"}
-    parameters = given.system.parameters(top, start)
-    xi = found.posed.xi if attitude else None
-    return Problem(given.system, given.precision, parameters, start, xi, (top, start))
+    """The problem in the format of the trajectory; of attitudes its data are exact: the body was rounded before."""
+    if given.observed is None:
+        return Problem.of(given.top, given.start, given.precision, given.system)
+    posed, attitude = given.observed.posed, set(given.observed.columns) - {"omega", "gamma"}
+    parameters, xi = given.system.parameters(posed.top, posed.start), posed.xi if attitude else None
+    return Problem(given.system, given.precision, parameters, posed.start, xi, (posed.top, posed.start))
 
 
 def observed_of(given: GivenTrajectory) -> Observed:
@@ -86,23 +85,6 @@ class Scored:
     problem: Problem
     scorer: DriftAndError
     errors: list[float]
-
-
-def _observed(given: GivenTrajectory, progress: Progress) -> Scored:
-    """A trajectory of attitudes, positions or Ω in any axes: samples up to the first that is not finite."""
-    found, problem = observed_of(given), exact_problem(given)
-    times = [round_to(time, given.precision.bits) for time in given.times]
-    keep = [times[i - 1] for i in log_spaced(len(times))]
-    true = truth(problem, times, _REFERENCE_EFFORT)
-    known = true if isinstance(true, str) else true.remembered()
-    scorer = ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
-    errors: list[float] = []
-    for row, time in enumerate(times[: _count(found)]):
-        scorer(time, found.sample(row))
-        if scorer.error is not None and scorer.error.truth.covers(time):
-            errors.append(scorer.error.last)
-        progress()
-    return Scored(_row(given, problem, times, keep, scorer), problem, scorer, errors)
 
 
 def _count(found: Observed) -> int:
@@ -336,23 +318,26 @@ def _of_clock(given: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, Give
 
 
 def _measured(given: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
-    """The row, what made it, and the error of each state relative to the size of Ω and γ where the reference goes."""
-    return (_of_states if given.observed is None else _observed)(given, progress)
-
-
-def _of_states(given: GivenTrajectory, progress: Progress) -> Scored:
-    """A trajectory of Ω and γ in principal axes."""
-    precision = given.precision
-    problem = Problem.of(given.top, given.start, precision, given.system)
-    states = _finite(given)
-    times = [round_to(time, precision.bits) for time in given.times]
+    """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes."""
+    found, rate = given.observed, turning_rate(given.top, given.start)
+    problem = (
+        Problem.of(given.top, given.start, given.precision, given.system) if found is None else exact_problem(given)
+    )
+    times = [round_to(time, given.precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    true = truth(problem, times, _REFERENCE_EFFORT)
-    scorer = Scorer(problem, true if isinstance(true, str) else true.remembered(), keep)
+    known = truth(problem, times, _REFERENCE_EFFORT)
+    known = known if isinstance(known, str) else known.remembered()
+    samples: Iterable[Any] = _finite(given)
+    scorer: Scorer | ObservedScorer = (
+        Scorer(problem, known, keep)
+        if found is None
+        else ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
+    )
+    if found is not None:
+        samples = map(found.sample, range(_count(found)))
     errors: list[float] = []
-    rate = turning_rate(given.top, given.start)
-    for time, state in zip(times, states, strict=False):
-        scorer(time, state)
+    for time, sample in zip(times, samples, strict=False):
+        scorer(time, sample)
         if scorer.error is not None and scorer.error.truth.covers(time):
             errors.append(scorer.error.last(rate))
         progress()

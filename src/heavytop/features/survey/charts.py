@@ -85,12 +85,12 @@ def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys,
     decades(axes.xaxis)
     alternative = []
     for source, row in rows:
-        found = _spread(row).histograms.get(name)
-        if found is None:
+        histogram = _spread(row).histograms.get(name)
+        if histogram is None:
             continue
         key = section.key(keys.key(_label("", row), source))
-        part = numpy.array([0, *found.counts, 0]) / sum(found.counts)
-        middles = found.first + found.width * (numpy.arange(len(part)) - 0.5)
+        part = numpy.array([0, *histogram.counts, 0]) / sum(histogram.counts)
+        middles = histogram.first + histogram.width * (numpy.arange(len(part)) - 0.5)
         draw(axes, key, middles, part)
         alternative.append(f"{key.label}: most at 10^{middles[int(part.argmax())]:.1f}.")
     axes.set_ylim(bottom=0)

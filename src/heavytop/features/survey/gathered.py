@@ -5,10 +5,9 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 import numpy
@@ -132,13 +131,13 @@ def cell_map(
     width, height = (len(e) - 1 for e in edges)
     cell = up * width + across
     order = numpy.lexsort((lost[kept], cell))
-    found: list[float | None] = [None] * (width * height)
+    medians: list[float | None] = [None] * (width * height)
     counts = numpy.bincount(cell, minlength=width * height)
     ends = numpy.cumsum(counts)
     ordered = lost[kept][order]
     for place in numpy.flatnonzero(counts).tolist():
-        found[place] = round(float(ordered[ends[place] - 1 - counts[place] // 2]), 3)
-    rows = tuple(tuple(found[k * width : (k + 1) * width]) for k in range(height))
+        medians[place] = round(float(ordered[ends[place] - 1 - counts[place] // 2]), 3)
+    rows = tuple(tuple(medians[k * width : (k + 1) * width]) for k in range(height))
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
 
@@ -167,17 +166,14 @@ _NORMAL = 1.959964
 """Standard deviations of a 95 % interval."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Bad:
-    index: int
-    error: float
+class _Bad(NamedTuple):
+    """A motion, the worst the smallest: failed runs first, then the largest errors, then the first drawn."""
+
+    reached: bool
+    minus_error: float
+    motion: int
     digits: float
     outcome: str
-
-    @property
-    def order(self) -> tuple[bool, float, int]:
-        """Failed runs first, then the largest errors, then the first drawn."""
-        return self.outcome == Outcome.SUCCESS.value, -self.error, self.index
 
 
 class Gathered:
@@ -211,8 +207,8 @@ class Gathered:
         success = numpy.array([each == Outcome.SUCCESS.value for each in outcomes])
         places = numpy.lexsort((-error, success))[:MOST_WORST].tolist()
         index, digits = table["index"].to_numpy(), table["digits_right"].to_numpy()
-        found = [_Bad(int(index[i]), float(error[i]), float(digits[i]), outcomes[i]) for i in places]
-        self._worst = sorted([*self._worst, *found], key=lambda each: each.order)[:MOST_WORST]
+        worst = [_Bad(bool(success[i]), -error[i], int(index[i]), float(digits[i]), outcomes[i]) for i in places]
+        self._worst = sorted([*self._worst, *worst])[:MOST_WORST]
 
     def row(self) -> Row:
         """The row of the report."""
@@ -240,7 +236,7 @@ class Gathered:
             data=None,
             request=_request(self._task),
             spread=Spread(histograms, self._cells()),
-            worst=tuple(_worst(self._task, cases[each.index], each) for each in self._worst),
+            worst=tuple(_worst(self._task, cases[each.motion], each) for each in self._worst),
         )
 
     def _cells(self) -> CellMap | None:
@@ -254,7 +250,7 @@ class Gathered:
 
 def _quantiles(quantity: Quantity, values: NDArray[np.float64]) -> dict[Quantity, Metric]:
     """Order statistics of sorted values, with half the width in decades of the 95 % interval of each by its ranks."""
-    found: dict[Quantity, Metric] = {}
+    quantiles: dict[Quantity, Metric] = {}
     n = len(values)
     for name, p in QUANTILES.items() if n else ():
         rank = min(n - 1, math.ceil(p * n) - 1)
@@ -264,17 +260,17 @@ def _quantiles(quantity: Quantity, values: NDArray[np.float64]) -> dict[Quantity
         if p < 1 and values[low] > 0:
             width = math.log10(values[high]) - math.log10(values[low])
             metric = msgspec.structs.replace(metric, band=round(min(100.0, width / 2), 4))
-        found[quantity.over(name)] = metric
-    return found
+        quantiles[quantity.over(name)] = metric
+    return quantiles
 
 
 def _worst(task: Task, case: Case, bad: _Bad) -> Worst:
     data = data_of(case)
     assert data is not None
     right = None if math.isnan(bad.digits) else round(bad.digits, 2)
-    error = "" if bad.outcome != Outcome.SUCCESS.value else f"{bad.error:.8g}"
+    error = f"{-bad.minus_error:.8g}" if bad.reached else ""
     return Worst(
-        case.name, bad.index, bad.outcome, error, right, data, command(task.key, task.times, case, bool(error))
+        case.name, bad.motion, bad.outcome, error, right, data, command(task.key, task.times, case, bad.reached)
     )
 
 

@@ -69,8 +69,8 @@ def _records(file: Path, row: Row) -> dict[str, Any]:
         table = read_table(file, columns=columns, filters=[(name, "=", text) for name, text in same.items()])
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{file} cannot be read: {error}.", "Give the folder of a finished run.") from None
-    found = {name: table[name].to_numpy() for name in columns if name != "outcome"}
-    return found | {"outcome": table["outcome"].cast("string").to_numpy()}
+    records = {name: table[name].to_numpy() for name in columns if name != "outcome"}
+    return records | {"outcome": table["outcome"].cast("string").to_numpy()}
 
 
 def _lost(before: dict[str, Any], after: dict[str, Any], limits: LossLimits, row: Row) -> Any:

@@ -94,10 +94,10 @@ class Drawn:
     def parameters(self) -> Parameters:
         """Each a column, (motions, 1)."""
         columns = [self.numbers[:, k : k + 1] for k in range(self.numbers.high.shape[1] - 6)]
-        found = self.system.taken_in(columns)
+        parameters = self.system.taken_in(columns)
         nothing = Pairs.of(numpy.zeros((len(self.problems), 1)))
-        moment = found.moment or (nothing,) * 3
-        return found._replace(moment=moment, rotor=nothing if found.rotor is None else found.rotor)
+        moment = parameters.moment or (nothing,) * 3
+        return parameters._replace(moment=moment, rotor=nothing if parameters.rotor is None else parameters.rotor)
 
     @property
     def start(self) -> list[Pairs]:
@@ -169,8 +169,8 @@ def _may_have_more(p: Any) -> Any:
 
 
 def _class(integrals: Sequence[Integral]) -> str:
-    found = [kind for each in integrals for name, kind in _CLASSES.items() if each.name.rstrip("123") == name]
-    return found[-1] if found else GENERAL
+    classes = [kind for each in integrals for name, kind in _CLASSES.items() if each.name.rstrip("123") == name]
+    return classes[-1] if classes else GENERAL
 
 
 _ALWAYS = holding(HeavyTop((4, 5, 6), 1, (1, 1, 1)), State((1, 0, 0), (0, 0, 1)))
@@ -333,7 +333,7 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
     groups: dict[Any, list[int]] = defaultdict(list)
     for place, integrals in enumerate(drawn.integrals):
         groups[tuple((i.name, _axes(i)) for i in integrals)].append(place)
-    found = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
+    drifts = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
     parameters, start = drawn.parameters, drawn.start
     for places in groups.values():
         own = parameters.mapped(lambda column, places=places: column[places])  # type: ignore[misc]
@@ -343,11 +343,11 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
             change = integral.value(own, now) - integral.value(own, before)
             size = numpy.abs(change.high).max(axis=1)
             name = f"drift_{integral.name}"
-            if name in found:
-                found[name][places] = size
+            if name in drifts:
+                drifts[name][places] = size
             else:
-                found["drift_further"][places] = numpy.fmax(found["drift_further"][places], size)
-    return found
+                drifts["drift_further"][places] = numpy.fmax(drifts["drift_further"][places], size)
+    return drifts
 
 
 def _axes(integral: Any) -> Any:

@@ -233,18 +233,18 @@ def trend(series: Series, rounding: float = 0.0) -> Trend | None:
 
 def alike(rows: Sequence[Row]) -> list[Row]:
     """The point of each method whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
-    found: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
+    cases: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
     for index, row in enumerate(rows):
         name, error = row.key.subject.name, row.metrics.get("error_max")
         if row.precision != "double" or row.outcome != "success":
             continue
         if name in METHODS and "drift_energy" in row.series and error is not None and error.log10 is not None:
-            points = found.setdefault((row.case, row.horizon), {}).setdefault(name, [])
+            points = cases.setdefault((row.case, row.horizon), {}).setdefault(name, [])
             points.append((abs(error.log10 - _LOG10), index))
-    whole = [case for case, methods in found.items() if len(methods) == len(METHODS)]
+    whole = [case for case, methods in cases.items() if len(methods) == len(METHODS)]
     if not whole:
         return []
-    chosen = found[max(whole, key=lambda case: Fraction(case[1]))]
+    chosen = cases[max(whole, key=lambda case: Fraction(case[1]))]
     return [rows[min(chosen[name])[1]] for name in METHODS]
 
 
@@ -255,15 +255,15 @@ def _curve(axes: Axes, key: Key, row: Row, name: str, power: float) -> tuple[Tre
     """
     held, end = row.series.get(name, Series([], [])), None
     x, y = points(held)
-    found = trend(held, 2.0 ** (1 - row.bits) * row.steps**power)
+    fit = trend(held, 2.0 ** (1 - row.bits) * row.steps**power)
     if x:
         draw(axes, key, x, y, 4.2, every=None)
-    if found is not None:
-        heights = [found.height + found.exponent * t for t in found.span]
-        axes.plot(found.span, heights, color=COLOURS[key.colour], lw=1.2, ls=DASHED, label=_FITTED.label)
-        law = "no law" if found.law == "unresolved" else found.law
-        end = End(f"{law} ({found.exponent:z.2f})", COLOURS[key.colour], x[-1], heights[-1])
-    return found, scientific(y[-1]) if y else "", end
+    if fit is not None:
+        heights = [fit.height + fit.exponent * t for t in fit.span]
+        axes.plot(fit.span, heights, color=COLOURS[key.colour], lw=1.2, ls=DASHED, label=_FITTED.label)
+        law = "no law" if fit.law == "unresolved" else fit.law
+        end = End(f"{law} ({fit.exponent:z.2f})", COLOURS[key.colour], x[-1], heights[-1])
+    return fit, scientific(y[-1]) if y else "", end
 
 
 def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:

@@ -91,12 +91,12 @@ class WorkPrecisionLine:
         """The seconds for an error of 10^log10: the least over points as fine, and between points on either side of it,
         where a straight line on logarithmic axes is drawn; None where no point is as fine.
         """
-        found = [point.seconds for point in self.points if point.log10 <= log10]
+        seconds = [point.seconds for point in self.points if point.log10 <= log10]
         for one, other in zip(self.points, self.points[1:], strict=False):
             if min(one.log10, other.log10) <= log10 <= max(one.log10, other.log10) and one.log10 != other.log10:
                 part = (log10 - one.log10) / (other.log10 - one.log10)
-                found.append(one.seconds ** (1 - part) * other.seconds**part)
-        return min(found, default=None)
+                seconds.append(one.seconds ** (1 - part) * other.seconds**part)
+        return min(seconds, default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +174,12 @@ class Lead:
 
 def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
     """The lines of each case, by the largest error over the samples."""
-    found: dict[str, dict[tuple[str, str], WorkPrecisionLine]] = {}
+    cases: dict[str, dict[tuple[str, str], WorkPrecisionLine]] = {}
     for row in rows:
         if row.outcome in UNMEASURED:
             continue
         name = row.key.subject.name
-        line = found.setdefault(row.case, {}).setdefault((name, row.precision), WorkPrecisionLine(name, row.precision))
+        line = cases.setdefault(row.case, {}).setdefault((name, row.precision), WorkPrecisionLine(name, row.precision))
         seconds, resolution = row.seconds.get("least", math.nan), row.seconds.get(UNRESOLVED_SECONDS, 0.0)
         error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
@@ -191,7 +191,7 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
             line.declared = row.order or 0
             line.resolution = max(line.resolution, resolution)
             line.compile = max(line.compile, row.seconds.get("compile", 0.0))
-    return {case: list(lines.values()) for case, lines in found.items()}
+    return {case: list(lines.values()) for case, lines in cases.items()}
 
 
 def _step(row: Row, log10: float) -> float:
@@ -205,13 +205,13 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
     """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
     a line a point of the curve, of its error, its seconds and, where heyoka is measured, what it takes for that error.
     """
-    found = panels(rows)
-    names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
-    beside = any(line.integrator == OURS for lines in found.values() for line in lines)
+    lines_by_case = panels(rows)
+    names = {line.integrator for lines in lines_by_case.values() for line in lines} - {OURS, CONSTANTS, LANES}
+    beside = any(line.integrator == OURS for lines in lines_by_case.values() for line in lines)
     tables = []
     for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
         cases: dict[str, dict[str, str]] = {}
-        for case, lines in list(found.items())[:_MOST_CASES]:
+        for case, lines in list(lines_by_case.items())[:_MOST_CASES]:
             for line in lines:
                 if line.integrator == name:
                     ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
@@ -294,20 +294,20 @@ def fastest(rows: Sequence[Row]) -> Headline | None:
     """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
     error of all.
     """
-    found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
-    if not found:
+    ratios_of = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
+    if not ratios_of:
         return _least_error(rows)
-    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in found]
+    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in ratios_of]
     (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
-    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, found, strict=True) if winner == first]
+    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, ratios_of, strict=True) if winner == first]
     behind = {other for winner, other in ends if winner == first}
-    where = f"{count} of {len(found)} motions" if rest else f"all {len(found)} motions"
-    where = clip(found[0][0].case, 40) if len(found) == 1 else where
+    where = f"{count} of {len(ratios_of)} motions" if rest else f"all {len(ratios_of)} motions"
+    where = clip(ratios_of[0][0].case, 40) if len(ratios_of) == 1 else where
     low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
     times = low if low == high else f"{low} to {high}"
     other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
-    said = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
-    return Headline("; ".join([said, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
+    text = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
+    return Headline("; ".join([text, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + ".")
 
 
 def _least_error(rows: Sequence[Row]) -> Headline | None:
@@ -315,5 +315,5 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
     if not best:
         return None
     point, case, label = min(best, key=lambda each: each[0].log10)
-    said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
-    return Headline(f"{said}, in {point.takes()}.")
+    text = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
+    return Headline(f"{text}, in {point.takes()}.")

@@ -45,8 +45,7 @@ from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
 NAME = "work_precision"
-_ENOUGH_SECONDS = 0.3
-_RUNS = range(3, 101)
+_USUAL = Repeats(3, 100, 0.3)
 _FOR_COMPARISON = Repeats(11, 201, 1.0, 3, band=True)
 ERROR_MAX, ERROR_FINAL = ERRORS
 RETURN = Quantity("return_error")
@@ -197,7 +196,8 @@ class WorkPrecision(Kind):
         self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None
     ) -> tuple[dict[str, float], Trajectory]:
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
-        end, how = task.times[-1:], _repeats(task)
+        # more of them where seconds are to be compared
+        end, how = task.times[-1:], _FOR_COMPARISON if task.options else _USUAL
         name = task.integrator.name
         if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
@@ -220,8 +220,8 @@ class WorkPrecision(Kind):
         largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
         if len(both) < 2 or largest is None:
             return
-        found = [size for series in both for size in sizes(series)]
-        if found and max(found) > bound(largest) + CLOSE:
+        values = [size for series in both for size in sizes(series)]
+        if values and max(values) > bound(largest) + CLOSE:
             yield "error_max: smaller than its series"
         if last is None or last.log10 is None:
             return
@@ -275,13 +275,6 @@ def _setting(subject: Subject) -> tuple[str, Fraction] | None:
     if FINEST in (subject.tolerance, subject.step):
         return None
     return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
-
-
-def _repeats(task: Task) -> Repeats:
-    """More of them where seconds are to be compared."""
-    if task.options.timings:
-        return _FOR_COMPARISON
-    return Repeats(_RUNS[0], _RUNS[-1], _ENOUGH_SECONDS)
 
 
 def _error(scorer: Scorer) -> Fraction | None:
@@ -339,5 +332,5 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
 @lru_cache(maxsize=8)
 def _truth(problem: Problem, times: tuple[Fraction, ...]) -> Truth | str:
     """Shared by all integrators that are compared with it, with every state that was worked out."""
-    found = truth(problem, times)
-    return found if isinstance(found, str) else found.remembered()
+    known = truth(problem, times)
+    return known if isinstance(known, str) else known.remembered()

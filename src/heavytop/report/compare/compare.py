@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ def compare(
     folders: of both reports, whose rows are joined by motion where their kind keeps records of these.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
-    found: list[list[Finding]] = []
+    findings_by_row: list[list[Finding]] = []
     missing: list[tuple[int, Row]] = []
     motions: list[WorseMotions | None] = []
     changes = Changes()
@@ -106,22 +107,23 @@ def compare(
     for row in baseline.rows:
         match = others.take(row.identity)
         if match is not None:
-            found.append(changes.add(row, match, rows.compare(row, match)))
+            findings_by_row.append(changes.add(row, match, rows.compare(row, match)))
             if folders is not None and not rows.ignores(row):
                 motions.append(kind_of(row, kinds).join(row, match, folders, partial(rows.limits, row)))
         elif not rows.ignores(row):
-            missing.append((len(found), row))
-            found.append([Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")])
+            missing.append((len(findings_by_row), row))
+            lacking = Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
+            findings_by_row.append([lacking])
     for place, row in missing:
         if (match := others.take_elsewhere(row.identity)) is not None:
-            found[place] = rows.compare(row, match)[:1]
-        changes.add(row, match, found[place])
+            findings_by_row[place] = rows.compare(row, match)[:1]
+        changes.add(row, match, findings_by_row[place])
     for row in others.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
-            found.append(changes.add(None, row, [new]))
+            findings_by_row.append(changes.add(None, row, [new]))
     excused = changes.excused()
-    findings = [each.as_same() if excused(each) else each for findings_of_row in found for each in findings_of_row]
+    findings = [each.as_same() if excused(each) else each for each in chain.from_iterable(findings_by_row)]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)

@@ -114,16 +114,16 @@ class Change(NamedTuple):
 
     def about(self, finding: Finding) -> Quantity | None:
         """The quantity that a metric or series is about, without its statistic; None for laws, seconds, whole rows."""
-        found = self.measured(finding)
-        return found and found.over("")
+        quantity = self.measured(finding)
+        return quantity and quantity.over("")
 
     def measured(self, finding: Finding) -> Quantity | None:
         """The quantity of a finding with its statistic."""
         for row in (self.old, self.new):
             if row is not None and finding.of in ("", "series"):
-                found = (row.series if finding.of else row.metrics).get(finding.name)
-                if found is not None and found.quantity is not None:
-                    return found.quantity
+                measure = (row.series if finding.of else row.metrics).get(finding.name)
+                if measure is not None and measure.quantity is not None:
+                    return measure.quantity
         return None
 
 
@@ -237,22 +237,22 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
         numbers = f"{plural(counted, 'metric is', 'metrics are')} the same within rounding noise"
         return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
-    found = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
+    ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
-    found += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
+    ranked += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
     for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
         for make in (_digits_moved, _steps_moved, _laws_moved, partial(_others_moved, changes)):
-            found += make(rows, verdicts)
-    found += [sentence for moved, sentence in orders if moved > 0]
+            ranked += make(rows, verdicts)
+    ranked += [sentence for moved, sentence in orders if moved > 0]
     still, beside = _still_failed(failed), _yardstick(changes)
-    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
-    told = frozenset[Identity]().union(*(each.rows for each in found))
-    rest = [change for change in changes.rows if change.identity not in told]
+    ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
+    named = frozenset[Identity]().union(*(each.rows for each in ranked))
+    rest = [change for change in changes.rows if change.identity not in named]
     end = f"{plural(len(rest), 'other row')} changed." if rest else "Nothing else changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
-    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end, *beside)]
+    return [clip(text, _LONGEST) for text in (*(each.text for each in ranked), *still, end, *beside)]
 
 
 def _yardstick(changes: Changes) -> list[str]:
@@ -290,10 +290,10 @@ def line(change: Change) -> str:
     better = change.verdict is Verdict.BETTER
     if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
-    said = f"{clip(worst.metric, 40)} {short(worst.baseline or '-')} → {short(worst.candidate or '-')}"
+    text = f"{clip(worst.metric, 40)} {short(worst.baseline or '-')} → {short(worst.candidate or '-')}"
     if worst.of == "series":
-        said = clip(worst.metric, 40)
-    return said + (f", {worst.reason}" if worst.reason else "") + more
+        text = clip(worst.metric, 40)
+    return text + (f", {worst.reason}" if worst.reason else "") + more
 
 
 def folded(change: Change) -> Iterator[tuple[str, list[Finding]]]:
@@ -311,8 +311,8 @@ def statistics(change: Change, name: str, findings: Sequence[Finding]) -> str:
     """Which statistics of a quantity changed: ``drift_energy: max, rms, series``."""
     measured = ((each, change.measured(each)) for each in findings)
     parts = ("series" if each.of == "series" else found.statistic if found else "" for each, found in measured)
-    said = ", ".join(part for part in parts if part)
-    return f"{name}: {said}" if said else name
+    listed = ", ".join(part for part in parts if part)
+    return f"{name}: {listed}" if listed else name
 
 
 def _without_samples(row: Row | None) -> Row | None:
@@ -379,8 +379,8 @@ def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
         metrics = [change.metric(row, order.text) for row in (change.old, change.new)]
         before, after = (math.nan if metric is None else float(metric) for metric in metrics)
         if abs(after - before) > 0:
-            said = f"Order observed {before:g} → {after:g} in {shown_by} on {_where(change.identity, at=False)}."
-            yield change.identity.key.subject.name, after - before, Sentence(said, frozenset({change.identity}))
+            text = f"Order observed {before:g} → {after:g} in {shown_by} on {_where(change.identity, at=False)}."
+            yield change.identity.key.subject.name, after - before, Sentence(text, frozenset({change.identity}))
 
 
 def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
@@ -398,19 +398,19 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                 if abs(after - before) >= _ORDER_MOVED:
                     steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
                     where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
-                    said = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
-                    yield name, after - before, Sentence(said, frozenset(rows))
+                    text = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
+                    yield name, after - before, Sentence(text, frozenset(rows))
 
 
 def _explained(changes: Changes) -> Iterator[Sentence]:
     """The explanations of states that are far off now and were not: of each integrator that of most rows."""
-    found: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
+    by_integrator: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
     for change in changes.worst_first:
         new, old = (each.explained if each else msgspec.UNSET for each in (change.new, change.old))
         if new and (not old or old.kind != new.kind):
-            kinds = found.setdefault(change.identity.key.subject.name, {})
+            kinds = by_integrator.setdefault(change.identity.key.subject.name, {})
             kinds.setdefault(new.kind, []).append((new.text, change.identity))
-    for kinds in found.values():
+    for kinds in by_integrator.values():
         cases = max(kinds.values(), key=len)
         (text, first), also = cases[0], len(cases) - 1
         more = f" and {plural(also, 'other row')}" if also else ""
@@ -424,20 +424,20 @@ def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence
     """Rows that failed, cannot be compared, are missing or new: one sentence for what became of them, its commonest
     reason named.
     """
-    found: dict[str, list[tuple[str, Change]]] = {}
+    by_fate: dict[str, list[tuple[str, Change]]] = {}
     for change in rows:
         if change.verdict in verdicts and not change.findings[0].metric:
             became, reason = _became(change)
-            found.setdefault(became, []).append((reason, change))
-    for became, cases in found.items():
+            by_fate.setdefault(became, []).append((reason, change))
+    for became, cases in by_fate.items():
         reason, _ = Counter(reason for reason, _ in cases).most_common(1)[0]
         cases.sort(key=lambda case: case[0] != reason)
         named = [change.identity for _, change in cases]
         whose, on = _whose(named), _on(named) if became in _NAMED else ""
         if len(cases) == 1:
             became = became.replace("are ", "is ").replace("stop ", "stops ")
-        said = f"{plural(len(cases), 'row')}{whose} {became}{on}"
-        yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
+        text = f"{plural(len(cases), 'row')}{whose} {became}{on}"
+        yield Sentence(f"{text}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
 
 
 _NAMED = ("failed", "stop earlier", "are worse", "are better")
@@ -505,25 +505,25 @@ def _ends_as_before(change: Change) -> bool:
 
 def _finals(row: Row) -> list[str]:
     """The metrics of the error at the last sample."""
-    found = ((name, metric.quantity) for name, metric in row.metrics.items())
-    return [name for name, q in found if q and q.name in _DIGITS and q.statistic == "final"]
+    pairs = ((name, metric.quantity) for name, metric in row.metrics.items())
+    return [name for name, q in pairs if q and q.name in _DIGITS and q.statistic == "final"]
 
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Growth laws that moved: one sentence for each quantity and integrator, the first motion named."""
-    found: dict[tuple[str, str, str], list[Change]] = {}
+    rows_of: dict[tuple[str, str, str], list[Change]] = {}
     for change in rows:
         for finding in change.findings:
             laws = [None if row is None else row.laws.get(finding.name) for row in (change.old, change.new)]
             if finding.of == "growth" and finding.verdict in verdicts and None not in laws:
                 old, new = (law for law in laws if law is not None)
-                said = _law_moved(old, new, finding.reason)
-                found.setdefault(
-                    (change.identity.key.subject.name, _quantity(old.quantity, finding.name), said), []
+                moved = _law_moved(old, new, finding.reason)
+                rows_of.setdefault(
+                    (change.identity.key.subject.name, _quantity(old.quantity, finding.name), moved), []
                 ).append(change)
-    for (_, what, said), changes in found.items():
+    for (_, what, moved), changes in rows_of.items():
         also = f" and {plural(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
-        text = f"The {what} {said} on {_where(changes[0].identity, at=False)}{also}."
+        text = f"The {what} {moved} on {_where(changes[0].identity, at=False)}{also}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
@@ -546,15 +546,15 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
     """Drifts, escape times, errors of steps, seconds: the largest change of each quantity and integrator."""
-    found: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
+    by_quantity: dict[tuple[str, str], list[tuple[float, Change, Finding]]] = {}
     for change in rows:
         for _, findings in folded(change):
             worst, quantity = findings[0], change.about(findings[0])
             if worst.verdict in verdicts and not _told_elsewhere(change, worst, quantity):
                 name = quantity.name if quantity else worst.name
                 size = change.decades(worst.metric) or 0.0
-                found.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
-    for cases in sorted(found.values(), key=lambda cases: -max(size for size, _, _ in cases)):
+                by_quantity.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
+    for cases in sorted(by_quantity.values(), key=lambda cases: -max(size for size, _, _ in cases)):
         _, change, finding = max(cases, key=lambda case: case[0])
         what = _quantity(change.about(finding), finding.metric)
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"

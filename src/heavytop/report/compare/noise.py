@@ -187,8 +187,8 @@ def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = N
 
 def _limits(rule: Rule, policy: Policy) -> Limits:
     def number(name: str) -> float:
-        given = getattr(rule, name)
-        return float(exact(getattr(policy, name) if given is None else given))
+        own = getattr(rule, name)
+        return float(exact(getattr(policy, name) if own is None else own))
 
     digits, bits = rule.loss_digits, rule.loss_bits
     if digits is None and bits is None:
@@ -261,14 +261,14 @@ class RoundingBound:
     def explains(self, quantity: Quantity | None, size: float) -> bool:
         """Whether rounding makes an error of that quantity, or a difference of two, as large as 10^size."""
         roundings = max(self._turns, float(self.row.steps))
-        found = MARGIN + (1 - self.row.bits) * BITS + math.log10(roundings) / 2 + self._unit(quantity)
+        bound = MARGIN + (1 - self.row.bits) * BITS + math.log10(roundings) / 2 + self._unit(quantity)
         if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
-            return size <= found
-        found += math.log10(self._turns)
-        if size <= found:
+            return size <= bound
+        bound += math.log10(self._turns)
+        if size <= bound:
             return True
         amplified = min(self._amplified(self.row.horizon), math.log10(self.kind.largest_amplification))
-        return size <= found + max(0.0, amplified - math.log10(self._turns))
+        return size <= bound + max(0.0, amplified - math.log10(self._turns))
 
     def explains_times(self, time: str, part: float) -> bool:
         """Whether rounding moves an escape at ``time`` by that part of it.
@@ -309,8 +309,8 @@ class RoundingBound:
         """log10 of A up to a time."""
         if self._motion is None:
             return math.log10(self.row.amplification or 1.0)
-        found = math.log10(amplification(*self._motion, exact(horizon)))
-        return found + _FASTER * max(0.0, found - math.log10(FOLLOWED))
+        decades = math.log10(amplification(*self._motion, exact(horizon)))
+        return decades + _FASTER * max(0.0, decades - math.log10(FOLLOWED))
 
     def _unit(self, quantity: Quantity | None) -> float:
         """log10 of the size of a quantity along the motion."""
@@ -327,8 +327,8 @@ class RoundingBound:
         """log10 of the size of the terms of a first integral."""
         assert self._case is not None
         top, start, which, p = self._case
-        found = next((each for each in holding(top, start, which) if each.name == name), None)
-        size = Fraction(0) if found is None else largest(found, p, self._rate)
+        integral = next((each for each in holding(top, start, which) if each.name == name), None)
+        size = Fraction(0) if integral is None else largest(integral, p, self._rate)
         return (log10(size) or 0.0) if size else 0.0
 
 

@@ -333,18 +333,18 @@ class RowComparison:
         if new.outcome != SUCCESS and not self.ignores(old):
             self.failed.append(new)
         rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
-        found = self._metrics(key, rules, old, new)
+        findings = self._metrics(key, rules, old, new)
         if old.laws or new.laws:
-            found += self._laws(key, rules, old, new)
+            findings += self._laws(key, rules, old, new)
         if old.series:
-            found += self._series(key, rules, old, new)
+            findings += self._series(key, rules, old, new)
         if not self.ignores(old):
-            found += self._row(key, old, new)
+            findings += self._row(key, old, new)
         if self.repeated and BAND in old.seconds:
-            found += self._repeated(key, rules, old, new)
+            findings += self._repeated(key, rules, old, new)
         elif self.timed:
-            found += self._seconds(key, rules, old, new)
-        return found
+            findings += self._seconds(key, rules, old, new)
+        return findings
 
     def _whole(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
         """The finding about a row that is judged by its outcome."""
@@ -375,7 +375,7 @@ class RowComparison:
 
     def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
         loss = self.lookup.metric((), "").truncation
-        found = []
+        findings = []
         for name, metric in old.metrics.items():
             match = new.metrics.get(name)
             if (
@@ -390,23 +390,23 @@ class RowComparison:
                 and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
             ):
                 if self.list_same:
-                    found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                    findings.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
                 else:
                     self.same += 1
             elif not (limits := self.lookup.metric(rules, name)).ignore:
                 if match is None:
-                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    findings.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
                 verdict, why = self._metric(metric, match, limits, old, new)
                 slight = verdict is Verdict.WORSE and self._is_slight(metric, match, limits, old, new)
-                found.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
+                findings.append(Finding(key, name, verdict, metric.value, match.value, why, slight=slight))
         if new.metrics.keys() != old.metrics.keys():
-            found += [
+            findings += [
                 Finding(key, name, Verdict.NEW, None, metric.value)
                 for name, metric in new.metrics.items()
                 if name not in old.metrics and not self.lookup.metric(rules, name).ignore
             ]
-        return found
+        return findings
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
         """The values first, then the noise of the candidate, which is worse where it is more than chance and reaches
@@ -417,7 +417,7 @@ class RowComparison:
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
         bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
-        known, found = of_starts(metric, old), of_starts(match, new)
+        known, banded = of_starts(metric, old), of_starts(match, new)
         truncated = self._is_truncation(metric, match, old, new)
         assumed = 0.0 if truncated else kind.assumed_band(old.key.subject)
         noise = assumed if metric.band is None else kind.least_band(old.starts)
@@ -425,7 +425,7 @@ class RowComparison:
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
         allowed = msgspec.structs.replace(limits, loss=limits.truncation) if truncated else limits
-        judged = judge(known, found, allowed, eps, least_of, bound)
+        judged = judge(known, banded, allowed, eps, least_of, bound)
         changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
         if changed and self._is_by_rounding(metric, match, old):
             return SAME
@@ -477,8 +477,8 @@ class RowComparison:
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
-                found = [f"{len(each.values)} samples" for each in (series, match)]
-                yield Finding(key, name, judged[0], found[0], found[1], judged[1], "series")
+                counts = [f"{len(each.values)} samples" for each in (series, match)]
+                yield Finding(key, name, judged[0], counts[0], counts[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """Findings beside the numbers themselves that make these incomparable."""
@@ -496,10 +496,10 @@ class RowComparison:
         if old.order != new.order and self.policy.flags != "ignore":
             yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
         fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
-        needed, found = -(-_samples(old) // fewer), _samples(new)
-        if found < needed:
+        needed, taken = -(-_samples(old) // fewer), _samples(new)
+        if taken < needed:
             why = "fewer samples: the largest of them is smaller"
-            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{found} samples", why)
+            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{taken} samples", why)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)
@@ -594,8 +594,8 @@ class RowComparison:
     def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
         """Whether roundings alone make the largest values of a series."""
         pairs = zip(_of_series(name, old, "max"), _of_series(name, new, "max"), strict=False)
-        found = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
-        return bool(found) and all(found)
+        explained = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
+        return bool(explained) and all(explained)
 
     def _noise(self, name: str, row: Row, limits: Limits) -> float:
         """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""
@@ -620,5 +620,5 @@ def _samples(row: Row) -> int:
 
 def _of_series(name: str, row: Row, *statistics: str) -> list[Metric]:
     """The metrics of a row that sum up its series of that name."""
-    found = ((metric.quantity, metric) for metric in row.metrics.values())
-    return [metric for q, metric in found if q and q.statistic in statistics and q.over("").text == name]
+    pairs = ((metric.quantity, metric) for metric in row.metrics.values())
+    return [metric for q, metric in pairs if q and q.statistic in statistics and q.over("").text == name]

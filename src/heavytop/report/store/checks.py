@@ -155,9 +155,9 @@ def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
 
 
 def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
-    found = sizes(series)
+    values = sizes(series)
     largest, last = (row.metrics.get(quantity.over(part).text) for part in ("max", "final"))
-    if largest is not None and found and max(found) > bound(largest) + CLOSE:
+    if largest is not None and values and max(values) > bound(largest) + CLOSE:
         yield f"{quantity.text}: the series is larger than {quantity.over('max').text}"
     if last is not None and ended(series, row):
         yield from _last(quantity.over("final").text, series.values[-1], last)
@@ -232,13 +232,13 @@ def inconsistent(law: Law) -> str:
         return "an exponent or an interval that is not finite"
     if not low <= law.exponent <= high or bend[0] > bend[1]:
         return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
-    said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
+    law_said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
     if law.growth == "exponential":
-        return "" if law.exponent > 0 and law.bend is None else said
+        return "" if law.exponent > 0 and law.bend is None else law_said
     if law.low is None:
         low, high = low - _HALF_WAY, high + _HALF_WAY
     expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
-    return "" if law.growth == expected else said
+    return "" if law.growth == expected else law_said
 
 
 def interval_of(law: Law) -> Interval:
@@ -298,10 +298,10 @@ def _floats(texts: Sequence[str]) -> list[float]:
 def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     """The ids of the metrics that are not plainly a number with its logarithm; told in a few strokes."""
     values = numpy.array(_floats([metric.value for metric in metrics]))
-    given = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
+    logarithms = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
     with numpy.errstate(all="ignore"):
         # the logarithm of a negative number is none
-        plain = numpy.abs(numpy.log10(values) - given) < CLOSE / 2
+        plain = numpy.abs(numpy.log10(values) - logarithms) < CLOSE / 2
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
@@ -354,11 +354,11 @@ def _check_metric(where: str, metric: Metric, finite: bool) -> None:
     number = _number(where, metric.value)
     if number < 0 and metric.kind != "value":
         raise InputError(f"{where}: a negative {metric.kind} {metric.value}.", REMEDY)
-    given, expected = metric.log10, log10(number)
-    if (given is None) != (expected is None) or (
-        given is not None and expected is not None and not abs(given - expected) < CLOSE
+    stated, expected = metric.log10, log10(number)
+    if (stated is None) != (expected is None) or (
+        stated is not None and expected is not None and not abs(stated - expected) < CLOSE
     ):
-        raise InputError(f"{where}: value {metric.value} and log10 {given} disagree.", REMEDY)
+        raise InputError(f"{where}: value {metric.value} and log10 {stated} disagree.", REMEDY)
 
 
 def _number(where: str, value: str) -> Fraction:

@@ -109,8 +109,8 @@ def _data(row: Row) -> list[float | str | None]:
     floats: list[float | None] = []
     texts: list[str | None] = []
     for name, count in _OF_DATA.items():
-        found: Any = None if row.data is None else getattr(row.data, name)
-        parts = [] if not found else list(found) if count else [found]
+        numbers: Any = None if row.data is None else getattr(row.data, name)
+        parts = [] if not numbers else list(numbers) if count else [numbers]
         floats += [_float(part) for part in parts] or [None] * max(count, 1)
         texts.append(",".join(parts) or None)
     return [*floats, *texts]

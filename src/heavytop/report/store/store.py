@@ -232,9 +232,9 @@ def _target() -> dict[str, Any]:
     import heyoka
 
     x = heyoka.make_vars("x")
-    said = str(heyoka.cfunc([x], [x]).llvm_states[0])
-    cpu = re.search(r"^Target CPU *: (.+)$", said, re.M)
-    features = re.search(r"^Target features *: (.+)$", said, re.M)
+    target = str(heyoka.cfunc([x], [x]).llvm_states[0])
+    cpu = re.search(r"^Target CPU *: (.+)$", target, re.M)
+    features = re.search(r"^Target features *: (.+)$", target, re.M)
     return {
         "cpu_target": cpu[1] if cpu else "unknown",
         "cpu_features": sorted(re.findall(r"\+([^,]+)", features[1])) if features else [],
@@ -247,8 +247,8 @@ def _llvm_version() -> str:
         if file.name.startswith("libheyoka"):
             with open(file.locate(), "rb") as library, mmap(library.fileno(), 0, access=ACCESS_READ) as content:
                 at = content.find(b"LLVM_VERSION=")
-                found = re.match(rb"LLVM_VERSION=([0-9.]+)", content[at : at + 40]) if at >= 0 else None
-                return found[1].decode() if found else "unknown"
+                version = re.match(rb"LLVM_VERSION=([0-9.]+)", content[at : at + 40]) if at >= 0 else None
+                return version[1].decode() if version else "unknown"
     return "unknown"
 
 
