@@ -178,7 +178,6 @@ class _Moving(WithBearing):
     __slots__ = ()
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.Evaluated`."""
         swing, frame = _swing(self), _frame(self)
         phase: BallLike = swing.phase(frame.rate * ball(time))[0]
         for _ in range(current_length() - 1):
