@@ -13,7 +13,7 @@ import re
 import select
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import pairwise
@@ -262,6 +262,7 @@ class ProgramRequest:
         """Its lines."""
         p, precision = self.problem.parameters, self.problem.precision
         rotor = (0, p.rotor, 0) if self.problem.system is GYROSTAT else p.rotors if len(p.rotors) == 3 else (0, 0, 0)
+        near = [exact(number(value, precision)) for value in quaternion(self.problem)] if self.quaternion else []
         lines = {
             "run": [str(label)],
             "system": [self.problem.system.name],
@@ -269,15 +270,12 @@ class ProgramRequest:
             "moment": self._numbers(p.moment),
             "rotor": self._numbers(rotor),
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
-            "quaternion": self._quaternion() if self.quaternion else [],
+            "quaternion": self._numbers(near),
             "precision": [precision.name],
             "setting": self._numbers([] if self.control is None else [self.control]),
             "times": [str(len(self.times)), *self.written.texts],
         }
         return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"
-
-    def _quaternion(self) -> list[str]:
-        return self._numbers([exact(number(value, self.problem.precision)) for value in quaternion(self.problem)])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
         return numbers_texts(values, self.problem.precision, self.hex)
@@ -430,20 +428,28 @@ class Reply:
 
 
 class _Greeting:
-    """What takes the first line of a program."""
+    """Takes the first line of a program: ``ready``, its name and version."""
 
-    due = 0
+    due, text = 0, ""
 
-    def __init__(self, take: Callable[[bytes], bool]) -> None:
-        self.take = take
+    def __init__(self, name: str) -> None:
+        self.name = name
 
-    def nap(self, seconds: float) -> float:
+    def nap(self, _seconds: float) -> float:
         """None is needed."""
-        return 0.0 * seconds
+        return 0.0
 
-    def take_states(self, lines: list[bytes]) -> int:
+    def take_states(self, _lines: list[bytes]) -> int:
         """None."""
         return 0
+
+    def take(self, line: bytes) -> bool:
+        """Raises PeerFailed for another line."""
+        text = line.decode("utf-8", "replace")
+        if text.split()[:1] != ["ready"]:
+            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
+        self.text = said(text.partition("ready")[2])
+        return True
 
 
 class Session:
@@ -480,19 +486,13 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
         self._poll.register(self._err, select.POLLIN)
-        self.greeting = ""
+        greeting = _Greeting(self.name)
         try:
-            self._exchange(f"{HELLO}\n".encode(), _Greeting(self._greeted), "ready")
+            self._exchange(f"{HELLO}\n".encode(), greeting, "ready")
         except BaseException:
             self.close()
             raise
-
-    def _greeted(self, line: bytes) -> bool:
-        text = line.decode("utf-8", "replace")
-        if text.split()[:1] != ["ready"]:
-            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
-        self.greeting = said(text.partition("ready")[2])
-        return True
+        self.greeting = greeting.text
 
     def empty_request(self, problem: Problem) -> float:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
