@@ -26,7 +26,7 @@ from typing import Any
 
 from flint import acb, arb, arb_series
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision, sign
 from heavytop.exact.flint.balls import (
     BallLike,
@@ -418,8 +418,6 @@ def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> Al
     :func:`heavytop.precision.exact`.
     Raises InputError where there is no such top, and for a place out of range.
     """
-    try:
+    with prefixed("place"):
         where = exact(place)
-    except InputError as error:
-        raise InputError(f"place: {error.cause}", error.remedy) from None
     return AlgebraicDokshevich(vector(inertia, "inertia"), where)

@@ -9,7 +9,7 @@ from typing import Any, overload
 
 from heavytop import arguments
 from heavytop.arguments import Number
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
@@ -264,7 +264,7 @@ def poincare(
         raise InputError("There are no starts.", "Give at least one State.")
     found: list[Events | ReferenceEvents] = []
     for place, start in enumerate(listed):
-        try:
+        with prefixed(f"Start {place}"):
             found.append(
                 events(
                     top, start, until, function, direction, precision, integrator=integrator, system=system, limit=limit
@@ -272,8 +272,6 @@ def poincare(
                 if digits is None
                 else events(top, start, until, function, direction, digits=digits, system=system, limit=limit)
             )
-        except InputError as error:
-            raise InputError(f"Start {place}: {error.cause}", error.remedy) from None
     about = arguments.system(system, top)
     own = [resolve(top, start) for start in listed]
     parameters = [about.parameters(each.top, each.start) for each in own]

@@ -302,9 +302,9 @@ def integrate_to_samples(
     if stepping is Stepper and all(option is None for option in (observer, between, place, mark)):
         at_once = _at_once(engine, lambda: load(engine, problem), targets, step_limit, problem.precision)
         if at_once is not None:
-            run = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=at_once[0])
-            ended = RoundedTimes(targets), at_once[1], Outcome.SUCCESS, perf_counter() - began
-            return _trajectory(tool, problem, run, *ended)
+            stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=at_once[0])
+            seconds = perf_counter() - began
+            return _trajectory(tool, problem, stepper, RoundedTimes(targets), at_once[1], Outcome.SUCCESS, seconds)
     load(engine, problem)
     if problem.precision.family == "double":
         targets = list(map(float, targets))  # as far() is

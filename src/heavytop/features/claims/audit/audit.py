@@ -18,8 +18,8 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, invalid
-from heavytop.features.claims.audit.context import ClaimFile, prefixed
+from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
+from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion

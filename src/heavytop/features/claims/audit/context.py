@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -15,7 +14,7 @@ import sympy
 from flint import arb
 from msgspec import structs
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
@@ -327,15 +326,6 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     )
     _check_samples(context, bounds, unequal)
     return context
-
-
-@contextmanager
-def prefixed(what: str) -> Iterator[None]:
-    """Says in the cause of an InputError what was read."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 def sample_number(text: str, what: str) -> Fraction:

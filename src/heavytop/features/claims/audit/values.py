@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from flint import arb
 
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     ball,
@@ -28,7 +28,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
-from heavytop.features.claims.audit.context import Tensor, Text, Three, of_file, prefixed
+from heavytop.features.claims.audit.context import Tensor, Text, Three, of_file
 from heavytop.features.claims.audit.judge import StatementVerdict
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import decimal_text, dot, exact, round_to
