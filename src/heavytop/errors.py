@@ -78,8 +78,10 @@ class InputError(HeavyTopError):
 @contextmanager
 def prefixed(what: str) -> Iterator[None]:
     """Says in the cause of an InputError what was read."""
-    with prefixed(what):
+    try:
         yield
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 class NotInClass(InputError):

@@ -102,13 +102,9 @@ def _start(run: Trajectory) -> list[float]:
     problem = run.problem
     start, xi = (problem.start, problem.xi) if run.frame is None else (run.frame, run.frame.xi)
     assert xi is not None  # without ξ no attitude was computed
-    q = quaternion_of_rows(rows_of(start.gamma, xi), SimpleNamespace(sqrt=_root))
+    q = quaternion_of_rows(rows_of(start.gamma, xi), SimpleNamespace(sqrt=lambda value: Fraction(math.sqrt(value))))
     sign = first_sign(q, 2**_SIGN_BITS * problem.precision.eps)
     return [sign * float(value) for value in q]
-
-
-def _root(value: Any) -> Fraction:
-    return Fraction(math.sqrt(value))
 
 
 def _centre(run: Trajectory, output: Output) -> Vector:
