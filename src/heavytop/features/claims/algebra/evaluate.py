@@ -7,8 +7,9 @@ from fractions import Fraction
 from typing import Any
 
 import sympy
-from flint import acb_poly, arb
+from flint import acb, arb
 
+from heavytop.errors import OutOfReach
 from heavytop.exact.flint.balls import ball, whole_evaluation, working_precision
 from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.structure import Defined
@@ -22,7 +23,6 @@ from heavytop.features.claims.algebra.structure import Defined
 
 
 _NAN = arb("nan")
-_NEWTON = 12
 
 
 class _Elliptic(sympy.Function):  # type: ignore[misc]
@@ -89,81 +89,31 @@ WEIERSTRASS = {"wp": wp, "wpprime": wpprime, "wp3": wp3, "wp3prime": wp3prime}
 # --- at numbers ----------------------------------------------------------------------------------------------------
 
 
-def _elliptic_jacobi(u: arb, m: arb) -> tuple[arb, arb, arb]:
-    """(sn, cn, dn) as balls; not finite unless 0 ≤ m ≤ 1 is certain."""
-    from heavytop.exact.elliptic.jacobi import jacobi
+def _weierstrass(u: arb, g2: arb, g3: arb, third: bool = False) -> tuple[arb, arb]:
+    """(℘, ℘') at u, or at u + ω3, as balls; not finite at poles, where Δ = 0 may be, and at u + ω3 unless Δ > 0.
 
-    complement = 1 - m
-    if not (u.is_finite() and m >= 0 and complement >= 0):
-        return _NAN, _NAN, _NAN
-    found: tuple[arb, arb, arb] = jacobi(m, complement).functions(u)
-    return found
+    By theta quotients, as in :mod:`heavytop.exact.elliptic.weierstrass`.
+    """
+    from heavytop.exact.elliptic.weierstrass import Lattice, from_invariants, thetas
 
-
-def _roots(g2: arb, g3: arb) -> tuple[arb, arb, arb] | None:
-    """e1 > e2 > e3; None unless Δ > 0 is certain."""
-    if not g2**3 - 27 * g3**2 > 0:
-        return None
-    # 4x³ − g2 x = g3 with x = 2√(g2/12) cos θ is cos 3θ = g3/(8 (g2/12)^(3/2))
-    size = (g2 / 12).sqrt()
-    theta = (g3 / (8 * size**3)).acos() / 3
-    third = 2 * arb.pi() / 3
-    return 2 * size * theta.cos(), 2 * size * (theta - third).cos(), 2 * size * (theta + third).cos()
-
-
-def _complex_roots(g2: arb, g3: arb) -> tuple[arb, arb] | None:
-    """(e, H) with the real root e and H² = 3e² − g2/4 > 0; None unless Δ < 0 is certain."""
-    if not g2**3 - 27 * g3**2 < 0:
-        return None
     try:
-        found = acb_poly([-g3, -g2, 0, 4]).roots()
-    except ValueError:
-        return None
-    real = [root.real for root in found if root.imag.contains(0)]
-    if len(real) != 1:
-        return None
-    e = real[0]
-    for _ in range(_NEWTON):  # the root lies in each of these balls
-        middle = e.mid()
-        closer = middle - (4 * middle**3 - g2 * middle - g3) / (12 * e**2 - g2)
-        if not (closer.is_finite() and closer.rad() < e.rad()):
-            break
-        e = closer
-    return e, (3 * e**2 - g2 / 4).sqrt()
-
-
-def _weierstrass(u: arb, g2: arb, g3: arb) -> tuple[arb, arb]:
-    """(℘, ℘'), DLMF 23.6.16, 23.6.21 and Abramowitz and Stegun 18.9.11; not finite at poles, and where Δ = 0 may be."""
-    if (roots := _roots(g2, g3)) is not None:
-        e1, e2, e3 = roots
-        scale = (e1 - e3).sqrt()
-        s, c, d = _elliptic_jacobi(scale * u, (e2 - e3) / (e1 - e3))
-        return e3 + (e1 - e3) / s**2, -2 * scale**3 * c * d / s**3
-    if (pair := _complex_roots(g2, g3)) is not None:
-        e, h = pair
-        scale = 2 * h.sqrt()
-        s, c, d = _elliptic_jacobi(scale * u, arb("0.5") - 3 * e / (4 * h))
-        # ((1 + c)/(1 − c))' = 2c'/(1 − c)² = −2 s d/(1 − c)²
-        return e + h * (1 + c) / (1 - c), -2 * h * scale * s * d / (1 - c) ** 2
-    return _NAN, _NAN
-
-
-def _bounded(u: arb, g2: arb, g3: arb) -> tuple[arb, arb]:
-    """(℘, ℘') at u + ω3: e3 + (e2 − e3) sn²; not finite unless Δ > 0 is certain."""
-    roots = _roots(g2, g3)
-    if roots is None:
+        lattice = from_invariants(g2, g3)
+    except OutOfReach:
         return _NAN, _NAN
-    e1, e2, e3 = roots
-    scale = (e1 - e3).sqrt()
-    s, c, d = _elliptic_jacobi(scale * u, (e2 - e3) / (e1 - e3))
-    return e3 + (e2 - e3) * s**2, 2 * (e2 - e3) * scale * s * c * d
+    if not isinstance(lattice, Lattice) or not u.is_finite() or (third and not g2**3 > 27 * g3**2):
+        return _NAN, _NAN
+    z, _ = lattice.reduced(acb(u))
+    first, *others = thetas(z + lattice.ratio / 2 if third else z, lattice.ratio)
+    scale = 2 * lattice.half_period * first / lattice.zero[0]
+    two, three, four = (value / at_zero for value, at_zero in zip(others, lattice.zero[1:], strict=True))
+    return (lattice.roots[0] + (two / scale) ** 2).real, (-2 * two * three * four / scale**3).real
 
 
-VALUES: dict[str, Callable[..., arb]] = {
+_VALUES: dict[str, Callable[..., arb]] = {
     "wp": lambda u, g2, g3: _weierstrass(u, g2, g3)[0],
     "wpprime": lambda u, g2, g3: _weierstrass(u, g2, g3)[1],
-    "wp3": lambda u, g2, g3: _bounded(u, g2, g3)[0],
-    "wp3prime": lambda u, g2, g3: _bounded(u, g2, g3)[1],
+    "wp3": lambda u, g2, g3: _weierstrass(u, g2, g3, True)[0],
+    "wp3prime": lambda u, g2, g3: _weierstrass(u, g2, g3, True)[1],
     "wpinverse": lambda u, g2, g3: 1 / _weierstrass(u, g2, g3)[0],
 }
 """Each function of balls, as a ball that is proven to hold it, at the working precision."""
@@ -193,7 +143,7 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "sn": lambda u, m: _jacobi(u, m)[0],
     "cn": lambda u, m: _jacobi(u, m)[1],
     "dn": lambda u, m: _jacobi(u, m)[2],
-    **VALUES,
+    **_VALUES,
 }
 
 
@@ -202,7 +152,7 @@ def _jacobi(u: arb, m: arb) -> tuple[arb, arb, arb]:
     from heavytop.exact.elliptic.jacobi import jacobi
 
     if not (m >= 0 and m <= 1):
-        return arb("nan"), arb("nan"), arb("nan")
+        return _NAN, _NAN, _NAN
     sine, cosine, delta = jacobi(m, 1 - m).functions(u)
     return sine, cosine, delta
 
