@@ -71,7 +71,7 @@ def test_quaternions_come_back_whichever_component_is_the_largest() -> None:
         q = [Fraction(sign, 10) for sign in chosen]
         q[place] *= 30
         length = math.sqrt(sum(value * value for value in q))
-        wanted = [float(value) / length * signs[place] for value in q]
+        wanted = [float(value) / length * chosen[place] for value in q]
         rows = Attitude.quaternion(*q, normalize=True).rows(math)
         assert quaternion_of_rows(rows, math) == pytest.approx(wanted, abs=1e-15)
 

@@ -359,9 +359,7 @@ def _enclose(near: acb, g2: arb, g3: arb) -> acb:
     """The ball around ``near`` that holds a root of 4x³ − g2 x − g3: a contracting interval Newton step."""
     middle = near.mid() if not near.imag.contains(0) else acb(near.real.mid())
     value = 4 * middle**3 - g2 * middle - g3
-    spread = abs(value / (12 * middle**2 - g2)).upper() * 2 + arb(2) ** (-current_precision()) * (
-        1 + abs(middle).upper()
-    )
+    spread = abs(value / (12 * middle**2 - g2)).upper() * 2 + arb(2) ** (-current_precision())
     wide = middle + (acb(arb(0, spread)) if middle.imag == 0 else acb(arb(0, spread), arb(0, spread)))
     narrow = middle - value / (12 * wide**2 - g2)
     if not wide.contains(narrow):
@@ -380,7 +378,7 @@ def _from_roots(roots: _Roots) -> Lattice:
     e, _, pair = roots.values
     apart = acb(e.real - pair.real, pair.imag)
     # √(e − pair) has these real and imaginary parts; each from the sum that does not cancel
-    size = (apart.real * apart.real + apart.imag * apart.imag).sqrt()  # FLINT: a power of a ball about 0 is nan
+    size = (apart.real * apart.real + apart.imag * apart.imag).sqrt()
     larger = ((size + abs(apart.real)) / 2).sqrt()
     smaller = apart.imag / (2 * larger)
     along, across = (larger, smaller) if apart.real > 0 else (smaller, larger)

@@ -7,117 +7,12 @@ from fractions import Fraction
 from typing import Any
 
 import sympy
-from flint import acb, arb
+from flint import arb
 
-from heavytop.errors import OutOfReach
 from heavytop.exact.flint.balls import ball, whole_evaluation, working_precision
+from heavytop.features.claims.algebra.elliptic import VALUES
 from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.structure import Defined
-
-# Weierstrass' ℘ of (u, g2, g3) as formulas of a claim, and their values as balls.
-#
-# wp is ℘(u), with poles at the real periods; wp3 is ℘(u + ω3) with the imaginary half-period ω3: it runs between the
-# two lower roots, real and without poles for real u where Δ = g2³ − 27 g3² > 0.
-#
-#     ℘'' = 6℘² − g2/2,   ℘'² = 4℘³ − g2 ℘ − g3      (DLMF 23.3.10, 23.3.12, 23.6)
-
-
-_NAN = arb("nan")
-
-
-class _Elliptic(sympy.Function):  # type: ignore[misc]
-    """A function of u whose invariants have no rate here: they do not move in any claim that is proven."""
-
-    nargs = 3
-    is_real = True
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """The derivative in u."""
-        if argindex != 1:
-            return sympy.Function(f"rate_of_{self.func.__name__}_by_g{argindex}", real=True)(*self.args)
-        return self.rate()
-
-    def rate(self) -> sympy.Expr:
-        """The derivative in u."""
-        raise NotImplementedError
-
-
-class wp(_Elliptic):  # noqa: N801
-    """℘(u; g2, g3)."""
-
-    def rate(self) -> sympy.Expr:
-        """℘'."""
-        return wpprime(*self.args)
-
-
-class wpprime(_Elliptic):  # noqa: N801
-    """℘'(u; g2, g3)."""
-
-    def rate(self) -> sympy.Expr:
-        """6℘² − g2/2."""
-        return 6 * wp(*self.args) ** 2 - self.args[1] / 2
-
-
-class wp3(_Elliptic):  # noqa: N801
-    """℘(u + ω3; g2, g3)."""
-
-    def rate(self) -> sympy.Expr:
-        """℘'(u + ω3)."""
-        return wp3prime(*self.args)
-
-
-class wp3prime(_Elliptic):  # noqa: N801
-    """℘'(u + ω3; g2, g3)."""
-
-    def rate(self) -> sympy.Expr:
-        """6℘² − g2/2 at u + ω3."""
-        return 6 * wp3(*self.args) ** 2 - self.args[1] / 2
-
-
-class wpinverse(_Elliptic):  # noqa: N801
-    """1/℘(u; g2, g3), which is 0 at the poles of ℘: it stands in conditions alone."""
-
-    def rate(self) -> sympy.Expr:
-        """−℘'/℘²."""
-        return -wpprime(*self.args) / wp(*self.args) ** 2
-
-
-WEIERSTRASS = {"wp": wp, "wpprime": wpprime, "wp3": wp3, "wp3prime": wp3prime}
-"""Each function as a formula calls it."""
-
-
-# --- at numbers ----------------------------------------------------------------------------------------------------
-
-
-def _weierstrass(u: arb, g2: arb, g3: arb, third: bool = False) -> tuple[arb, arb]:
-    """(℘, ℘') at u, or at u + ω3, as balls; not finite at poles, where Δ = 0 may be, and at u + ω3 unless Δ > 0.
-
-    By theta quotients, as in :mod:`heavytop.exact.elliptic.weierstrass`.
-    """
-    from heavytop.exact.elliptic.weierstrass import Lattice, from_invariants, thetas
-
-    try:
-        lattice = from_invariants(g2, g3)
-    except OutOfReach:
-        return _NAN, _NAN
-    if not isinstance(lattice, Lattice) or not u.is_finite() or (third and not g2**3 > 27 * g3**2):
-        return _NAN, _NAN
-    z, _ = lattice.reduced(acb(u))
-    first, *others = thetas(z + lattice.ratio / 2 if third else z, lattice.ratio)
-    scale = 2 * lattice.half_period * first / lattice.zero[0]
-    two, three, four = (value / at_zero for value, at_zero in zip(others, lattice.zero[1:], strict=True))
-    return (lattice.roots[0] + (two / scale) ** 2).real, (-2 * two * three * four / scale**3).real
-
-
-_VALUES: dict[str, Callable[..., arb]] = {
-    "wp": lambda u, g2, g3: _weierstrass(u, g2, g3)[0],
-    "wpprime": lambda u, g2, g3: _weierstrass(u, g2, g3)[1],
-    "wp3": lambda u, g2, g3: _weierstrass(u, g2, g3, True)[0],
-    "wp3prime": lambda u, g2, g3: _weierstrass(u, g2, g3, True)[1],
-    "wpinverse": lambda u, g2, g3: 1 / _weierstrass(u, g2, g3)[0],
-}
-"""Each function of balls, as a ball that is proven to hold it, at the working precision."""
-
 
 _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "exp": arb.exp,
@@ -140,21 +35,8 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "atan2": lambda y, x: arb.atan2(y, x),
     "Abs": abs,
     "sign": arb.sgn,
-    "sn": lambda u, m: _jacobi(u, m)[0],
-    "cn": lambda u, m: _jacobi(u, m)[1],
-    "dn": lambda u, m: _jacobi(u, m)[2],
-    **_VALUES,
+    **VALUES,
 }
-
-
-def _jacobi(u: arb, m: arb) -> tuple[arb, arb, arb]:
-    """sn, cn, dn; not finite unless 0 ≤ m ≤ 1 is certain."""
-    from heavytop.exact.elliptic.jacobi import jacobi
-
-    if not (m >= 0 and m <= 1):
-        return _NAN, _NAN, _NAN
-    sine, cosine, delta = jacobi(m, 1 - m).functions(u)
-    return sine, cosine, delta
 
 
 @whole_evaluation
@@ -197,11 +79,12 @@ def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bi
 
 
 def _power(base: arb, exponent: sympy.Expr) -> arb:
-    if exponent.is_Rational and exponent.q in (1, 2):
-        root = base if exponent.q == 1 else base.sqrt()
-        power = _whole_power(root, abs(int(exponent.p)))
+    if exponent.is_Rational and exponent.q in (1, 2, 4):
+        for _ in range(int(exponent.q) // 2):
+            base = base.sqrt()
+        power = _whole_power(base, abs(int(exponent.p)))
         return power if exponent.p > 0 else 1 / power
-    raise Unprovable(f"The power {exponent} is no multiple of 1/2.")
+    raise Unprovable(f"The power {exponent} is no multiple of 1/4.")
 
 
 def _whole_power(base: arb, exponent: int) -> arb:
