@@ -17,6 +17,7 @@ from heavytop.features.kinds import KINDS
 from heavytop.features.work_precision import kind as work_precision
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import measure
+from heavytop.measure.integrator import Repeats
 from heavytop.records import Row
 from support.reports import expand, load
 
@@ -259,8 +260,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
-    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
-    monkeypatch.setattr(work_precision, "_RUNS", range(3, 4))
+    monkeypatch.setattr(work_precision, "_USUAL", Repeats(3, 3, 0.0))
     return tmp_path
 
 

@@ -17,6 +17,7 @@ from heavytop.errors import InputError, PeerFailed
 from heavytop.features.work_precision import kind as work_precision
 from heavytop.integrate import registry
 from heavytop.integrate.peers import contract
+from heavytop.measure.integrator import Repeats
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import Report
 from heavytop.report.compare.noise import Policy
@@ -226,8 +227,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
-    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
-    monkeypatch.setattr(work_precision, "_RUNS", range(1, 2))
+    monkeypatch.setattr(work_precision, "_USUAL", Repeats(1, 1, 0.0))
     return tmp_path
 
 

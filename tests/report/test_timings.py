@@ -125,7 +125,7 @@ def ran(folder: Path, more: str) -> Row:
 
 @pytest.mark.slow
 def test_a_plan_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
+    monkeypatch.setattr(work_precision, "_USUAL", Repeats(3, 100, 0.0))
     monkeypatch.setattr(work_precision, "_FOR_COMPARISON", Repeats(11, 20, 0.0, 3, band=True))
     plain, timed = ran(tmp_path, ""), ran(tmp_path, "timings = true\n")
     assert plain.seconds.keys() == {"compile", "run", "least", "repeats"}

@@ -15,6 +15,7 @@ from heavytop.features.work_precision.charts import trend
 from heavytop.features.work_precision.curves import panels
 from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
+from heavytop.measure.integrator import Repeats
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
 from heavytop.report.compare.noise import Policy
@@ -25,8 +26,7 @@ HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 
 @pytest.fixture(autouse=True)
 def few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
-    monkeypatch.setattr(work_precision, "_RUNS", range(2, 3))
+    monkeypatch.setattr(work_precision, "_USUAL", Repeats(2, 2, 0.0))
 
 
 def tasks(tmp_path: Path, text: str) -> list:
