@@ -86,6 +86,14 @@ class Task:
     source: IntegratorSource | None = None
     request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
+    @classmethod
+    def of_run(
+        cls, kind: str, case: Case, by: Subject, precision: Precision, times: tuple[Fraction, ...], **more: Any
+    ) -> Task:
+        """The task of a run of that case to the last of ``times``.  more: its other fields."""
+        key = RowKey(kind, case.name, case.system.name, by, precision.name, horizon=time_text(times[-1]))
+        return cls(**{"key": key, "suffix": "", "subject": by.name, "case": case, "times": times, **more})
+
     def of(self, case: Case) -> Task:
         """This measurement of another case of the same system."""
         key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)

@@ -19,7 +19,7 @@ from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row, RowKey
+from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
 from heavytop.report.document.document import Block, Chart
 from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
 from heavytop.report.render.plots import digits, growth
@@ -64,22 +64,16 @@ class DriftTable(PlanTable, tag=NAME):
         runs = []
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")
-            runs.append((parse(run.precision).name, time_text(horizon), uniform(horizon, run.samples)))
+            runs.append((parse(run.precision), *uniform(horizon, run.samples)))
         if self.step:
             positive([self.step], "step")
-        subject = computed(self.integrator, step=self.step)
+        subject, suffix = computed(self.integrator, step=self.step), f"/step={self.step}" if self.step else ""
+        options, request = Extent(self.attitude, self.noise), {"attitude": str(self.attitude)}
+        more = {"suffix": suffix, "options": options, "request": request}
         return [
-            Task(
-                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
-                f"/step={self.step}" if self.step else "",
-                self.integrator,
-                case,
-                *times,
-                options=Extent(self.attitude, self.noise),
-                request={"attitude": str(self.attitude)},
-            )
+            Task.of_run(NAME, case, subject, precision, times, keep=keep, **more)
             for case in map(find, self.cases)
-            for precision, horizon, times in runs
+            for precision, times, keep in runs
         ]
 
 

@@ -24,7 +24,7 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
 from heavytop.measure.truth import EnsembleReference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Chart, computed_by, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import laws_headline
@@ -106,11 +106,11 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
     subject = computed(integrator, seed=run.seed, **asked)
-    key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
     reference = "" if run.reference is None else parse(run.reference).name
     request = {"attitude": str(run.attitude), "reference": reference}
     title = f"{integrator} {subject.variant}".rstrip()
-    return Task(key, "", title, case, times, times, run, request=request)
+    more = {"subject": title, "keep": times, "options": run, "request": request}
+    return Task.of_run(NAME, case, subject, precision, times, **more)
 
 
 class _Done(msgspec.Struct):

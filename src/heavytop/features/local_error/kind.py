@@ -27,8 +27,8 @@ from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import OBSERVED_ORDER, ORDER_OF_RUNS
-from heavytop.precision import exact, parse, time_text
-from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
+from heavytop.precision import exact, parse
+from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.report.document.document import Table as Cells
 
@@ -53,15 +53,8 @@ class LocalErrorTable(PlanTable, tag=NAME):
     def tasks(self, find: Find) -> list[Task]:
         """A task for each row."""
         times = tuple(positive([self.horizon], "horizon"))
-        horizon, subject = time_text(times[-1]), computed(self.integrator)
         return [
-            Task(
-                RowKey(NAME, case.name, case.system.name, subject, parse(precision).name, horizon=horizon),
-                "",
-                self.integrator,
-                case,
-                times,
-            )
+            Task.of_run(NAME, case, computed(self.integrator), parse(precision), times)
             for case in map(find, self.cases)
             for precision in self.precisions
         ]

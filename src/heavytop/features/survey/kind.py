@@ -22,8 +22,8 @@ from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA
-from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
-from heavytop.records import Against, Beside, Metric, Row, RowKey, Spread
+from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse
+from heavytop.records import Against, Beside, Metric, Row, Spread
 from heavytop.report.document.document import Block, Card, Chart, In, Note
 from heavytop.report.document.motions import LossLimits, WorseMotions
 
@@ -66,19 +66,9 @@ class SurveyTable(PlanTable, tag=NAME):
                 f"A map over {quoted(', '.join(self.map))} has no two axes.", f"Use two of {', '.join(DATA)}."
             )
         times, _ = uniform(horizon, self.samples)
-        subject = computed(self.integrator, tolerance=self.tolerance)
-        return [
-            Task(
-                RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon)),
-                "",
-                self.integrator,
-                case,
-                times,
-                options=tuple(self.map),
-                request={"samples": str(self.samples)},
-            )
-            for case in map(find, self.cases)
-        ]
+        subject, request = computed(self.integrator, tolerance=self.tolerance), {"samples": str(self.samples)}
+        more = {"options": tuple(self.map), "request": request}
+        return [Task.of_run(NAME, case, subject, precision, times, **more) for case in map(find, self.cases)]
 
 
 class Survey(Kind):

@@ -37,7 +37,7 @@ from heavytop.measure.scalar import RELATIVE, metric, of_fraction
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import FINEST, Beside, Explained, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import FINEST, Beside, Explained, Metric, Quantity, Row, Subject, by_name
 from heavytop.report.document.document import Block, Chart, In, Note, clip
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.store.checks import CLOSE, bound, ended, size_of, sizes
@@ -104,19 +104,14 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
     def tasks(self, find: Find) -> list[Task]:
         """A task for each row."""
         (horizon,) = positive([self.horizon], "horizon")
-        times, end = uniform(horizon, self.samples), time_text(horizon)
-        points = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
+        times, keep = uniform(horizon, self.samples)
+        points = [(parse(each.precision), subject) for each in self.ladders for subject in each.subjects()]
+        options = Options(self.timings, self.attitude)
+        more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": options}
         return [
-            Task(
-                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
-                f"/T={self.horizon}",
-                f"{subject.name} {subject.setting}",
-                case,
-                *times,
-                Options(self.timings, self.attitude),
-            )
+            Task.of_run(NAME, case, by, precision, times, subject=f"{by.name} {by.setting}", **more)
             for case in map(find, self.cases)
-            for precision, subject in points
+            for precision, by in points
         ]
 
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
@@ -197,7 +192,7 @@ class WorkPrecision(Kind):
     ) -> tuple[dict[str, float], Trajectory]:
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
         # more of them where seconds are to be compared
-        end, how = task.times[-1:], _FOR_COMPARISON if task.options else _USUAL
+        end, how = task.times[-1:], _FOR_COMPARISON if task.options.timings else _USUAL
         name = task.integrator.name
         if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
