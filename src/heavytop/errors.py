@@ -73,6 +73,10 @@ class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 
 
+class MissingExtra(InputError):
+    """A package of an extra that is not installed; names the extra and the command that installs it."""
+
+
 class NotInClass(InputError):
     """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
 

@@ -25,6 +25,7 @@ from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, Sta
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.files import cache_folder
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
 # Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
@@ -282,7 +283,7 @@ def _keep(entry: Entry, found: Judged) -> None:
 
 def _place(entry: Entry) -> Path:
     content = (FOLDER / f"{entry.id}.toml").read_bytes()
-    return _cache_folder() / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
+    return cache_folder("claims") / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
 
 
 @cache
@@ -294,13 +295,6 @@ def _program() -> bytes:
     for path in sorted(path for room in _ROOMS for path in (_PACKAGE / room).rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.digest()
-
-
-def _cache_folder() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    with suppress(RuntimeError):
-        return (Path(home) if home else Path.home() / ".cache") / "heavytop" / "claims"
-    return Path(os.devnull) / "none"
 
 
 # The process in which the claim of a file is audited: :mod:`heavytop.features.claims.audit.guard` starts it.
