@@ -19,6 +19,7 @@ FEATURES = {f"features.{name}" for name in features.NAMES}
 GROUND = {
     "errors": set(),
     "display": set(),
+    "extras": {"errors"},
     "feature": set(),
     "features": {"feature"},
     "files": {"errors"},
@@ -146,8 +147,8 @@ def test_no_room_hides_a_public_name() -> None:
     assert not {path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py")} & set(heavytop.__all__)
 
 
-TWO_MEANINGS = {"Integrator", "Report", "Section"}
-"""Of the Python interface, each with its namesake behind it."""
+TWO_MEANINGS = {"Integrator", "Report", "Section", "Engine"}
+"""Of the Python interface, each with its namesake behind it; and what an adapter of each engine has."""
 
 
 def test_a_public_class_name_has_one_meaning() -> None:
