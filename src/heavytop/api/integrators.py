@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
@@ -33,6 +34,33 @@ LANGUAGES = {
     "fortran": Language("Fortran", "mine.f90", '["./mine"]'),
 }
 
+
+class Method(NamedTuple):
+    """A method of `heavytop new`: what it is called, the keys of its table, and its control and ladder in the plan."""
+
+    title: str
+    keys: str
+    control: str
+    ladder: str
+
+
+_STEPS = 'steps = ["1/10", "1/30", "1/100", "1/300"]'
+METHODS = {
+    "step": Method("the classical Runge-Kutta method", 'setting = "step"\norder = 4', "0.01", _STEPS),
+    "adaptive": Method(
+        "the method of Dormand and Prince",
+        'setting = "tolerance"\norder = 5',
+        "1e-9",
+        'tolerances = ["1e-4", "1e-6", "1e-8", "1e-10"]',
+    ),
+    "multistep": Method(
+        "the method of Adams and Bashforth",
+        'setting = "step"\norder = 4\none_step = false  # it keeps a memory',
+        "0.01",
+        _STEPS,
+    ),
+}
+
 _WORKFLOW = ".github/workflows/heavytop.yml"
 
 
@@ -51,30 +79,48 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
     return check(named(integrator))
 
 
-def new_integrator(folder: Path, language: str) -> list[str]:
-    """Write a program that integrates, with its gate, into a new folder; returns the names of the files.
+def new_integrator(folder: Path, language: str, method: str = "step", into: Path | None = None) -> list[str]:
+    """Write a program that integrates, with its gate, into a new folder; returns the names of the files in it.
 
-    Raises InputError for an unknown language, a folder that holds anything and one that cannot be written.
+    method: a fixed step, an adaptive one, or a multistep method.  into: a repository that ``folder`` lies in, which is
+    given the workflow.  Raises InputError for an unknown language or method, a folder that holds anything, a workflow
+    that exists, and what cannot be written.
     """
-    if language not in LANGUAGES:
-        raise InputError(f"There is no program in {quoted(language)}.", f"Use {', '.join(LANGUAGES)}.")
+    for name, choices, noun in ((language, LANGUAGES, "program in"), (method, METHODS, "method")):
+        if name not in choices:
+            raise InputError(f"There is no {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
+    files = _starter(LANGUAGES[language], METHODS[method], _texts(language), method)
+    workflow = (into or folder) / _WORKFLOW
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} already holds other content.", "Give a new folder.")
-        about = LANGUAGES[language]
-        files = _texts("common") | _texts(language)
-        files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
-        words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-        words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
-        for name in ("mine.toml", "README.md", _WORKFLOW):
-            for word, text in words.items():
-                files[name] = files[name].replace(word, text)
+        if workflow.exists():
+            raise InputError(f"{workflow} exists already.", "Move it away, or give another --into.")
+        place = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
+        files[_WORKFLOW] = files[_WORKFLOW].replace("WHERE", place)
         for name, text in sorted(files.items()):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            replace(folder / name, text.encode())
+            path = workflow if name == _WORKFLOW else folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace(path, text.encode())
+    except ValueError:
+        raise InputError(f"{folder} is not in {into}.", "Give a folder of that repository.") from None
     except OSError as error:
         raise InputError(f"{folder} cannot be written: {error.strerror}.", "Give a folder that can be.") from None
     return sorted(files)
+
+
+def _starter(about: Language, method: Method, program: dict[str, str], name: str) -> dict[str, str]:
+    """The files of a starter by their names, with the workflow under its own."""
+    parts = {part: program.pop(part) for part in METHODS}
+    files = _texts("common") | program
+    files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
+    files[about.file] = re.sub(r"^.*\bMETHOD\b.*\n", lambda _: parts[name], files[about.file], flags=re.MULTILINE)
+    words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
+    words |= {"TITLE": method.title, "KEYS": method.keys, "CONTROL": method.control, "LADDER": method.ladder}
+    words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
+    pattern = re.compile(rf"\b({'|'.join(words)})(?=_dp\b|\b)")
+    texts = {"mine.toml", "gate.toml", "README.md", _WORKFLOW, about.file}
+    return {file: pattern.sub(lambda m: words[m[1]], text) if file in texts else text for file, text in files.items()}
 
 
 def _texts(part: str) -> dict[str, str]:
