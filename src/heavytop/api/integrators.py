@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import re
+import tomllib
 from collections.abc import Callable
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
+from heavytop.features import FEATURES
 from heavytop.files import replace
 from heavytop.harness.integrator_check import NOT_TRIED as NOT_TRIED
 from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
+from heavytop.top.bodies import Body
 from heavytop.version import commit
 
 
@@ -79,17 +85,21 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
     return check(named(integrator))
 
 
-def new_integrator(folder: Path, language: str, method: str = "step", into: Path | None = None) -> list[str]:
+def new_integrator(
+    folder: Path, language: str, method: str = "step", into: Path | None = None, engine: str = ""
+) -> list[str]:
     """Write a program that integrates, with its gate, into a new folder; returns the names of the files in it.
 
     method: a fixed step, an adaptive one, or a multistep method.  into: a repository that ``folder`` lies in, which is
-    given the workflow.  Raises InputError for an unknown language or method, a folder that holds anything, a workflow
-    that exists, and what cannot be written.
+    given the workflow.  engine: in the place of a program the adapter of that engine of rigid bodies.
+    Raises InputError for an unknown language, method or engine, a folder that holds anything, a workflow that exists,
+    and what cannot be written.
     """
     for name, choices, noun in ((language, LANGUAGES, "program in"), (method, METHODS, "method")):
         if name not in choices:
             raise InputError(f"There is no {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
-    files = _starter(LANGUAGES[language], METHODS[method], _texts(language), method)
+    if engine and engine not in (known := engines()):
+        raise InputError(f"There is no adapter of {quoted(engine)}.", f"Use {', '.join(known)}.")
     workflow = (into or folder) / _WORKFLOW
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -97,7 +107,7 @@ def new_integrator(folder: Path, language: str, method: str = "step", into: Path
         if workflow.exists():
             raise InputError(f"{workflow} exists already.", "Move it away, or give another --into.")
         place = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
-        files[_WORKFLOW] = files[_WORKFLOW].replace("WHERE", place)
+        files = _adapter(engine, place) if engine else _program(language, method, place)
         for name, text in sorted(files.items()):
             path = workflow if name == _WORKFLOW else folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -109,18 +119,65 @@ def new_integrator(folder: Path, language: str, method: str = "step", into: Path
     return sorted(files)
 
 
-def _starter(about: Language, method: Method, program: dict[str, str], name: str) -> dict[str, str]:
-    """The files of a starter by their names, with the workflow under its own."""
-    parts = {part: program.pop(part) for part in METHODS}
-    files = _texts("common") | program
-    files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
-    files[about.file] = re.sub(r"^.*\bMETHOD\b.*\n", lambda _: parts[name], files[about.file], flags=re.MULTILINE)
+def _program(language: str, method: str, place: str) -> dict[str, str]:
+    """The files of a program by their names."""
+    about, chosen = LANGUAGES[language], METHODS[method]
+    files = _texts("common") | _texts(language)
+    parts = {name: files.pop(name) for name in METHODS}
+    files[".gitignore"], files[_WORKFLOW] = files.pop("gitignore"), files.pop("workflow.yml")
+    files[about.file] = re.sub(r"^.*\bMETHOD\b.*\n", lambda _: parts[method], files[about.file], flags=re.MULTILINE)
     words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-    words |= {"TITLE": method.title, "KEYS": method.keys, "CONTROL": method.control, "LADDER": method.ladder}
-    words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
-    pattern = re.compile(rf"\b({'|'.join(words)})(?=_dp\b|\b)")
-    texts = {"mine.toml", "gate.toml", "README.md", _WORKFLOW, about.file}
-    return {file: pattern.sub(lambda m: words[m[1]], text) if file in texts else text for file, text in files.items()}
+    words |= {"TITLE": chosen.title, "KEYS": chosen.keys, "CONTROL": chosen.control, "LADDER": chosen.ladder}
+    return {
+        name: text if name in (".gitignore", "Makefile", "policy.toml") else _filled(text, words, place)
+        for name, text in files.items()
+    }
+
+
+def _filled(text: str, words: dict[str, str], place: str) -> str:
+    """A text with its words in capitals replaced.  place: the folder of the program in the repository."""
+    words = words | {"MADE_FROM": (commit() or "HEAD").removesuffix("-dirty"), "WHERE": place}
+    return re.sub(rf"(?<![A-Za-z])({'|'.join(words)})(?![A-Za-z])", lambda match: words[match[1]], text)
+
+
+# Engines of rigid bodies, as features have adapters of them: NAME.toml, NAME_top.py, and what these share.
+
+
+def engines() -> list[str]:
+    """The names of `heavytop new --engine`."""
+    return sorted(path.name.removesuffix(".toml") for path in _adapters() if path.name.endswith(".toml"))
+
+
+def _adapters() -> list[Traversable]:
+    folders = (resources.files(each.package) / each.starters for each in FEATURES if each.starters)
+    return [path for folder in folders for path in folder.iterdir() if path.is_file()]
+
+
+def _adapter(engine: str, place: str) -> dict[str, str]:
+    """The files of an engine: the gate measures each of its integrators."""
+    own = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
+    texts = {path.name: path.read_text("utf-8") for path in _adapters()}
+    files = {name: texts[source] for name, source in own.items()}
+    tables = tomllib.loads(files["engine.toml"])["integrator"]
+    line = '    {{ integrator = "{name}", {setting}s = {points} }},'
+    ladders = (line.format(**each, points=json.dumps(_POINTS[each["setting"]])) for each in tables)
+    runs = "\n".join(_DRIFT.format(name=each["name"]) for each in tables)
+    words = {"ENGINE": engine, "LADDERS": "\n".join(ladders), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
+    words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
+    words |= {"BUILD": words["INSTALL"].replace("pip", "python -m pip"), "mine.toml": f"engine.toml:{words['FIRST']}"}
+    texts[f"{_WORKFLOW}.txt"] = _texts("common")["workflow.yml"]
+    return files | {name: _filled(texts[f"{name}.txt"], words, place) for name in ("gate.toml", "README.md", _WORKFLOW)}
+
+
+_POINTS = {"step": ["1/50", "1/100", "1/200", "1/400"], "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"]}
+_DRIFT = """
+[[measure]]
+kind = "drift"
+cases = ["lagrange"]
+integrator = "{name}"
+attitude = true
+noise = false
+runs = [{{ precision = "double", horizon = "10", samples = 50 }}]"""
 
 
 def _texts(part: str) -> dict[str, str]:
@@ -147,10 +204,8 @@ def listing() -> dict[str, Any]:
         for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
     }
     return {
-        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
-        "bodies": [
-            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
-        ],
+        "cases": [_listed(case) for case in CASES.values()],
+        "bodies": [_listed(case) for case in named_bodies().values()],
         "plans": list(BUILT_IN),
         "systems": [system.name for system in SYSTEMS],
         "formats": {
@@ -160,6 +215,11 @@ def listing() -> dict[str, Any]:
         "integrators": integrators,
         "capabilities": {name: each.capabilities() for name, each in known.items()},
     }
+
+
+def _listed(case: Case) -> dict[str, Any]:
+    about = {"name": case.name, "system": case.system.name, "about": case.about}
+    return about | {"realisable": Body.realising(case.top) is not None}
 
 
 def case_document(name: str) -> dict[str, Any]:

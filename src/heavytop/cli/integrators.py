@@ -57,22 +57,25 @@ def new(
     folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="A new folder; with --into, heavytop.")] = None,
     language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
     method: Annotated[str, typer.Option(help="step, adaptive or multistep.")] = "step",
+    engine: Annotated[str, typer.Option(help="An adapter of that engine: mujoco, drake, ...; '?' lists all.")] = "",
     into: Annotated[Path | None, typer.Option(help="A repository: it gets the workflow, and DIR lies in it.")] = None,
 ) -> int:
     """Begin an integrator and its gate in a new folder.
 
-    It holds a program that integrates the heavy top: by RK4 in fixed steps, by the pair of Dormand and Prince to a
-    tolerance, or by Adams-Bashforth 4.  It works at once: mine.toml describes the program, gate.toml is the plan that
-    measures it, and a workflow runs `heavytop gate` on GitHub.
+    It holds a program that integrates the heavy top, in the language asked for: by RK4 in fixed steps, by the pair of
+    Dormand and Prince to a tolerance, or by Adams-Bashforth 4; or the adapter of an engine of rigid bodies.  It works
+    at once: mine.toml (engine.toml) describes the program, gate.toml is the plan that measures it, and a workflow runs
+    `heavytop gate` on GitHub.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 
     if folder is None and into is None:
         raise InputError("A folder must be named.", "Give DIR, or --into a repository.")
     made = (into or Path()) / (folder or "heavytop")
-    files = new_integrator(made, language, method, into)
+    files = new_integrator(made, language, method, into, engine)
     print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
-    print(f"Next: cd {made}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml; heavytop gate --bless")
+    first = "cat README.md" if engine else f"{LANGUAGES[language].build}; heavytop check-integrator mine.toml"
+    print(f"Next: cd {made}; {first}; heavytop gate --bless")
     return ExitCode.GOOD
 
 
@@ -105,9 +108,9 @@ def list_(
         print_json(listed)
         return ExitCode.GOOD
     print("Cases (--case NAME shows the data)")
-    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
+    _lines({each["name"]: _about(each) for each in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
-    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
+    _lines({each["name"]: _about(each) for each in listed["bodies"]}, indent=15)
     plans = f"{', '.join(listed['plans'])}, or a TOML file"
     print("Plans")
     print(fill(plans, 80, initial_indent="  ", subsequent_indent="  "))
@@ -117,6 +120,10 @@ def list_(
     print("Integrators")
     _lines(listed["integrators"])
     return ExitCode.GOOD
+
+
+def _about(case: dict[str, Any]) -> str:
+    return f"{case['system']:14} {case['about']}" + ("" if case["realisable"] else " (no rigid body has these moments)")
 
 
 def _lines(notes: dict[str, str], indent: int = 0) -> None:
