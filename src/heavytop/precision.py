@@ -229,6 +229,12 @@ def six_digits(value: Fraction) -> str:
     return f"{float(decimal_text(value, 6)):.6g}"
 
 
+def plain_decimal(value: Fraction, digits: int) -> str:
+    """A decimal of at most so many digits, without trailing zeros."""
+    text = decimal_text(value, digits)
+    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
+
+
 def time_text(time: Fraction) -> str:
     """A time in reports: exact where 20 digits suffice, else 20 digits."""
     text = decimal_text(time, 20)

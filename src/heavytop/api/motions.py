@@ -196,7 +196,7 @@ def motion(
     reached: Callable[[Fraction], None] | None = None,
     **options: Unpack[RunOptions],
 ) -> Motion:
-    """What `heavytop propagate` shows: a computed motion with the drift of every first integral that holds.
+    """Compute a motion as `heavytop propagate` shows it, with the drift of every first integral that holds.
 
     Arguments:
         top, start, times, precision, integrator, system, options: as in :func:`propagate`.

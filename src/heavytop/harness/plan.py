@@ -361,7 +361,7 @@ def _own(plan: Plan) -> dict[str, Case]:
 
 
 def warnings(plan: Plan) -> list[str]:
-    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    """Warnings of data that no rigid body can have, though the equations do not mind, of the plan's own tops."""
     return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 
@@ -418,11 +418,11 @@ def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[Pla
 _MAX_SAMPLES = 1_000_000
 
 
-def log_spaced(count: int, per_decade: int = 8) -> list[int]:
-    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
+def log_spaced(count: int) -> list[int]:
+    """About eight integers a decade from 1 to ``count``, both included."""
     wanted = {count}
     i = 0
-    while (value := round(10 ** (i / per_decade))) < count:
+    while (value := round(10 ** (i / 8))) < count:
         wanted.add(value)
         i += 1
     return sorted(wanted)

@@ -444,7 +444,7 @@ class Observed:
         said = Reading.of(self.said)
         if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
             said = replace(said, degrees=self.start.degrees)
-        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot, count) if count else None
+        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot) if count else None
 
 
 def _start(raw: RawStart, posed: Posed) -> GivenStart:
