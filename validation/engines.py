@@ -33,8 +33,13 @@ STEPS = {
 }
 """By the beginning of an integrator's name; of all others FINE."""
 TOLERANCES = ["1e-3", "1e-5", "1e-7", "1e-9"]
-FAST = ("mujoco", "exudyn", "dart", "pybullet")
-"""The engines that take steps of 1/8000, which the fast top needs, in a second or two."""
+ON = {
+    "generic-body": ("mujoco", "mjx", "pinocchio", "exudyn", "drake", "dart", "pybullet", "siconos"),
+    "middle-axis": ("mujoco", "pinocchio:RKMK4", "basilisk"),
+    "slow-lagrange": ("mujoco", "pinocchio:RKMK4"),
+    "bruels-cardona-arnold": ("mujoco", "exudyn:RK67", "exudyn:generalized-alpha"),
+}
+"""The beginnings of the names that are measured on a body: all on one, some on the others."""
 MEASURES = {"generic-body": "10", "middle-axis": "10", "slow-lagrange": "10", "bruels-cardona-arnold": "2"}
 
 
@@ -57,8 +62,10 @@ def plan(folder: Path, environments: dict[str, Path]) -> Path:
         names += [(each.name, each.setting) for each in commands_in(table)]
     measures = []
     for body, horizon in MEASURES.items():
-        curves = [curve(*each, body) for each in names if _measured(each[0], body)]
+        curves = [curve(*each, body) for each in names if each[0].startswith(ON[body])]
         lines = "\n".join(curves)
+        if not curves:
+            continue
         measures.append(
             f'[[measure]]\nkind = "work_precision"\ncases = ["{body}"]\nattitude = true\nhorizon = "{horizon}"\n'
             f"samples = 20\nladders = [\n{lines}\n]\n"
@@ -67,14 +74,6 @@ def plan(folder: Path, environments: dict[str, Path]) -> Path:
     path = folder / "plan.toml"
     path.write_text("\n".join([f'name = "engines"\nintegrators = [{files}]\n', *tops, *measures]), "utf-8")
     return path
-
-
-def _measured(name: str, body: str) -> bool:
-    if body == "bruels-cardona-arnold":
-        return name.startswith(FAST)
-    return (
-        body == "middle-axis" if name.startswith("basilisk") else body == "generic-body" or not name.startswith("mjx")
-    )
 
 
 def main() -> int:
