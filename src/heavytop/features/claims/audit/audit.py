@@ -20,7 +20,7 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
 from heavytop.features.claims.audit.context import ClaimFile
-from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
+from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
@@ -299,11 +299,13 @@ def _program() -> bytes:
 
 
 def child() -> None:
-    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
-    path, system_name, seconds = sys.argv[2:]
+    """The audit of ``sys.argv[2:]`` = path, system, seconds of the processor and of the clock: a JSON document of
+    :class:`Answer` on standard output.
+    """
+    path, system_name, seconds, last = sys.argv[2:]
     if hasattr(signal, "alarm"):
-        signal.alarm(int(seconds))
-    limit_memory()
+        signal.alarm(int(last))
+    limit_process(int(seconds))
     try:
         answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
     except HeavyTopError as error:
