@@ -23,6 +23,7 @@ NAMES = (
     "events",
     "derivatives",
     "body",
+    "engines",
 )
 """In the order of the summary of a run."""
 FEATURES: tuple[Feature, ...] = tuple(import_module(f"{__name__}.{name}").FEATURE for name in NAMES)

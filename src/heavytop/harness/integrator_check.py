@@ -410,8 +410,8 @@ class _Contract:
 
     def _unknown_lines(self) -> str:
         assert self.program is not None
-        quaternion = self.declared.attitude == "quaternion"
-        request = _Extended(self._problem(), [exact(Fraction(1))], self._default(), self.program.hex, quaternion)
+        own = self.program.request(self._problem(), [exact(Fraction(1))], self._default())
+        request = _Extended(own.problem, own.times, own.control, own.hex, own.quaternion, own.body)
         try:
             with session(self.program) as program:
                 reply = program.ask(request)

@@ -24,16 +24,19 @@ from heavytop.errors import (
     PeerFailed,
     Unsupported,
 )
+from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
+from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.truth import seconds_a_step as words_seconds
-from heavytop.precision import Precision, decimal_text, exact, exact_text, parse, time_text
+from heavytop.measure.truth import truth
+from heavytop.precision import Precision, decimal_text, exact, exact_text, number, parse, time_text
 from heavytop.records import (
     CONTRADICTION,
     EXACT,
@@ -106,7 +109,9 @@ class Task:
     @property
     def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, source=self.source)
+        step = self.key.subject.step
+        control = ("step", exact(step)) if step not in ("", FINEST) else None
+        return ChosenIntegrator(self.key.subject.name, control, self.source)
 
     @property
     def is_third_party(self) -> bool:
@@ -141,6 +146,18 @@ class Task:
         """Seconds that multiword, or heyoka for all others, take for such a motion, roughly."""
         step = (words_seconds if self.key.subject.name == MULTIWORD else seconds_a_step)(self.precision.bits)
         return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
+
+
+def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
+    """The run of a task with ξ beside Ω and γ, and what measured it; begun anew where it was interrupted."""
+    case, precision = task.given, task.precision
+    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
+    xi = resolve(case.body or case.top, case.given_start or case.start).xi
+    problem = Problem.of(case.top, case.start, precision, case.system, xi)
+    known = truth(replace(problem, xi=None), times)
+    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
+    run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
+    return run, scorer
 
 
 def computed(name: str, **setting: Any) -> Subject:

@@ -426,6 +426,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
     problem, the principal axes.  principal: then the run as it was computed.
     angle_texts: φ, θ, ψ, followed from t = 0, as decimal text, shape (n, 3), where they were asked for.
+    joint_violation: how far an engine of bodies let the fixed point move, where it says so.
     """
 
     problem: Problem
@@ -443,6 +444,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     frame: Frame | None = None
     principal: Trajectory | None = None
     angle_texts: Sequence[Sequence[str]] | None = None
+    joint_violation: float | None = None
 
     def __post_init__(self) -> None:
         import numpy

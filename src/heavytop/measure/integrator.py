@@ -119,6 +119,8 @@ class ChosenIntegrator:
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
+        if self.capabilities.streams and self.control:
+            raise Unsupported(f"{self.name} has no {self.control[0]}.", "Name an integrator that has.")
         if self.capabilities.streams:
             call = registry.propagator(self.which, {})
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
@@ -305,9 +307,11 @@ def _nudged(problem: Problem, count: int) -> State:
 
 
 def _moved(problem: Problem, part: Fraction) -> State:
-    """A start with Ω and γ larger by a part of them: where γ is parallel to M, it stays so."""
+    """A start with Ω larger by a part of it, or γ where Ω is 0: where γ is parallel to M, it stays so."""
     start = problem.start if problem.given is None else problem.given[1]
-    return State([(1 + part) * value for value in start.omega], [(1 + part) * value for value in start.gamma])
+    if not any(start.omega):
+        return State(start.omega, [(1 + part) * value for value in start.gamma])
+    return State([(1 + part) * value for value in start.omega], start.gamma)
 
 
 def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction | None) -> Fraction | None:

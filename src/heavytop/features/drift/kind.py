@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
-from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, run_with_attitude
 from heavytop.integrate.trajectory import Problem, ResumePoint, Trajectory
 from heavytop.kind import Kind, with_explanation
-from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
@@ -51,6 +49,7 @@ class DriftTable(PlanTable, tag=NAME):
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too: of an integrator
     that declares that it carries the attitude; others are given Ω and γ alone, and the flag of the row says so.
     noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
+    step: of an integrator with fixed steps, in the place of its own.
     """
 
     cases: list[str]
@@ -58,6 +57,7 @@ class DriftTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
     attitude: bool = False
     noise: bool = True
+    step: str = ""
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
@@ -65,11 +65,13 @@ class DriftTable(PlanTable, tag=NAME):
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")
             runs.append((parse(run.precision).name, time_text(horizon), uniform(horizon, run.samples)))
-        subject = computed(self.integrator)
+        if self.step:
+            positive([self.step], "step")
+        subject = computed(self.integrator, step=self.step)
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
-                "",
+                f"/step={self.step}" if self.step else "",
                 self.integrator,
                 case,
                 *times,
@@ -158,14 +160,7 @@ def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
 
 def _with_attitude(task: Task) -> Row:
     """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
-    case, precision, integrator = task.given, task.precision, task.integrator
-    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
-    xi = resolve(case.body or case.top, case.given_start or case.start).xi
-    problem = Problem.of(case.top, case.start, precision, case.system, xi)
-    known = truth(replace(problem, xi=None), times)
-    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
-    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
-    return _row(task, run, scorer)
+    return _row(task, *run_with_attitude(task))
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

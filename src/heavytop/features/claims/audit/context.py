@@ -24,6 +24,7 @@ from heavytop.features.claims.algebra.conditions import (
     solve_relations,
     written,
 )
+from heavytop.features.claims.algebra.elliptic import FORMULAS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
 from heavytop.features.claims.algebra.reader import (
@@ -213,7 +214,8 @@ def of_bodies(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[N
 
 TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
-RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variable) for variable in STATE)}
+"""Names that no parameter may have: an elliptic function is one only before a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """Of numerator and denominator of a number in a sample: 2000 digits."""
