@@ -124,7 +124,7 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
         said(lead.ours),
         clip(lead.other, 40),
         said(lead.theirs) if lead.other else "",
-        "" if lead.ratio is None else f"{'slower, ' * (lead.ratio < 1)}{lead.ratio:.1f} ×",
+        "" if lead.ratio is None else f"{'slower, ' * (lead.ratio < 1)}{lead.ratio:.1f}\N{NO-BREAK SPACE}×",
         "" if lead.general is None else said(lead.general[1]),
         "" if lead.lanes is None else seconds_text(lead.lanes),
     ]
