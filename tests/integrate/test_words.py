@@ -4,6 +4,7 @@ import json
 import math
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from functools import lru_cache
 from random import Random
 
 import pytest
@@ -19,7 +20,6 @@ from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.multiword.motions import propagate_multiword, sums_of_two
 from heavytop.integrate.trajectory import Outcome, Problem, ResumePoint, Trajectory
 from heavytop.multiword.codegen import recurrence
-from heavytop.multiword.codegen.machine_code import once
 from heavytop.multiword.double_double import double_double_run, steps
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
@@ -295,7 +295,7 @@ def test_heyoka_refuses_double_double() -> None:
 @pytest.mark.slow
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
-    monkeypatch.setattr(double_double_run, "machine", once(steps.build))
+    monkeypatch.setattr(double_double_run, "machine", lru_cache(steps.build))  # not from the disk
     monkeypatch.setattr(engines, "_made", {})
     damaged = [list(part) for part in recurrence.GATHERED]
     damaged[2][4] = (6, -1)

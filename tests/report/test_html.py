@@ -250,7 +250,8 @@ def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
 def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str, Page]) -> None:
     section = section_of("work-precision", full_report())
     (lead,) = section.answers.rows
-    assert lead == ["euler/T=1000", "1e-10", "heyoka double", "2 ms", "peer:A", "6 ms", "3.0\N{NO-BREAK SPACE}×", "", ""]
+    assert lead[:-3] == ["euler/T=1000", "1e-10", "heyoka double", "2 ms", "peer:A", "6 ms"]
+    assert lead[-3:] == ["3.0\N{NO-BREAK SPACE}×", "", ""]
     assert "peer:A" in pages["report"].text
     assert not section.legend
     euler, lagrange = section.pictures

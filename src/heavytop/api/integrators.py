@@ -43,7 +43,7 @@ _WORKFLOW = ".github/workflows/heavytop.yml"
 
 
 def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
-    """What an integrator answers to every request of the contract, odd ones too.
+    """The answers of an integrator to every request of the contract, odd ones too.
 
     Arguments:
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.

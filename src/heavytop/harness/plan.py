@@ -22,7 +22,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, quoted
+from heavytop.errors import InputError, invalid, prefixed, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.features import FEATURES
 from heavytop.files import read_whole
@@ -353,15 +353,13 @@ def _own(plan: Plan) -> dict[str, Case]:
             raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
         if top.name in CASES or top.name in named_bodies():
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
-        try:
+        with prefixed(f"The plan's top {top.name!r}"):
             own[top.name] = top.case()
-        except InputError as error:
-            raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None
     return own
 
 
 def warnings(plan: Plan) -> list[str]:
-    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    """Warnings of data that no rigid body can have, though the equations do not mind, of the plan's own tops."""
     return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 
@@ -395,13 +393,11 @@ def _require_fit(task: Task) -> None:
     """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
     if task.case is None or not task.has_precision:
         return
-    try:
+    with prefixed(f"{task.label}"):
         precision = require(task.precision)
         Problem.of(task.case.top, task.case.start, precision, task.case.system)
         for time in task.times[:1] + task.times[-1:]:
             number(time, precision)
-    except InputError as error:
-        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
 def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
@@ -418,11 +414,11 @@ def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[Pla
 _MAX_SAMPLES = 1_000_000
 
 
-def log_spaced(count: int, per_decade: int = 8) -> list[int]:
-    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
+def log_spaced(count: int) -> list[int]:
+    """About eight integers a decade from 1 to ``count``, both included."""
     wanted = {count}
     i = 0
-    while (value := round(10 ** (i / per_decade))) < count:
+    while (value := round(10 ** (i / 8))) < count:
         wanted.add(value)
         i += 1
     return sorted(wanted)

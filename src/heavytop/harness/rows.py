@@ -87,13 +87,13 @@ class Task:
     request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
     def of(self, case: Case) -> Task:
-        """The same measurement of another case of the same system."""
+        """This measurement of another case of the same system."""
         key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)
         return replace(self, key=key, case=case)
 
     @property
     def title(self) -> str:
-        """What the row calls its case."""
+        """The name of the case in the row."""
         return self.key.case + self.suffix
 
     @property
@@ -108,7 +108,7 @@ class Task:
 
     @property
     def integrator(self) -> ChosenIntegrator:
-        """What computes the motion."""
+        """The integrator that computes the motion."""
         step = self.key.subject.step
         control = ("step", exact(step)) if step not in ("", FINEST) else None
         return ChosenIntegrator(self.key.subject.name, control, self.source)
@@ -321,7 +321,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
     """A table `[[measure]]` of a plan; unknown keys are errors."""
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError for an impossible value."""
+        """A task for each row; raises InputError for an impossible value."""
         raise NotImplementedError
 
     def swept(self, sweep: Sweep, cases: Sequence[Case]) -> Sequence[Case]:
@@ -329,7 +329,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         return cases
 
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
-        """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
+        """These measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
         return msgspec.structs.replace(self, integrator=name_of(which))
@@ -364,7 +364,7 @@ class MeasuredKind(Protocol):
         return 1.0 + task.run_seconds
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
-        """What all rows of the kind together come to; called where it :attr:`concludes`."""
+        """Further rows from all rows of the kind together; called where it :attr:`concludes`."""
         return []
 
     def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:

@@ -35,7 +35,7 @@ _CENTRAL = 0.95
 
 
 def factor(seed: int, rerun: int = 0) -> Fraction:
-    """What inertia and weight are multiplied by; 1 for seed 0 and rerun 0."""
+    """The factor of inertia and weight; 1 for seed 0 and rerun 0."""
     number = (seed * (RERUNS + 1) + rerun) * _STRIDE % FACTORS
     return 1 + Fraction(number, 2**_BITS)
 

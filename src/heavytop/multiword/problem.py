@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -12,8 +11,8 @@ from math import isqrt
 from threading import local
 
 import numpy
-from llvmlite import ir
 
+from heavytop.extras import Stub
 from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
@@ -26,10 +25,12 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     doubles,
     function,
+    ir,
     once,
     pointer,
 )
 from heavytop.multiword.codegen.recurrence import Coefficients, coefficients
+from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 
 
@@ -141,11 +142,8 @@ class Scaled:
 def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
     """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
     omega = system.angular_velocity(p, y[:6])
-    return all(_parallel(vector, omega) for vector in (y[3:6], y[6:]) if vector) and not any(system.field(p, y[:6]))
-
-
-def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
-    return all(a[i] * b[j] == a[j] * b[i] for i, j in ((0, 1), (1, 2), (2, 0)))
+    turning = any(any(cross(vector, omega)) for vector in (y[3:6], y[6:]) if vector)
+    return not turning and not any(system.field(p, y[:6]))
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
@@ -204,10 +202,21 @@ def variation(slopes: Doubles) -> Doubles:
     slopes: J_0, …, J_(T−1), shape (T, size, size).  The result has shape (T + 1, size, size).
     """
     orders, size, _ = slopes.shape
+    if isinstance(ir, Stub):
+        return _variation_by_numpy(slopes)
     room = _rooms.of(orders, size)
     room.given[:] = slopes.ravel()
     _machine(size).functions["variation"](*room.pointers, orders)
     return room.table[:, :, :size].copy()
+
+
+def _variation_by_numpy(slopes: Doubles) -> Doubles:
+    orders, size, _ = slopes.shape
+    powers = numpy.zeros((orders + 1, size, size))
+    powers[0] = numpy.eye(size)
+    for n in range(orders):
+        powers[n + 1] = numpy.einsum("mij,mjk->ik", slopes[: n + 1], powers[n::-1]) / (n + 1)
+    return powers
 
 
 class _Room:

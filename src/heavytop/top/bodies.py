@@ -10,7 +10,7 @@ from math import isqrt, lcm
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.precision import (
     Given,
     Vector,
@@ -376,10 +376,8 @@ def _texts(values: Vector) -> str:
 
 
 def _number(value: Given, what: str) -> Fraction:
-    try:
+    with prefixed(what):
         return exact(value)
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 def _about(about: object, centre: Vector) -> str:

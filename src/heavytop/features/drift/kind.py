@@ -29,7 +29,7 @@ NAME = "drift"
 
 
 class Extent(NamedTuple):
-    """What is measured of a run beside the usual, or not."""
+    """Measurements of a run beside the usual."""
 
     attitude: bool = False
     noise: bool = True
@@ -60,7 +60,7 @@ class DriftTable(PlanTable, tag=NAME):
     step: str = ""
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         runs = []
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")
@@ -100,8 +100,8 @@ class DriftKind(Kind):
         return (0.8 if task.options.noise else 0.1) + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
-        place reached with other flags.
+        """Measure one run.  Raises Contradiction where two proofs of the motion exclude each other, InputError for
+        a place reached with other flags.
         """
         if task.options.attitude and task.integrator.carries_attitude:
             return _with_attitude(task)
@@ -159,7 +159,7 @@ def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
 
 
 def _with_attitude(task: Task) -> Row:
-    """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
+    """The row of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
     return _row(task, *run_with_attitude(task))
 
 

@@ -17,6 +17,7 @@ import numpy
 
 from heavytop.cases import Case
 from heavytop.errors import InputError
+from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import DATA, command
 from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
@@ -59,6 +60,7 @@ def worse_motions(old: Row, new: Row, files: tuple[Path, Path], limits: LossLimi
 
 def _records(file: Path, row: Row) -> dict[str, Any]:
     """Columns of the motions of one row, by their index."""
+    require_extra("parquet")
     import pyarrow
     from pyarrow.parquet import read_table
 
@@ -101,7 +103,7 @@ def _motion(row: Row, before: dict[str, Any], after: dict[str, Any], place: int)
 
 
 def _command(row: Row, columns: dict[str, Any], place: int, outcome: str) -> str:
-    """Of the rounded top and start: the same motion in double, one within a rounding of double in other formats."""
+    """The command of the rounded top and start: the motion itself in double, within a rounding in other formats."""
     numbers = [Fraction(repr(float(columns[name][place]))) for name in DATA]
     inertia, moment, rotor, omega, gamma = (numbers[k : k + 3] for k in range(0, 15, 3))
     top = HeavyTop(inertia, 1, moment, rotor if any(rotor) else None)

@@ -103,7 +103,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
     attitude: bool = False
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         (horizon,) = positive([self.horizon], "horizon")
         times, end = uniform(horizon, self.samples), time_text(horizon)
         points = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
@@ -271,7 +271,7 @@ def _missing() -> Metric:
 
 
 def _setting(subject: Subject) -> tuple[str, Fraction] | None:
-    """What the integrator is asked for; None for the finest that it offers."""
+    """The setting of the integrator; None for the finest that it offers."""
     if FINEST in (subject.tolerance, subject.step):
         return None
     return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))

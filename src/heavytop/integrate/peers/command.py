@@ -14,7 +14,7 @@ import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import pairwise
@@ -284,7 +284,7 @@ class ProgramRequest:
             "moment": self._numbers(p.moment),
             "rotor": self._numbers(rotor),
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
-            "quaternion": self._quaternion() if self.quaternion else [],
+            "quaternion": self._rounded(quaternion(self.problem)) if self.quaternion else [],
             "precision": [precision.name],
             "setting": self._numbers([] if self.control is None else [self.control]),
             "times": [str(len(self.times)), *self.written.texts],
@@ -297,9 +297,6 @@ class ProgramRequest:
         scalars: dict[str, Sequence[Fraction]] = {"mass": [body.mass], "gravity": [body.gravity]}
         about_centre = {"centre": body.centre, "inertia": six_of(body.central)}
         return scalars | about_centre | {"attitude": quaternion(self.problem)}
-
-    def _quaternion(self) -> list[str]:
-        return self._rounded(quaternion(self.problem))
 
     def _rounded(self, values: Sequence[Fraction]) -> list[str]:
         return self._numbers([rounded(value, self.problem.precision) for value in values])
@@ -455,20 +452,28 @@ class Reply:
 
 
 class _Greeting:
-    """What takes the first line of a program."""
+    """Takes the first line of a program: ``ready``, its name and version."""
 
-    due = 0
+    due, text = 0, ""
 
-    def __init__(self, take: Callable[[bytes], bool]) -> None:
-        self.take = take
+    def __init__(self, name: str) -> None:
+        self.name = name
 
-    def nap(self, seconds: float) -> float:
+    def nap(self, _seconds: float) -> float:
         """None is needed."""
-        return 0.0 * seconds
+        return 0.0
 
-    def take_states(self, lines: list[bytes]) -> int:
+    def take_states(self, _lines: list[bytes]) -> int:
         """None."""
         return 0
+
+    def take(self, line: bytes) -> bool:
+        """Raises PeerFailed for another line."""
+        text = line.decode("utf-8", "replace")
+        if text.split()[:1] != ["ready"]:
+            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
+        self.text = said(text.partition("ready")[2])
+        return True
 
 
 class Session:
@@ -505,19 +510,13 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
         self._poll.register(self._err, select.POLLIN)
-        self.greeting = ""
+        greeting = _Greeting(self.name)
         try:
-            self._exchange(f"{HELLO}\n".encode(), _Greeting(self._greeted), "ready")
+            self._exchange(f"{HELLO}\n".encode(), greeting, "ready")
         except BaseException:
             self.close()
             raise
-
-    def _greeted(self, line: bytes) -> bool:
-        text = line.decode("utf-8", "replace")
-        if text.split()[:1] != ["ready"]:
-            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
-        self.greeting = said(text.partition("ready")[2])
-        return True
+        self.greeting = greeting.text
 
     def empty_request(self, problem: Problem) -> float:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""

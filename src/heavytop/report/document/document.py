@@ -1,4 +1,4 @@
-"""What a report says of its rows: blocks with typed cells.  A kind of measurement gives one list of them, and the
+"""The document of a report: blocks with typed cells.  A kind of measurement gives one list of them, and the
 terminal, the page, JSON and Markdown show it.
 """
 

@@ -131,7 +131,7 @@ def read(path: Path, kinds: Kinds) -> Report:
 
 
 def read_brief(path: Path, kinds: Kinds) -> Brief:
-    """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
+    """The report at ``path`` for a comparison; errors in a row are found as the rows are gone through."""
     return Brief(*_read(path, _Parts), kinds)
 
 
@@ -223,7 +223,7 @@ def environment() -> dict[str, Any]:
         "simd_width_double": int(heyoka.recommended_simd_size()),
         "extended_bits": int(numpy.finfo(numpy.longdouble).nmant) + 1,
         "formats": {name: reason or "available" for name, reason in available().items()},
-        "code_cache": "none: every integrator was compiled in this run",
+        "code_cache": "heyoka: none; multiword: by checksum, then a step that is known",
     }
 
 

@@ -141,7 +141,7 @@ class Field:
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """symbol = bound + excess."""
         floor = self.enter(bound)
-        index = _index(self.enter(symbol))
+        index = used(self.enter(symbol).numerator).pop()
         if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
             excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
             self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
@@ -342,11 +342,6 @@ class Field:
             (square,) = self.tower.generators[index].arguments
             self._expressions[index] = sympy.sqrt(self.expression(square))
         return self._expressions[index]
-
-
-def _index(value: Quotient) -> int:
-    """The generator that a symbol is."""
-    return used(value.numerator).pop()
 
 
 def _placeholder(index: int) -> sympy.Symbol:

@@ -188,10 +188,9 @@ class Transcendental:
         if still and len(still) < len(terms):
             moving = [term for term in terms if not self._field.is_constant(term)]
             return [self._tower.sum(still), self._tower.sum(moving)]
-        return terms if all(self._is_multiple(term) for term in terms) else [argument]
-
-    def _is_multiple(self, argument: Quotient) -> bool:
-        return any(self._tower.ratio(argument, base) is not None for kind, base, _ in self._bases if kind == "exp")
+        bases = [base for kind, base, _ in self._bases if kind == "exp"]
+        multiples = all(any(self._tower.ratio(term, base) is not None for base in bases) for term in terms)
+        return terms if multiples else [argument]
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
@@ -289,14 +288,12 @@ class Transcendental:
 
     def _circle_of_number(self, value: Quotient) -> Circle | None:
         """(sin, cos) of a multiple of π/12, in square roots."""
-        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if self._is_number(value) else None
+        is_number = used(value.numerator) <= self._tower.signs.numbers.keys()
+        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if is_number else None
         if turn is None or 12 % turn.denominator:
             return None
         angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
         return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
-
-    def _is_number(self, value: Quotient) -> bool:
-        return used(value.numerator) <= self._tower.signs.numbers.keys()
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
         """((sin, cos) of an inverse function, n) where the value is n times it."""
