@@ -13,7 +13,7 @@ from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
-from heavytop.features.events.dense import dense
+from heavytop.integrate.dense import dense
 from heavytop.features.events.functions import (
     PROVEN,
     EventFunction,
