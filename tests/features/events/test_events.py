@@ -14,9 +14,9 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.integrate.dense import Dense, Piece
 from heavytop.features.events.functions import event_function
 from heavytop.features.events.located import locate
+from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
 
 TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
