@@ -23,6 +23,7 @@ NAMES = (
     "events",
     "derivatives",
     "body",
+    "limits",
 )
 """In the order of the summary of a run."""
 FEATURES: tuple[Feature, ...] = tuple(import_module(f"{__name__}.{name}").FEATURE for name in NAMES)
