@@ -102,8 +102,9 @@ def write_claims() -> None:
     """The part of the page of audited claims that is made from the library."""
     import msgspec
 
-    from heavytop.features.claims.claim_library import Library, document, is_current
-    from heavytop.features.claims.page import page
+    sys.path.insert(0, str(ROOT / "tools"))
+    from claim_library import Library, document, is_current
+    from claims_page import page
 
     kept = ROOT / "results" / "claims" / "library.json"
     found = msgspec.json.decode(kept.read_bytes(), type=Library) if kept.exists() else None

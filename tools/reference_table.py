@@ -23,8 +23,8 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.solution import ExactSolution
 from heavytop.files import replace
-from heavytop.measure.certify import Certificate, certify, enclosure_of
-from heavytop.measure.reference import Ball, ball_texts
+from heavytop.measure.certify import Certificate, bits_of, certify, enclosure_of
+from heavytop.measure.reference import Ball, known_texts
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -153,7 +153,7 @@ def motion(case: TableCase, digits: int) -> CertifiedMotion:
     entries = [
         CertifiedState(
             str(time),
-            ball_texts(solution.state, solution.method, time, digits),
+            known_texts(solution.state(time, bits_of(digits)), solution.method, time, digits),
             certify(solution, time, digits, enclosure=enclosure),
         )
         for time in (*times, *case.beyond)

@@ -90,7 +90,7 @@ def added(feature: Feature) -> set[str]:
         Path(str(feature.load(module).__file__)).read_text("utf-8") for module in (*feature.commands, "__init__")
     )
     commands = re.findall(r"^@command\n(?:@\w+\n)*def (\w+)", text, re.M)
-    return kinds | {*commands, *(name for names in feature.python.values() for name in names)}
+    return kinds | {*feature.plans, *commands, *(name for names in feature.python.values() for name in names)}
 
 
 def delete(copy: Path, name: str, feature: Feature) -> None:

@@ -1,6 +1,8 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 
 
@@ -71,6 +73,15 @@ class ImpossibleBody(UserWarning):
 
 class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
+
+
+@contextmanager
+def prefixed(what: str) -> Iterator[None]:
+    """Says in the cause of an InputError what was read."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 class NotInClass(InputError):

@@ -16,6 +16,8 @@ class Feature:
     commands: modules that add commands to the command line when they are imported.
     python: the names that :mod:`heavytop` has from it, by their modules.
     motion: options of `propagate` and `reference`, a class of :class:`heavytop.cli.motions.MotionOptions`.
+    plans: built-in plans, each a file NAME.toml of the package.
+    starters: a folder of the package, with adapters that `heavytop new --engine` copies.
     explain: a function of a case, its run and the largest error of that, which says what explains the error.
     """
 
@@ -24,6 +26,8 @@ class Feature:
     commands: tuple[str, ...] = ()
     python: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     motion: str = ""
+    plans: tuple[str, ...] = ()
+    starters: str = ""
     explain: str = ""
 
     def load(self, name: str) -> Any:

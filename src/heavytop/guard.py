@@ -23,6 +23,11 @@ _ROUNDS = 20
 """How often what a process may just have started is looked for."""
 
 
+def processors() -> int:
+    """How many processors this process may use, where the platform tells; else how many there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def how_it_ended(code: int) -> str:
     """``by SIGSEGV`` or ``with exit code 1``, of the exit code that Python gives of a process."""
     if code >= 0:

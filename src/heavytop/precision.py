@@ -229,6 +229,12 @@ def six_digits(value: Fraction) -> str:
     return f"{float(decimal_text(value, 6)):.6g}"
 
 
+def plain_decimal(value: Fraction, digits: int) -> str:
+    """A decimal of at most so many digits, without trailing zeros."""
+    text = decimal_text(value, digits)
+    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
+
+
 def time_text(time: Fraction) -> str:
     """A time in reports: exact where 20 digits suffice, else 20 digits."""
     text = decimal_text(time, 20)
@@ -476,7 +482,7 @@ def cache_last_call(function: Callable[..., Found]) -> Callable[..., Found]:
     def look_up(*arguments: Any) -> Found:
         nonlocal kept
         before = kept
-        if before is not None and len(before[0]) == len(arguments) and _are_same(before[0], arguments):
+        if before is not None and len(before[0]) == len(arguments) and all(map(is_, before[0], arguments)):
             found: Found = before[1]
             return found
         found = function(*arguments)
@@ -484,10 +490,6 @@ def cache_last_call(function: Callable[..., Found]) -> Callable[..., Found]:
         return found
 
     return look_up
-
-
-def _are_same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    return all(map(is_, one, other))
 
 
 # Vectors of three exact numbers, and their products over any ring.

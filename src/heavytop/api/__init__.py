@@ -1,1 +1,1 @@
-"""What ``import heavytop`` offers: thin functions that check what they are given and join the other rooms."""
+"""The functions of ``import heavytop``: thin ones that check what they are given and join the other rooms."""

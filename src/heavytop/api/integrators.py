@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Callable
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
+from heavytop.features import FEATURES
 from heavytop.files import replace
 from heavytop.harness.integrator_check import NOT_TRIED as NOT_TRIED
 from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
+from heavytop.top.bodies import Body
 from heavytop.version import commit
 
 
@@ -37,7 +43,7 @@ _WORKFLOW = ".github/workflows/heavytop.yml"
 
 
 def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
-    """What an integrator answers to every request of the contract, odd ones too.
+    """The answers of an integrator to every request of the contract, odd ones too.
 
     Arguments:
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
@@ -51,30 +57,79 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
     return check(named(integrator))
 
 
-def new_integrator(folder: Path, language: str) -> list[str]:
+def new_integrator(folder: Path, language: str, engine: str = "") -> list[str]:
     """Write a program that integrates, with its gate, into a new folder; returns the names of the files.
 
-    Raises InputError for an unknown language, a folder that holds anything and one that cannot be written.
+    engine: in the place of a program the adapter of that engine of rigid bodies.
+    Raises InputError for an unknown language or engine, a folder that holds anything and one that cannot be written.
     """
     if language not in LANGUAGES:
         raise InputError(f"There is no program in {quoted(language)}.", f"Use {', '.join(LANGUAGES)}.")
+    if engine and engine not in (known := engines()):
+        raise InputError(f"There is no adapter of {quoted(engine)}.", f"Use {', '.join(known)}.")
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} already holds other content.", "Give a new folder.")
-        about = LANGUAGES[language]
-        files = _texts("common") | _texts(language)
-        files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
-        words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-        words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
-        for name in ("mine.toml", "README.md", _WORKFLOW):
-            for word, text in words.items():
-                files[name] = files[name].replace(word, text)
+        files = _adapter(engine) if engine else _program(LANGUAGES[language], language)
         for name, text in sorted(files.items()):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             replace(folder / name, text.encode())
     except OSError as error:
         raise InputError(f"{folder} cannot be written: {error.strerror}.", "Give a folder that can be.") from None
     return sorted(files)
+
+
+def _program(about: Language, language: str) -> dict[str, str]:
+    files = _texts("common") | _texts(language)
+    files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
+    words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
+    words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
+    for name in ("mine.toml", "README.md", _WORKFLOW):
+        for word, text in words.items():
+            files[name] = files[name].replace(word, text)
+    return files
+
+
+# Engines of rigid bodies, as features have adapters of them: NAME.toml, NAME_top.py, and what these share.
+
+
+def engines() -> list[str]:
+    """The names of `heavytop new --engine`."""
+    return sorted(path.name.removesuffix(".toml") for path in _adapters() if path.name.endswith(".toml"))
+
+
+def _adapters() -> list[Traversable]:
+    folders = (resources.files(each.package) / each.starters for each in FEATURES if each.starters)
+    return [path for folder in folders for path in folder.iterdir() if path.is_file()]
+
+
+def _adapter(engine: str) -> dict[str, str]:
+    """The files of an engine: the gate measures each of its integrators."""
+    own = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
+    texts = {path.name: path.read_text("utf-8") for path in _adapters()}
+    files = {name: texts[source] for name, source in own.items()}
+    tables = tomllib.loads(files["engine.toml"])["integrator"]
+    line = '    {{ integrator = "{name}", {setting}s = {points} }},'
+    ladders = (line.format(**each, points=json.dumps(_POINTS[each["setting"]])) for each in tables)
+    runs = "\n".join(_DRIFT.format(name=each["name"]) for each in tables)
+    words = {"ENGINE": engine, "LADDERS": "\n".join(ladders), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
+    words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
+    for name in ("gate.toml", "README.md"):
+        files[name] = texts[f"{name}.txt"]
+        for word, text in words.items():
+            files[name] = files[name].replace(word, text)
+    return files
+
+
+_POINTS = {"step": ["1/50", "1/100", "1/200", "1/400"], "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"]}
+_DRIFT = """
+[[measure]]
+kind = "drift"
+cases = ["lagrange"]
+integrator = "{name}"
+attitude = true
+noise = false
+runs = [{{ precision = "double", horizon = "10", samples = 50 }}]"""
 
 
 def _texts(part: str) -> dict[str, str]:
@@ -101,10 +156,8 @@ def listing() -> dict[str, Any]:
         for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
     }
     return {
-        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
-        "bodies": [
-            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
-        ],
+        "cases": [_listed(case) for case in CASES.values()],
+        "bodies": [_listed(case) for case in named_bodies().values()],
         "plans": list(BUILT_IN),
         "systems": [system.name for system in SYSTEMS],
         "formats": {
@@ -114,6 +167,11 @@ def listing() -> dict[str, Any]:
         "integrators": integrators,
         "capabilities": {name: each.capabilities() for name, each in known.items()},
     }
+
+
+def _listed(case: Case) -> dict[str, Any]:
+    about = {"name": case.name, "system": case.system.name, "about": case.about}
+    return about | {"realisable": Body.realising(case.top) is not None}
 
 
 def case_document(name: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
@@ -211,7 +211,7 @@ def motion(
     reached: Callable[[Fraction], None] | None = None,
     **options: Unpack[RunOptions],
 ) -> Motion:
-    """What `heavytop propagate` shows: a computed motion with the drift of every first integral that holds.
+    """Compute a motion as `heavytop propagate` shows it, with the drift of every first integral that holds.
 
     Arguments:
         top, start, times, precision, integrator, system, options: as in :func:`propagate`.
@@ -346,11 +346,9 @@ def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Prec
         raise InputError(f"There are {len(tops)} tops and {len(starts)} starts.", remedy)
     setups = []
     for index in range(size):
-        try:
+        with prefixed(f"Motion {index}"):
             body, start = arguments.motion(tops[index % len(tops)], starts[index % len(starts)], form)
             setups.append(Setup.of(body, start, form, system))
-        except InputError as error:
-            raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
     return setups
 
 

@@ -35,7 +35,7 @@ from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
 from heavytop.report.document.svg import COLOURS, decades, new_figure
-from heavytop.top.equations import NAMES, component
+from heavytop.top.equations import NAMES, Parameters, component
 from heavytop.top.heavy_top import HeavyTop
 
 if TYPE_CHECKING:
@@ -119,29 +119,27 @@ def polhode(
     """
     omega = principal(run, samples(run).omega)
     drawn = _solid(axes)
-    known = isinstance(run, Trajectory) or top is not None
-    if known:
-        p = parameters_of(run, top)
-        if not any(p.moment) and not any(p.rotors):
-            inertia = np.array([float(value) for value in p.inertia])
-            radii = np.sqrt((omega[0] ** 2 * inertia).sum() / inertia)
-            _ellipsoid(drawn, radii)
-            _visible_path(drawn, omega, colour, label, 1 / radii**2)
-            _equal(drawn, radii.max())
-            drawn.set(**_omega_labels())
-            drawn.set_title("polhode on the energy ellipsoid", fontsize="medium")
-            return drawn
-    drawn.plot(*omega.T, color=colour, lw=_WIDTH, label=label)
-    drawn.plot(*omega[:1].T, "o", color=colour, ms=4)
-    low, high = omega.min(axis=0), omega.max(axis=0)
-    _equal(drawn, 0.55 * (high - low).max() or 1.0, (low + high) / 2)
-    drawn.set(**_omega_labels())
-    drawn.set_title("Ω in the body", fontsize="medium")
+    free = _free(run, top)
+    if free is not None:
+        inertia = np.array([float(value) for value in free.inertia])
+        radii = np.sqrt((omega[0] ** 2 * inertia).sum() / inertia)
+        _ellipsoid(drawn, radii)
+        _visible_path(drawn, omega, colour, label, 1 / radii**2)
+        _equal(drawn, radii.max())
+    else:
+        drawn.plot(*omega.T, color=colour, lw=_WIDTH, label=label)
+        drawn.plot(*omega[:1].T, "o", color=colour, ms=4)
+        low, high = omega.min(axis=0), omega.max(axis=0)
+        _equal(drawn, 0.55 * (high - low).max() or 1.0, (low + high) / 2)
+    drawn.set(**{f"{axis}label": f"{name} ({_RATE})" for axis, name in zip("xyz", NAMES, strict=False)})
+    drawn.set_title("Ω in the body" if free is None else "polhode on the energy ellipsoid", fontsize="medium")
     return drawn
 
 
-def _omega_labels() -> dict[str, str]:
-    return {f"{axis}label": f"{name} ({_RATE})" for axis, name in zip("xyz", NAMES, strict=False)}
+def _free(run: Motion, top: HeavyTop | None) -> Parameters | None:
+    """The parameters of a free body; None of one with weight or rotor, and where they are not known."""
+    p = parameters_of(run, top) if isinstance(run, Trajectory) or top is not None else None
+    return None if p is None or any(p.moment) or any(p.rotors) else p
 
 
 def herpolhode(
@@ -167,11 +165,9 @@ def herpolhode(
     found = samples(run)
     rows = found.rows()
     omega = np.einsum("nij,nj->ni", rows, found.omega)
-    p = parameters_of(run, top) if isinstance(run, Trajectory) or top is not None else None
-    free = p is not None and not any(p.moment) and not any(p.rotors)
-    across = np.eye(3)[:2]
-    if p is not None and free:
-        own = principal(run, found.omega[:1])[0] * np.array([float(value) for value in p.inertia])
+    free, across = _free(run, top), np.eye(3)[:2]
+    if free is not None:
+        own = principal(run, found.omega[:1])[0] * np.array([float(value) for value in free.inertia])
         turn = axes_of(run)
         momentum = rows[0] @ (own if turn is None else turn @ own)
         if (size := np.linalg.norm(momentum)) > 0:
@@ -280,7 +276,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
     samples(run)
     places = every(len(run.states))
     drawn, times = _flat(axes), np.array([float(exact(run.times[place])) for place in places])
-    curves = sample_drifts(run.problem, exact_states(run, places))
+    curves = sample_drifts(run.problem, [exact(run.times[place]) for place in places], exact_states(run, places))
     _logarithmic(drawn, times, {name.replace("_", " "): logs for name, logs in curves.items()})
     drawn.set_ylabel("|I(t) − I(0)|")
     drawn.set_title(f"drift in {run.problem.precision.name}, {run.integrator}", fontsize="medium")
@@ -304,7 +300,7 @@ def digits(
     """
     problem, times, states, truth = compared(run, known)
     most = problem.precision.bits * np.log10(2)
-    logs = sample_errors(problem, states, truth)["relative"]
+    logs = sample_errors(problem, times, states, truth)["relative"]
     right = [most if log is None else float(np.clip(-log, 0, most)) for log in logs]
     drawn, instants = _flat(axes), np.abs(np.array([float(time) for time in times]))
     drawn.plot(instants, right, color=colour, lw=_WIDTH, label=label)
@@ -327,7 +323,7 @@ def error(run: Trajectory, known: Motion, axes: Axes | None = None) -> Axes:
         InputError: where the times differ, and as :func:`sphere`.
     """
     problem, times, states, truth = compared(run, known)
-    found = sample_errors(problem, states, truth)
+    found = sample_errors(problem, times, states, truth)
     drawn = _flat(axes)
     _logarithmic(drawn, np.array([float(time) for time in times]), {name: found[name] for name in ("along", "across")})
     drawn.set_ylabel("error along and across the flow")

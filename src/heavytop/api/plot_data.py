@@ -1,4 +1,4 @@
-"""What a picture needs of a motion: times, states and attitude as arrays, checked."""
+"""Motions as pictures need them: times, states and attitude as arrays, checked."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Crossings(Protocol):
 
 @runtime_checkable
 class PoincareSection(Protocol):
-    """Those of several motions: :func:`heavytop.poincare` returns such."""
+    """Crossings of several motions: :func:`heavytop.poincare` returns such."""
 
     @property
     def events(self) -> Sequence[Crossings]: ...
@@ -161,7 +161,7 @@ def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, N
 
 
 def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, Samples, NDArray[np.float64]]:
-    """What is followed, the samples, and its path on the unit sphere, (n, 3), third component upwards.
+    """The name of the axis, the samples, and its path on the unit sphere, (n, 3), third component upwards.
 
     "vertical" is γ, the vertical in body axes.
     """

@@ -72,7 +72,7 @@ class Report(Tabular, records.Report, frozen=True):
         return exports.to_json(self, KINDS)
 
     def to_markdown(self) -> str:
-        """What `show --markdown` writes."""
+        """The text of `show --markdown`."""
         return exports.to_markdown(self, KINDS)
 
     def _table(self) -> TitledTable:
@@ -107,11 +107,11 @@ class Comparison(Tabular, comparing.Differences):
         return comparison_page(old, new, self, KINDS)
 
     def to_junit(self) -> str:
-        """What `compare --junit` writes: a test case a metric."""
+        """The document of `compare --junit`: a test case a metric."""
         return exports.comparison_junit(self)
 
     def to_markdown(self, page: PathLike | None = None) -> str:
-        """What `compare --markdown` writes: the findings, then a line for each row that changed.
+        """The text of `compare --markdown`: the findings, then a line for each row that changed.
 
         page: the file of :meth:`to_html`, which is named at the end.
         """
@@ -267,7 +267,7 @@ def compared(
     list_same: bool = True,
     read: Callable[[], None] = lambda: None,
 ) -> Comparison:
-    """The same.  list_same: False to count what plainly stayed the same.  read: called after each report is read."""
+    """As :func:`compare`.  list_same: False to count what plainly stayed the same.  read: called after each report."""
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
     old, new = _report(baseline, "baseline", read), _report(candidate, "candidate", read)
@@ -310,7 +310,7 @@ def history(
 
 
 def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, read: Callable[[], None]) -> History:
-    """The same; ``read`` is called after each report."""
+    """As :func:`history`; ``read`` is called after each report."""
     given = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
     if len(given) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")

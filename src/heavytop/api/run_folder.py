@@ -128,7 +128,7 @@ class PlannedRun:
         return lambda: held
 
     def _gathered(self, kind: str, rows: Checkpoint, places: list[int]) -> list[Row]:
-        """What the rows in these places come to, of a kind that gathers them."""
+        """The rows of the report made of those in these places, of a kind that gathers them."""
         tasks = [self.tasks[place] for place in places]
         return KINDS[kind].gather(lambda: zip(tasks, rows.rows(places), strict=True), self.directory)
 

@@ -34,7 +34,7 @@ _SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What the comparison said of one fault.
+    """The verdict of the comparison on one fault.
 
     caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
     shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where one was
@@ -66,7 +66,7 @@ class Trial:
 
 
 def trial(name: str, comparison: Differences) -> Trial:
-    """What came of the control, or of the fault of that name."""
+    """The trial of the control, or of the fault of that name."""
     alarms: dict[str, list[tuple[float, str]]] = {}
     quiet: list[tuple[bool, float, str]] = []
     for finding in comparison.findings:
@@ -113,7 +113,7 @@ def tasks(plan: str = "selftest") -> list[Task]:
 
 
 def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]) -> list[Trial]:
-    """What comes of :func:`tasks`: one trial for the control and one for each fault."""
+    """The trials that :func:`tasks` make: one for the control and one for each fault."""
     found: dict[int, Row] = {}
     for index, row in rows(tasks, KINDS, workers, None):
         found[index] = row

@@ -1,4 +1,4 @@
-"""What the commands share: the application, printing, exact numbers in options."""
+"""The parts that commands share: the application, printing, exact numbers in options."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _common(
         typer.Option(callback=_completion, is_eager=True, metavar="SHELL", help="Print completion: bash, zsh or fish."),
     ] = None,
 ) -> None:
-    """What stands before a command."""
+    """Options before a command."""
 
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output and nothing else there.")]
@@ -76,7 +76,7 @@ def plans(begun: str) -> list[str]:
 
 
 def cases(begun: str) -> list[str]:
-    """The same of cases."""
+    """Cases whose names begin so, for completion."""
     from heavytop.cases import CASES
 
     return [name for name in CASES if name.startswith(begun)]

@@ -56,17 +56,20 @@ def check_integrator(
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
     language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
+    engine: Annotated[str, typer.Option(help="An adapter of that engine: mujoco, drake, ...; '?' lists all.")] = "",
 ) -> int:
     """Begin an integrator and its gate in a new folder.
 
-    It holds a program that integrates the heavy top by RK4, in the language asked for.  It works at once: mine.toml
-    describes the program, gate.toml is the plan that measures it.
+    It holds a program that integrates the heavy top by RK4, in the language asked for, or the adapter of an engine of
+    rigid bodies.  It works at once: mine.toml describes the program (engine.toml), gate.toml is the plan that measures
+    it.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 
-    files = new_integrator(folder, language)
+    files = new_integrator(folder, language, engine)
     print(fill(f"{folder}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
-    print(f"Next: cd {folder}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml")
+    first = "cat README.md" if engine else f"{LANGUAGES[language].build}; heavytop check-integrator mine.toml"
+    print(f"Next: cd {folder}; {first}")
     return ExitCode.GOOD
 
 
@@ -99,9 +102,9 @@ def list_(
         print_json(listed)
         return ExitCode.GOOD
     print("Cases (--case NAME shows the data)")
-    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
+    _lines({each["name"]: _about(each) for each in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
-    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
+    _lines({each["name"]: _about(each) for each in listed["bodies"]}, indent=15)
     plans = f"{', '.join(listed['plans'])}, or a TOML file"
     print("Plans")
     print(fill(plans, 80, initial_indent="  ", subsequent_indent="  "))
@@ -111,6 +114,10 @@ def list_(
     print("Integrators")
     _lines(listed["integrators"])
     return ExitCode.GOOD
+
+
+def _about(case: dict[str, Any]) -> str:
+    return f"{case['system']:14} {case['about']}" + ("" if case["realisable"] else " (no rigid body has these moments)")
 
 
 def _lines(notes: dict[str, str], indent: int = 0) -> None:

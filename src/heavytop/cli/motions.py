@@ -182,10 +182,10 @@ class MotionOptions(Protocol):
     _fields: ClassVar[tuple[str, ...]]
 
     def require(self) -> str:
-        """What is measured, said while it is; "" for nothing.  Raises InputError for what cannot be read."""
+        """The measurement in words, said while it goes on; "" for none.  Raises InputError for what cannot be read."""
 
     def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> Any:
-        """What has ``to_json()``, entries of the document of the motion, and ``text()``, shown behind it."""
+        """A measurement with ``to_json()``, entries of the document of the motion, and ``text()``, shown behind it."""
 
 
 _FURTHER: list[Any] = [feature.load(feature.motion) for feature in FEATURES if feature.motion]
@@ -195,7 +195,7 @@ _DATA = _SHARED[: _SHARED.index("case")]
 
 
 class _Asked:
-    """What is asked for, read before anything is computed; raises InputError for what cannot be read."""
+    """A request, read before anything is computed; raises InputError for what cannot be read."""
 
     def __init__(self, times: str, options: _Options, further: list[MotionOptions]) -> None:
         require_one_output(options.csv, options.latex, options.json)
@@ -206,7 +206,7 @@ class _Asked:
         self.further = [(each, what) for each in further if (what := each.require())]
 
     def beside(self, expected: float, **settings: Any) -> list[Any]:
-        """What features measure of the motion up to the time farthest from 0.
+        """The measurements of features on the motion up to the time farthest from 0.
 
         expected: seconds.  settings: of :meth:`MotionOptions.measure`.
         """
@@ -379,7 +379,7 @@ def _warn_of_cost(precision: str, integrator: str) -> None:
 
 
 def _part_of(times: list[str], reach: Callable[[float], None]) -> Callable[[Fraction], None]:
-    """What to call with the times reached on the way to the last of ``times``, for a bar that hears of parts."""
+    """A function of the times reached on the way to the last of ``times``, for a bar that hears of parts."""
 
     def reached(time: Fraction) -> None:
         end = farthest(times)

@@ -213,7 +213,7 @@ def told_when_slow(command: str) -> Iterator[None]:
 
 
 class Bar:
-    """What is done, of how many, per cent, time left: a line on a terminal, which is drawn again and again.
+    """A line on a terminal that is drawn again and again: parts done, of how many, per cent, time left.
 
     count: how many parts there are, named by ``unit``; 0 where they are not counted.  label: what is being done.
     """
@@ -248,7 +248,7 @@ class Bar:
         return ", ".join(filter(None, (counted, percent_text, time_left)))
 
     def state(self) -> str:
-        """What is being done and how far it is, in a line."""
+        """The work under way and how far it is, in a line."""
         if self.look is not None:
             self.look()
         return ": ".join(filter(None, (self.label, self.said())))

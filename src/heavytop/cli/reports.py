@@ -197,7 +197,7 @@ def run(
     plan: Annotated[
         str,
         typer.Option(
-            help="smoke, default, growth, long, peers, gate, bodies, claims, selftest, or a TOML file.",
+            help="smoke, default, growth, long, peers, gate, bodies, claims, selftest, engines, or a TOML file.",
             autocompletion=plans,
         ),
     ] = "default",

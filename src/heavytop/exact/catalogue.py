@@ -56,15 +56,12 @@ class OnLevel(Validated):
         Validated.__post_init__(self)
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
         return self._named(Validated.state, time, bits)
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """See :meth:`Validated.attitude`."""
         return self._named(Validated.attitude, time, bits)
 
     def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """See :meth:`Validated.with_attitude`."""
         return self._named(Validated.with_attitude, time, bits)
 
     def _named(self, evaluate: Callable[[Validated, Fraction, int], list[arb]], time: Fraction, bits: int) -> list[arb]:

@@ -219,11 +219,9 @@ class Evaluated(ABC):
         return time
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
         return to_bits(lambda _working: self.evaluate(time), bits, self.own_time(time))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
         def evaluate(_working: int) -> list[arb]:
@@ -272,7 +270,6 @@ class WithAttitude(ClosedForm):
         """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`ClosedForm`."""
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
@@ -478,11 +475,9 @@ class Renamed:
         return [*omega, *permuted(values[3:6], self.axes)]
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
         return self._renamed(self.solution.state(time, bits))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(length):
             return self._renamed(self.solution.series(time, length, bits))
 

@@ -24,6 +24,7 @@ NAMES = (
     "derivatives",
     "body",
     "limits",
+    "engines",
 )
 """In the order of the summary of a run."""
 FEATURES: tuple[Feature, ...] = tuple(import_module(f"{__name__}.{name}").FEATURE for name in NAMES)

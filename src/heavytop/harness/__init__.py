@@ -1,1 +1,1 @@
-"""What is run."""
+"""Runs of plans."""

@@ -1,4 +1,4 @@
-"""What a run has on disk while it goes on, so that `run --resume` measures nothing twice.
+"""The files of a run while it goes on, so that `run --resume` measures nothing twice.
 
 DIR/rows.jsonl: a first line that names plan and program, then one line a row, each with its checksum.  A line that a
 kill cut short is measured again.  DIR/row-N.partial: the place of a long row in progress.  All is text; nothing is
@@ -53,13 +53,13 @@ class Saved:
         self._last = monotonic()
 
     def forget(self) -> None:
-        """What was saved before is of no use: nothing is loaded any more, and the next save replaces it."""
+        """Drop what was saved before: nothing is loaded any more, and the next save replaces it."""
         self.taken = False
         if self.path is not None:
             self.path.unlink(missing_ok=True)
 
     def load(self) -> dict[str, Any] | None:
-        """What was saved last by the same plan and program; None where nothing was.
+        """The content saved last by the same plan and program; None where there is none.
 
         Its checksum is right, but not that of a secret: anything may stand in it.
         """

@@ -89,47 +89,48 @@ def check(which: str | IntegratorSource) -> list[Checked]:
     Raises InputError for an unknown integrator.
     """
     registry.require(which)
+    process = None
     if isinstance(which, Command):
-        limit = min(which.seconds, _PATIENCE)
-        try:
-            return list(_Contract(msgspec.structs.replace(which, timeout=str(limit))).checks())
-        finally:
-            close_all()
-    process = GuardedProcess()
+        which = msgspec.structs.replace(which, timeout=str(min(which.seconds, _PATIENCE)))
+    else:
+        process = GuardedProcess()
     try:
-        return list(_in_child(process, which))
+        return list(_checks(which, process))
     finally:
-        process.end()
+        close_all() if process is None else process.end()
 
 
-def _in_child(process: GuardedProcess, which: str | IntegratorSource) -> Iterator[Checked]:
-    """Each part in the process; where one does not come back, what was found before it stands."""
+def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> Iterator[Checked]:
+    """Each part; where one of the first is violated, or one ends its process, no other is tried."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
-        seconds = _PATIENCE_OF.get(name, _PATIENCE)
-        ended = True
-        try:
-            future = process.submit(_part, which, place)
-            # an interrupt that comes from the child was raised by the integrator
-            error = future.exception(timeout=seconds)
-            if error is None:
-                found, ended = future.result(), False
-            elif isinstance(error, HeavyTopError | BrokenProcessPool):
-                raise error
-            else:
-                cause = ": ".join(filter(None, (type(error).__name__, said(error))))
-                found = Checked(name, "violated", f"It left its process by {cause}.")
-        except TimeoutError:
-            process.kill()
-            text = f"It does not answer within {seconds:g} s; its process was ended."
-            if name == _TOO_FAST:
-                text = f"{_HUGE_REQUEST}: {text}"
-            found = Checked(name, "note" if name == _TOO_FAST else "violated", text)
-        except BrokenProcessPool:
-            found = Checked(name, "violated", "It ended its whole process.")
+        found, ended = (_part(which, place), False) if process is None else _in_child(process, which, place, name)
         yield found
         if found.verdict == "violated" and (ended or place < _FIRST):
-            yield _NOTHING_ELSE
+            yield Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
             return
+
+
+def _in_child(process: GuardedProcess, which: str | IntegratorSource, place: int, name: str) -> tuple[Checked, bool]:
+    """That part in the process, and whether it has ended it."""
+    seconds = _PATIENCE_OF.get(name, _PATIENCE)
+    try:
+        future = process.submit(_part, which, place)
+        # an interrupt that comes from the child was raised by the integrator
+        error = future.exception(timeout=seconds)
+        if error is None:
+            return future.result(), False
+        if isinstance(error, HeavyTopError | BrokenProcessPool):
+            raise error
+        cause = ": ".join(filter(None, (type(error).__name__, said(error))))
+        return Checked(name, "violated", f"It left its process by {cause}."), True
+    except TimeoutError:
+        process.kill()
+        text = f"It does not answer within {seconds:g} s; its process was ended."
+        if name == _TOO_FAST:
+            return Checked(name, "note", f"{_HUGE_REQUEST}: {text}"), True
+        return Checked(name, "violated", text), True
+    except BrokenProcessPool:
+        return Checked(name, "violated", "It ended its whole process."), True
 
 
 def _part(which: str | IntegratorSource, place: int) -> Checked:
@@ -138,7 +139,6 @@ def _part(which: str | IntegratorSource, place: int) -> Checked:
     return _judged(*_Contract(which).parts()[place])
 
 
-_NOTHING_ELSE = Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
 _FIRST = 2
 """Parts that nothing works without."""
 _TOO_FAST = "huge"
@@ -148,11 +148,11 @@ _PATIENCE_OF = {_TOO_FAST: _HUGE_SECONDS}
 
 
 class _Violated(Exception):
-    """What is wrong, as a sentence."""
+    """A violation, as a sentence."""
 
 
 class _Note(Exception):
-    """What is worth saying and no violation."""
+    """A remark that is no violation."""
 
 
 class _Contract:
@@ -173,7 +173,7 @@ class _Contract:
 
     @cached_property
     def declared(self) -> Declared:
-        """What it declares; asked for where it runs, as that imports it."""
+        """Its declaration; asked for where it runs, as that imports it."""
         return ChosenIntegrator.of(self.which).declared
 
     @cached_property
@@ -181,16 +181,6 @@ class _Contract:
         """A vertical along a principal axis, e3 if it can be, at which its coordinates are not singular."""
         axes = [vector([sign * (k == i) for i in range(3)], "γ") for sign in (1, -1) for k in (2, 1, 0)]
         return next((axis for axis in axes if not self.declared.is_singular(axis)), axes[0])
-
-    def checks(self) -> Iterator[Checked]:
-        """Each part; where one of the first is violated by a program that does not start, no other is tried."""
-        for place, (name, part) in enumerate(self.parts()):
-            begin_row()
-            found = _judged(name, part)
-            yield found
-            if found.verdict == "violated" and place < _FIRST:
-                yield _NOTHING_ELSE
-                return
 
     def parts(self) -> list[tuple[str, Callable[[], str]]]:
         """The name of each part, and what tries it."""
@@ -410,8 +400,8 @@ class _Contract:
 
     def _unknown_lines(self) -> str:
         assert self.program is not None
-        quaternion = self.declared.attitude == "quaternion"
-        request = _Extended(self._problem(), [exact(Fraction(1))], self._default(), self.program.hex, quaternion)
+        own = self.program.request(self._problem(), [exact(Fraction(1))], self._default())
+        request = _Extended(own.problem, own.times, own.control, own.hex, own.quaternion, own.body)
         try:
             with session(self.program) as program:
                 reply = program.ask(request)

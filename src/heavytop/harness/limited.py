@@ -175,7 +175,7 @@ class _Worker:
         return "" if self._process is None else self._process.ending
 
     def awaited(self) -> list[Future[Any]]:
-        """What is to be waited for: the process, then its row."""
+        """The futures to wait for: the process, then its row."""
         return [future for _, future in [*self.rows][:1]] + ([] if self._hello is None else [self._hello])
 
     def greet(self) -> None:

@@ -12,6 +12,7 @@ from difflib import get_close_matches
 from fractions import Fraction
 from functools import reduce
 from importlib import resources
+from importlib.resources.abc import Traversable
 from itertools import accumulate
 from operator import or_
 from pathlib import Path
@@ -21,8 +22,9 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, quoted
+from heavytop.errors import InputError, invalid, prefixed, quoted
 from heavytop.exact.bodies import resolve
+from heavytop.features import FEATURES
 from heavytop.files import read_whole
 from heavytop.harness.rows import Kinds, PlanTable, Task
 from heavytop.harness.sweeps import Lazy, Sweep
@@ -41,7 +43,8 @@ from heavytop.top.heavy_top import HeavyTop
 _KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
-BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
+_OF_FEATURES = {plan: feature.package for feature in FEATURES for plan in feature.plans}
+BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest", *_OF_FEATURES)
 QUANTITIES = frozenset(
     (
         *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
@@ -118,7 +121,7 @@ def read(
     """
     plan, digest = load(name, kinds)
     try:
-        folder = Path() if name in BUILT_IN else Path(name).parent
+        folder = Path(str(_built_in(name))).parent if name in BUILT_IN else Path(name).parent
         plan, defined = _by_name(plan, definitions(plan, folder), folder)
         if integrator:
             integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
@@ -138,7 +141,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     Raises InputError with the place in the file for an unknown key or kind or an impossible value.
     """
     if name in BUILT_IN:
-        text = (resources.files("heavytop.harness") / "plans" / f"{name}.toml").read_text("utf-8")
+        text = _built_in(name).read_text("utf-8")
     elif Path(name).suffix == ".toml":
         try:
             text = read_whole(Path(name)).decode("utf-8")
@@ -156,6 +159,11 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         cause = f"The plan {name} is not valid: {invalid(error)}."
         raise InputError(cause, _KEYS) from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def _built_in(name: str) -> Traversable:
+    shared = resources.files("heavytop.harness") / "plans"
+    return (resources.files(_OF_FEATURES[name]) if name in _OF_FEATURES else shared) / f"{name}.toml"
 
 
 def document_of(text: str) -> dict[str, Any]:
@@ -345,15 +353,13 @@ def _own(plan: Plan) -> dict[str, Case]:
             raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
         if top.name in CASES or top.name in named_bodies():
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
-        try:
+        with prefixed(f"The plan's top {top.name!r}"):
             own[top.name] = top.case()
-        except InputError as error:
-            raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None
     return own
 
 
 def warnings(plan: Plan) -> list[str]:
-    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    """Warnings of data that no rigid body can have, though the equations do not mind, of the plan's own tops."""
     return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 
@@ -387,13 +393,11 @@ def _require_fit(task: Task) -> None:
     """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
     if task.case is None or not task.has_precision:
         return
-    try:
+    with prefixed(f"{task.label}"):
         precision = require(task.precision)
         Problem.of(task.case.top, task.case.start, precision, task.case.system)
         for time in task.times[:1] + task.times[-1:]:
             number(time, precision)
-    except InputError as error:
-        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
 def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[PlanTable, Sequence[Case] | None]]:
@@ -410,11 +414,11 @@ def _parts(table: PlanTable, swept: dict[str, Sequence[Case]]) -> list[tuple[Pla
 _MAX_SAMPLES = 1_000_000
 
 
-def log_spaced(count: int, per_decade: int = 8) -> list[int]:
-    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
+def log_spaced(count: int) -> list[int]:
+    """About eight integers a decade from 1 to ``count``, both included."""
     wanted = {count}
     i = 0
-    while (value := round(10 ** (i / per_decade))) < count:
+    while (value := round(10 ** (i / 8))) < count:
         wanted.add(value)
         i += 1
     return sorted(wanted)

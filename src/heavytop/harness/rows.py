@@ -24,16 +24,19 @@ from heavytop.errors import (
     PeerFailed,
     Unsupported,
 )
+from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
+from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.truth import seconds_a_step as words_seconds
-from heavytop.precision import Precision, decimal_text, exact, exact_text, parse, time_text
+from heavytop.measure.truth import truth
+from heavytop.precision import Precision, decimal_text, exact, exact_text, number, parse, time_text
 from heavytop.records import (
     CONTRADICTION,
     EXACT,
@@ -84,13 +87,13 @@ class Task:
     request: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
     def of(self, case: Case) -> Task:
-        """The same measurement of another case of the same system."""
+        """This measurement of another case of the same system."""
         key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)
         return replace(self, key=key, case=case)
 
     @property
     def title(self) -> str:
-        """What the row calls its case."""
+        """The name of the case in the row."""
         return self.key.case + self.suffix
 
     @property
@@ -105,8 +108,10 @@ class Task:
 
     @property
     def integrator(self) -> ChosenIntegrator:
-        """What computes the motion."""
-        return ChosenIntegrator(self.key.subject.name, source=self.source)
+        """The integrator that computes the motion."""
+        step = self.key.subject.step
+        control = ("step", exact(step)) if step not in ("", FINEST) else None
+        return ChosenIntegrator(self.key.subject.name, control, self.source)
 
     @property
     def is_third_party(self) -> bool:
@@ -141,6 +146,18 @@ class Task:
         """Seconds that multiword, or heyoka for all others, take for such a motion, roughly."""
         step = (words_seconds if self.key.subject.name == MULTIWORD else seconds_a_step)(self.precision.bits)
         return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
+
+
+def run_with_attitude(task: Task) -> tuple[Trajectory, AttitudeScorer]:
+    """The run of a task with ξ beside Ω and γ, and what measured it; begun anew where it was interrupted."""
+    case, precision = task.given, task.precision
+    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
+    xi = resolve(case.body or case.top, case.given_start or case.start).xi
+    problem = Problem.of(case.top, case.start, precision, case.system, xi)
+    known = truth(replace(problem, xi=None), times)
+    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
+    run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
+    return run, scorer
 
 
 def computed(name: str, **setting: Any) -> Subject:
@@ -304,7 +321,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
     """A table `[[measure]]` of a plan; unknown keys are errors."""
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError for an impossible value."""
+        """A task for each row; raises InputError for an impossible value."""
         raise NotImplementedError
 
     def swept(self, sweep: Sweep, cases: Sequence[Case]) -> Sequence[Case]:
@@ -312,7 +329,7 @@ class PlanTable(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         return cases
 
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
-        """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
+        """These measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
         return msgspec.structs.replace(self, integrator=name_of(which))
@@ -347,7 +364,7 @@ class MeasuredKind(Protocol):
         return 1.0 + task.run_seconds
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
-        """What all rows of the kind together come to; called where it :attr:`concludes`."""
+        """Further rows from all rows of the kind together; called where it :attr:`concludes`."""
         return []
 
     def gather(self, rows: Callable[[], Iterator[tuple[Task, Row]]], folder: Path) -> list[Row]:

@@ -14,7 +14,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case, require_possible
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.precision import exact, shown, vector
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system, system_of
 from heavytop.top.heavy_top import HeavyTop, State
@@ -91,11 +91,9 @@ class SweepGrid(Strict, tag="grid"):
 
         # the gyrostat asks for more than that each value be possible
         for index in _along_axes(shape) if self.system != GYROSTAT.name else range(size):
-            try:
+            with prefixed(f"The sweep's {label(index)}"):
                 for warning in require_possible(point(index)).top.warnings():
                     raise InputError(warning, "Each moment is at most the sum of the other two.")
-            except InputError as error:
-                raise InputError(f"The sweep's {label(index)}: {error.cause}", error.remedy) from None
         return Lazy(size, point)
 
     @property
@@ -110,15 +108,13 @@ class SweepGrid(Strict, tag="grid"):
         given = getattr(self, what)
         if given is None:  # no rotor
             return (None,)
-        try:
+        with prefixed(f"The sweep {self.name}"):
             if what == "weight":
                 return [exact(value) for value in given] if isinstance(given, list) else (exact(given),)
             if not given or all(isinstance(part, list) for part in given):
                 return [vector(value, what) for value in given]
             if all(isinstance(part, str) for part in given):
                 return (vector(given, what),)
-        except InputError as error:
-            raise InputError(f"The sweep {self.name}: {error.cause}", error.remedy) from None
         raise InputError(
             f"The sweep {self.name}: {what} mixes numbers and lists.", "Give three numbers, or lists of three."
         )

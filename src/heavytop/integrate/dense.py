@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -48,11 +48,13 @@ def dyadic(value: Any) -> Dyadic:
     return number.numerator, 1 - number.denominator.bit_length()
 
 
-def dyadics(values: NDArray[np.float64]) -> list[Dyadic]:
+def _of_row(rows: NDArray[np.float64], index: int) -> list[Dyadic]:
     """Numbers of a format as m 2^e each."""
     import numpy
 
-    if isinstance(values, numpy.ndarray) and values.dtype == numpy.float64:
+    values = rows[index]
+
+    if values.dtype == numpy.float64:
         mantissas, exponents = numpy.frexp(values)
         return list(
             zip(numpy.ldexp(mantissas, 53).astype(numpy.int64).tolist(), (exponents - 53).tolist(), strict=True)
@@ -208,7 +210,7 @@ class OfHeyoka(Dense):
                 self.steps += 1
                 rows = stepper.polynomial()
                 doubles = rows if problem.precision == DOUBLE else None
-                yield Piece(began, exact(engine.last_h), bits, _reader_of(rows), doubles=doubles)
+                yield Piece(began, exact(engine.last_h), bits, partial(_of_row, rows), doubles=doubles)
 
 
 class OfWords(Dense):
@@ -232,48 +234,17 @@ class OfWords(Dense):
             if status is not Status.OK:
                 self.outcome = OUTCOMES[status]
                 return
-            rows = _rows(run)
-            read = _reader(rows, scaled)
-            unit = sign / scaled.rate
-            yield _of_run(run, began * unit, (run.time - began) * unit, bits, read, scaled)
+            # double-double gives y_n, the others y_n h^n
+            powers, unit = isinstance(run, Floating), sign / scaled.rate
+            read = _reader(run, scaled, scaled.rate if powers else Fraction(1))
+            yield Piece(began * unit, (run.time - began) * unit, bits, read, powers)
 
 
-def _of_run(
-    run: ResumableRun,
-    began: Fraction,
-    length: Fraction,
-    bits: int,
-    read: Callable[[int], Sequence[Dyadic]],
-    scaled: Scaled,
-) -> Piece:
-    """A step in the units of the problem; double-double gives y_n, the others y_n h^n."""
-    if not isinstance(run, Floating):
-        return Piece(began, length, bits, read, powers=False)
-    m, e = dyadic(scaled.rate)
-
-    def in_units(index: int) -> list[Dyadic]:
-        # y_n counts rate^n, a power of two
-        shift = m.bit_length() - 1 + e
-        return [(k, f + n * shift) for n, (k, f) in enumerate(read(index))]
-
-    return Piece(began, length, bits, in_units)
-
-
-def _reader_of(rows: NDArray[np.float64]) -> Callable[[int], Sequence[Dyadic]]:
-    return lambda index: dyadics(rows[index])
-
-
-def _rows(run: ResumableRun) -> list[tuple[Fraction, ...]]:
+def _reader(run: ResumableRun, scaled: Scaled, rate: Fraction) -> Callable[[int], Sequence[Dyadic]]:
+    """Coefficients of the last step in the units of the problem; the nth counts rate^n."""
     give = run.derivatives if isinstance(run, Floating) else run.coefficients
-    return [give(n) for n in range(run.order + 1)]
-
-
-def _reader(rows: Sequence[tuple[Fraction, ...]], scaled: Scaled) -> Callable[[int], Sequence[Dyadic]]:
-    def read(index: int) -> list[Dyadic]:
-        size = scaled.sizes[index]
-        return [dyadic(row[index] * size) for row in rows]
-
-    return read
+    rows = [give(n) for n in range(run.order + 1)]
+    return lambda index: [dyadic(row[index] * scaled.sizes[index] * rate**n) for n, row in enumerate(rows)]
 
 
 _DENSE: dict[str, type[Dense]] = {

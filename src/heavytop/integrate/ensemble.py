@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -14,6 +13,7 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
+from heavytop.guard import processors
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.lanes import Lanes, Work
 from heavytop.integrate.heyoka.motions import integrate_to_samples
@@ -118,11 +118,6 @@ def _in_pool(run: Callable[[], None], work: Work, threads: int, receive: Callabl
                     receive(item)
         finally:
             work.stop.set()
-
-
-def processors() -> int:
-    """How many processors this process may use, where the platform tells; else how many there are."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _in_lanes(work: Work) -> None:

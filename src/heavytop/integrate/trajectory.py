@@ -103,13 +103,9 @@ def _start(run: Trajectory) -> list[float]:
     problem = run.problem
     start, xi = (problem.start, problem.xi) if run.frame is None else (run.frame, run.frame.xi)
     assert xi is not None  # without ξ no attitude was computed
-    q = quaternion_of_rows(rows_of(start.gamma, xi), SimpleNamespace(sqrt=_root))
+    q = quaternion_of_rows(rows_of(start.gamma, xi), SimpleNamespace(sqrt=lambda value: Fraction(math.sqrt(value))))
     sign = first_sign(q, 2**_SIGN_BITS * problem.precision.eps)
     return [sign * float(value) for value in q]
-
-
-def _root(value: Any) -> Fraction:
-    return Fraction(math.sqrt(value))
 
 
 def _centre(run: Trajectory, output: Output) -> Vector:
@@ -436,6 +432,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     problem, the principal axes.  principal: then the run as it was computed.
     angle_texts: φ, θ, ψ, followed from t = 0, as decimal text, shape (n, 3), where they were asked for.
     dense: (Ω, γ) at any exact time up to ``time_reached``, native numbers in the axes of ``states``.
+    joint_violation: how far an engine of bodies let the fixed point move, where it says so.
     """
 
     problem: Problem
@@ -454,6 +451,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     principal: Trajectory | None = None
     angle_texts: Sequence[Sequence[str]] | None = None
     dense: Callable[[Fraction], Sequence[Any]] | None = None
+    joint_violation: float | None = None
 
     def __post_init__(self) -> None:
         import numpy
@@ -625,8 +623,22 @@ def _shown(value: Any, digits: int) -> str:
 Observer = Callable[[Fraction, Any], None]
 
 
+Ended = tuple[Sequence[Fraction], Any, "Outcome", float]
+"""The times that a run reached, the states there, its outcome and its seconds."""
+
+
 class SampledRun(Protocol):
     """A run that is advanced to wherever its next sample lies."""
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+        ...
+
+    @property
+    def time(self) -> Any:
+        """Where the last step ended, exactly or as a native number."""
+        ...
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """How it came to the time, given as the native number and exactly, and the native state there."""
@@ -649,7 +661,7 @@ def sampled(
     observer: Observer | None,
     place: ResumePoint | None,
     mark: Callable[[ResumePoint], None] | None,
-) -> tuple[tuple[Fraction, ...], tuple[Any, ...], Outcome, float]:
+) -> Ended:
     """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
 
     began: by :func:`time.perf_counter`.  The other arguments: as in
@@ -676,6 +688,22 @@ def sampled(
         if mark is not None and target != 0:
             mark(run.place(len(times), perf_counter() - began, flags))
     return tuple(times), tuple(states), outcome, perf_counter() - began
+
+
+def trajectory_of(
+    problem: Problem,
+    integrator: str,
+    run: SampledRun,
+    order: int,
+    compiling: float,
+    flags: dict[str, str],
+    *ended: *Ended,
+) -> Trajectory:
+    """The trajectory of a run that ended so; compiling: seconds."""
+    times, states, outcome, seconds = ended
+    reached = times[-1] if outcome is Outcome.SUCCESS and times else exact(run.time)
+    spent = {"compile": compiling, "run": seconds}
+    return Trajectory(problem, integrator, times, states, outcome, reached, run.steps, order, spent, flags)
 
 
 @dataclass(frozen=True, slots=True)

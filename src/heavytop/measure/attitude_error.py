@@ -21,13 +21,12 @@ from heavytop.measure.scorer import (
     Running,
     Scorer,
     Statistics,
-    TimeText,
     parameter_balls,
     split,
 )
-from heavytop.measure.truth import Truth, truth_with_attitude
+from heavytop.measure.truth import Truth, truth
 from heavytop.precision import Vector, cross, dot, exact
-from heavytop.records import Metric, Quantity, Series
+from heavytop.records import Quantity
 from heavytop.top.attitude import SEQUENCES, Rows, matrix_of_quaternion, rotated, rows_of, rows_of_euler, transposed
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
@@ -60,7 +59,7 @@ WIDTHS = {"quaternion": 4, "matrix": 9, "euler": 3, **dict.fromkeys(VECTORS, 3)}
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """What the columns of a file mean.
+    """The conventions of the columns of a file.
 
     quaternion_order: "wxyz" or "xyzw".  quaternion, matrix: "body_to_space" (v_space = R v_body) or "space_to_body".
     sequence: of Euler angles, intrinsic.  angles: "radians" or "degrees".  up: the axis of space that points up.
@@ -284,7 +283,7 @@ class ObservedErrors(Statistics):
         return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, relative: part_of}
 
     def quantities(self) -> dict[Quantity, Running]:
-        """What the columns give."""
+        """The errors of the columns, by what they are of."""
         return self.running
 
     def largest_alone(self, quantity: Quantity) -> bool:
@@ -394,86 +393,55 @@ class ObservedScorer(DriftAndError):
 
 
 ATTITUDE, POSITION = Quantity(ATTITUDE_ERROR), Quantity(POSITION_ERROR)
-_KEPT = (ATTITUDE_ERROR, POSITION_ERROR)
 
 
-class AttitudeErrors:
-    """The angle between the attitude computed and the true one, in radians, and the error of the centre of mass.
+class _AttitudeErrors(ObservedErrors):
+    """Errors of the attitude and the position alone."""
 
-    problem: rounded, with ξ.  top, start: exact, in principal axes.  times: exact, those at which states come.
-    There are none where the true attitude is not known.
+    def quantities(self) -> dict[Quantity, Running]:
+        """Both errors, that of the position relative too."""
+        return {q: each for q, each in self.running.items() if q.name in (ATTITUDE_ERROR, POSITION_ERROR)}
+
+
+class AttitudeScorer(Scorer):
+    """A scorer of states (Ω, γ, ξ): of Ω and γ as of any run, and where the true attitude is known of its angle to the
+    one computed, in radians, and of the centre of mass.
+
+    problem: rounded, with ξ.  known: of Ω and γ.  top, start: exact, in principal axes.  times: exact, of the states.
     """
 
     def __init__(
-        self, problem: Problem, top: HeavyTop, start: State, times: Sequence[Fraction], keep: Sequence[Fraction]
+        self,
+        problem: Problem,
+        known: Truth | str,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        keep: Sequence[Fraction],
     ) -> None:
+        super().__init__(replace(problem, xi=None), known, keep)
         assert problem.xi is not None
-        truth = truth_with_attitude(problem, times)
-        xi: Vector = (problem.xi[0], problem.xi[1], problem.xi[2])
-        posed = Posed(top, start, xi, IDENTITY, top.centre)
-        self._centre = top.centre
+        turned = truth(problem, times)
+        posed = Posed(top, start, (problem.xi[0], problem.xi[1], problem.xi[2]), IDENTITY, top.centre)
         names = ("matrix", "position") if any(top.centre) else ("matrix",)
-        self._errors = (
-            None if isinstance(truth, str) else ObservedErrors(problem, truth, posed, Convention(), names, keep)
-        )
+        self._attitude: _AttitudeErrors | None = None
+        if not isinstance(turned, str):
+            self._attitude = _AttitudeErrors(problem, turned, posed, Convention(), names, keep)
+
+    def _parts(self) -> list[Statistics]:
+        return [*super()._parts(), *([] if self._attitude is None else [self._attitude])]
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
-        """Take in a native state (Ω, γ, ξ); one that is not finite counts for nothing."""
-        if self._errors is None:
+        """Take in a native state; an attitude that is not finite counts for nothing."""
+        super().__call__(time, state[:6])
+        if self._attitude is None:
             return
         try:
             values = [exact(value) for value in state[3:9]]
         except InputError:
             return
         rows = rows_of(values[:3], values[3:])
-        found = {"matrix": [entry for row in rows for entry in row]}
-        if any(self._centre):
-            found["position"] = list(rotated(rows, self._centre))
-        self._errors(time, found, None)
-
-    def running(self) -> dict[Quantity, Running]:
-        """The running values of both errors, the position's absolute, by what they are of."""
-        found = {} if self._errors is None else self._errors.running
-        return {quantity: each for quantity, each in found.items() if quantity in (ATTITUDE, POSITION)}
-
-    def metrics(self) -> dict[str, Metric]:
-        """``attitude_error_max``, ``_rms``, ``_final``; ``position_error_*``, also relative, of a body with r ≠ 0."""
-        found = {} if self._errors is None else self._errors.metrics()
-        return {name: metric for name, metric in found.items() if name.startswith(_KEPT)}
-
-    def series(self, time_text: TimeText) -> dict[str, Series]:
-        """The same over the kept times."""
-        found = {} if self._errors is None else self._errors.series(time_text)
-        return {name: series for name, series in found.items() if name.startswith(_KEPT)}
-
-
-class AttitudeScorer(Scorer):
-    """A scorer of states (Ω, γ, ξ): of Ω and γ as of any run, and :class:`AttitudeErrors` beside them.
-
-    problem: rounded, with ξ.  truth: of Ω and γ.  top, start: exact, in principal axes.
-    """
-
-    def __init__(
-        self,
-        problem: Problem,
-        truth: Truth | str,
-        top: HeavyTop,
-        start: State,
-        times: Sequence[Fraction],
-        keep: Sequence[Fraction],
-    ) -> None:
-        super().__init__(replace(problem, xi=None), truth, keep)
-        self._turned = AttitudeErrors(problem, top, start, times, keep)
-
-    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
-        super().__call__(time, state[:6])
-        self._turned(time, state)
-
-    def running(self) -> dict[Quantity, Running]:
-        return super().running() | self._turned.running()
-
-    def metrics(self) -> dict[str, Metric]:
-        return super().metrics() | self._turned.metrics()
-
-    def series(self, time_text: TimeText) -> dict[str, Series]:
-        return super().series(time_text) | self._turned.series(time_text)
+        columns = {"matrix": [entry for row in rows for entry in row]}
+        if self._attitude.distance_squared:
+            columns["position"] = list(rotated(rows, self._attitude.point))
+        self._attitude(time, columns, None)

@@ -1,4 +1,4 @@
-"""What a reference is certified by: a second source that shares no formula with the first, and the digits both give.
+"""The certificate of a reference: a second source that shares no formula with the first, and the digits both give.
 
 The second source of a closed form is the validated integration from the same exact start.  Where that is out of reach,
 the closed form is compared with the validated integration at an early time from the start, and over the last unit of

@@ -34,11 +34,25 @@ _SPARE_BITS = 12
 Balls = list[list[arb]]
 
 
-class DerivativeBall(msgspec.Struct, frozen=True):
-    """A value and a radius, as decimal text: the true derivative is within the radius of the printed value."""
+class Ball(msgspec.Struct, frozen=True):
+    """A value and a radius, as decimal text: the true number is within the radius of the printed value."""
 
     value: str
     radius: str
+
+    @classmethod
+    def proven(cls, value: arb, digits: int, name: str, time: Fraction, source: str = "") -> Ball:
+        """A ball of one digit more than ``digits``: rounded to these, 1.04 may be wrong by five units of the last.
+
+        Raises OutOfReach where the radius exceeds 10^-digits, relative to a value above 1.
+        """
+        found = cls(*value_text(value, digits + 1))
+        if exact(found.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(found.value))):
+            raise OutOfReach(
+                f"{name} at t = {shown(time)} is known within {found.radius} only, not to {digits} digits{source}.",
+                "Ask for fewer digits.",
+            )
+        return found
 
 
 class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -50,9 +64,9 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
     """
 
     method: str
-    start: list[list[list[DerivativeBall]]] | None = None
-    data: list[list[list[DerivativeBall]]] | None = None
-    lyapunov: list[DerivativeBall | None] | None = None
+    start: list[list[list[Ball]]] | None = None
+    data: list[list[list[Ball]]] | None = None
+    lyapunov: list[Ball | None] | None = None
 
     def numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
         """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
@@ -102,7 +116,7 @@ def known_derivatives(
         matrices = [in_axes(each.start, resolved) for each in found]
         of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
-        lyapunov = [None if value is None else _text(value, digits) for value in exponents]
+        lyapunov = [None if value is None else Ball(*value_text(value, digits + 1)) for value in exponents]
     if which != "start":
         matrices = [in_axes(each.data or [], resolved, kept=3) for each in found]
         of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
@@ -143,19 +157,8 @@ def _exponent(matrix: Balls, time: Fraction, bits: int) -> arb | None:
         return value.log() / ball(abs(time))
 
 
-def _texts(matrix: Balls, time: Fraction, digits: int) -> list[list[DerivativeBall]]:
-    found = [[_text(value, digits) for value in row] for row in matrix]
-    for row, name in zip(found, NAMES, strict=True):
-        for each in row:
-            if exact(each.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(each.value))):
-                raise OutOfReach(
-                    f"A derivative of {name} at t = {shown(time)} is known within {each.radius} only, not to {digits} "
-                    "digits.",
-                    "Ask for fewer digits.",
-                )
-    return found
-
-
-def _text(value: arb, digits: int) -> DerivativeBall:
-    """One digit more than ``digits`` is printed, so that its rounding does not cost one that was promised."""
-    return DerivativeBall(*value_text(value, digits + 1))
+def _texts(matrix: Balls, time: Fraction, digits: int) -> list[list[Ball]]:
+    return [
+        [Ball.proven(value, digits, f"A derivative of {name}", time) for value in row]
+        for row, name in zip(matrix, NAMES, strict=True)
+    ]

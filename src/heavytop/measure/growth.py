@@ -74,7 +74,7 @@ class Ensemble:
 
 
 def root_mean_square(values: Array) -> Array:
-    """Of finite values over axis 0, which is not empty, without underflow of the squares."""
+    """Root mean square of finite values over axis 0, which is not empty, without underflow of the squares."""
     largest: Array = numpy.abs(values).max(axis=0)
     scaled = numpy.divide(values, largest, out=numpy.zeros_like(values, dtype=float), where=largest > 0)
     root: Array = largest * numpy.sqrt((scaled**2).mean(axis=0))

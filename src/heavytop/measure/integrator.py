@@ -21,8 +21,8 @@ from heavytop.integrate.ensemble import Observer as EnsembleObserver
 from heavytop.integrate.heyoka import motions
 from heavytop.integrate.peers.command import NOT_COUNTED, Command
 from heavytop.integrate.peers.contract import Declared, require_equal
-from heavytop.integrate.registry import Integrator, IntegratorSource, described, load, name_of
-from heavytop.integrate.trajectory import Observer, Outcome, Problem, TaylorStep, Trajectory
+from heavytop.integrate.registry import Integrator, IntegratorSource, described, name_of
+from heavytop.integrate.trajectory import Observer, Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
@@ -57,12 +57,12 @@ class ChosenIntegrator:
 
     @property
     def which(self) -> str | IntegratorSource:
-        """What it is looked up by."""
+        """The name or the source by which it is looked up."""
         return self.source or self.name
 
     @property
     def capabilities(self) -> Integrator:
-        """What it can do."""
+        """Its capabilities."""
         return described(self.which)
 
     @property
@@ -85,7 +85,7 @@ class ChosenIntegrator:
 
     @property
     def declared(self) -> Declared:
-        """What it declares of itself; nothing where it cannot be used."""
+        """Its declaration; an empty one where it cannot be used."""
         if isinstance(self.source, Command):
             return self.source.declared
         try:
@@ -119,6 +119,8 @@ class ChosenIntegrator:
 
         Raises PeerFailed for whatever a third-party integrator does wrong.
         """
+        if self.capabilities.streams and self.control:
+            raise Unsupported(f"{self.name} has no {self.control[0]}.", "Name an integrator that has.")
         if self.capabilities.streams:
             call = registry.propagator(self.which, {})
             run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
@@ -171,15 +173,6 @@ class ChosenIntegrator:
             if finished is not None:
                 finished(index, runs[-1])
         return runs
-
-    def first_steps(
-        self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
-    ) -> tuple[Trajectory, list[TaylorStep]]:
-        """As :func:`heavytop.integrate.heyoka.motions.first_steps`, where its steps are exposed."""
-        found: tuple[Trajectory, list[TaylorStep]] = load(self.capabilities.steps)(
-            top, start, until, precision, system=system
-        )
-        return found
 
 
 def _given(problem: Problem) -> tuple[HeavyTop, State]:
@@ -305,9 +298,11 @@ def _nudged(problem: Problem, count: int) -> State:
 
 
 def _moved(problem: Problem, part: Fraction) -> State:
-    """A start with Ω and γ larger by a part of them: where γ is parallel to M, it stays so."""
+    """A start with Ω larger by a part of it, or γ where Ω is 0: where γ is parallel to M, it stays so."""
     start = problem.start if problem.given is None else problem.given[1]
-    return State([(1 + part) * value for value in start.omega], [(1 + part) * value for value in start.gamma])
+    if not any(start.omega):
+        return State(start.omega, [(1 + part) * value for value in start.gamma])
+    return State([(1 + part) * value for value in start.omega], start.gamma)
 
 
 def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction | None) -> Fraction | None:
@@ -327,7 +322,7 @@ def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction |
 
 
 def _distance(one: Trajectory, other: Trajectory) -> Fraction:
-    """Of the last states, largest component."""
+    """The distance of the last states, largest component."""
     return max(abs(exact(a) - exact(b)) for a, b in zip(one.states[-1], other.states[-1], strict=True))
 
 
@@ -432,7 +427,7 @@ _ACCUMULATES = {"along": 2, "across": 1, "omega": 2, "gamma": 2}
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """What stays of one start when its motion has ended.
+    """The record of one start whose motion has ended.
 
     values: by the key of each quantity, at the samples that it reached, as far as there is a truth; None where that is
     not finite.  The rest as in :class:`heavytop.integrate.trajectory.Trajectory`.
@@ -449,7 +444,7 @@ class Ended(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, run: Trajectory, scorer: Scorer) -> Ended:
-        """What stays of a run that went to ``scorer``."""
+        """The record of a run that went to ``scorer``."""
         running = scorer.running()
         values = {q.text: [_finite(kept) for kept in each.kept.values()] for q, each in running.items()}
         lost = run.outcome is Outcome.SUCCESS and any(None in kept for kept in values.values())
@@ -509,7 +504,7 @@ class _Measured:
 
 @dataclass(slots=True)
 class Growing:
-    """What an ensemble comes to: metrics, each a root mean square over the starts, series and their laws."""
+    """The results of an ensemble: metrics, each a root mean square over the starts, series and their laws."""
 
     metrics: dict[Quantity, Metric]
     series: dict[str, Series]

@@ -30,7 +30,8 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.integrate.trajectory import InSpace
 from heavytop.measure.certify import bits_of
-from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
+from heavytop.measure.derivatives import Ball as Ball
+from heavytop.measure.derivatives import Derivatives, known_derivatives
 from heavytop.measure.motion import motion_texts, xi_texts
 from heavytop.precision import Vector, decimal_text, dot, exact, shown, vector
 from heavytop.top.attitude import Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
@@ -258,15 +259,6 @@ _SHOWN = 15
 _WIDE, _ENDS = 52, 2
 """Characters of a number in a row, and times at either end that are shown of many."""
 
-Evaluate = Callable[[Fraction, int], Sequence[Any]]
-
-
-class Ball(msgspec.Struct, frozen=True):
-    """A value and a radius, as decimal text: the true number is within the radius of the printed value."""
-
-    value: str
-    radius: str
-
 
 class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
     """Proven states; its JSON is that of ``heavytop reference``.
@@ -393,7 +385,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         """
         return self._derivatives().numpy()
 
-    def lyapunov(self) -> list[DerivativeBall | None]:
+    def lyapunov(self) -> list[Ball | None]:
         """The finite-time Lyapunov exponent at each time, in 1/time unit, with its radius; None at t = 0.
 
         It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
@@ -487,7 +479,8 @@ def reference(
         stability=steady,
     )
     if not attitude:
-        states = [ball_texts(known.state, known.method, time, digits) for time in instants]
+        bits = bits_of(digits)
+        states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
         return msgspec.structs.replace(found, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
     method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
@@ -506,29 +499,12 @@ def reference(
 
 @whole_evaluation
 def start_texts(gamma: Vector, digits: int) -> list[str]:
-    """The same of a γ that is not of length 1, in balls."""
+    """ξ at t = 0 of a γ that is not of length 1, in balls."""
     with working_precision(bits_of(digits) + GUARD_BITS):
         return [value_text(value, digits + 1)[0] for value in initial_xi(gamma)]
 
 
-def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> list[Ball]:
-    """The balls of ``evaluate(time, bits)`` as text.
-
-    One significant digit more than ``digits`` is printed: rounded to ``digits`` of them, a value such as 1.04 may be
-    wrong by five units of the digit that was promised.  Raises OutOfReach where a printed radius exceeds 10^-digits,
-    relative to a value above 1.
-    """
-    return known_texts(evaluate(time, bits_of(digits)), method, time, digits)
-
-
 def known_texts(values: Sequence[Any], method: str, time: Fraction, digits: int) -> list[Ball]:
-    """:func:`ball_texts` of balls that are known already."""
-    found = [Ball(*value_text(value, digits + 1)) for value in values]
-    for component, each in enumerate(found, 1):
-        if exact(each.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(each.value))):
-            raise OutOfReach(
-                f"Component {component} at t = {shown(time)} is known within {each.radius} only, not to {digits} "
-                f"digits, by {method}.",
-                "Ask for fewer digits.",
-            )
-    return found
+    """The balls of a state as text; raises OutOfReach as :meth:`Ball.proven` does."""
+    source = f", by {method}"
+    return [Ball.proven(value, digits, f"Component {i}", time, source) for i, value in enumerate(values, 1)]

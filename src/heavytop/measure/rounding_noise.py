@@ -35,7 +35,7 @@ _CENTRAL = 0.95
 
 
 def factor(seed: int, rerun: int = 0) -> Fraction:
-    """What inertia and weight are multiplied by; 1 for seed 0 and rerun 0."""
+    """The factor of inertia and weight; 1 for seed 0 and rerun 0."""
     number = (seed * (RERUNS + 1) + rerun) * _STRIDE % FACTORS
     return 1 + Fraction(number, 2**_BITS)
 
@@ -43,7 +43,8 @@ def factor(seed: int, rerun: int = 0) -> Fraction:
 def scaled(top: HeavyTop, by: Fraction) -> HeavyTop:
     """The top with the same motions and other roundings: inertia, weight and rotor times a :func:`factor`."""
     rotor = None if top.rotor is None else [by * k for k in top.rotor]
-    return HeavyTop([by * moment for moment in top.inertia], by * top.weight, top.centre, rotor)
+    mass = None if top.mass is None else by * top.mass
+    return HeavyTop([by * moment for moment in top.inertia], by * top.weight, top.centre, rotor, mass)
 
 
 def least(metrics: Mapping[str, Metric], metric: Metric) -> float:

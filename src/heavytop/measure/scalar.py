@@ -9,7 +9,7 @@ from fractions import Fraction
 from functools import reduce
 from math import isfinite
 from sys import float_info
-from typing import Any, Protocol
+from typing import Any
 
 import numpy
 from flint import arb
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text
 from heavytop.precision import Precision, decimal_text, exact, log10, round_to
-from heavytop.records import Against, Metric, MetricKind, Quantity
+from heavytop.records import Metric, MetricKind, Quantity, Row
 
 DIGITS = 8
 UNRESOLVED = "unresolved"
@@ -125,29 +125,13 @@ def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
     return largest(error if size < _ONE else error / size.max(_ONE) for error, size in zip(errors, sizes, strict=True))
 
 
-class Measured(Protocol):
-    """A row, as far as its digits are concerned."""
-
-    @property
-    def bits(self) -> int: ...
-
-    @property
-    def metrics(self) -> dict[str, Metric]: ...
-
-    @property
-    def reference(self) -> Against: ...
-
-
-def digits_kept(row: Measured) -> float | None:
-    """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
-
-    Rounded to two places; :func:`digits_right` has all.
-    """
+def digits_kept(row: Row) -> float | None:
+    """The digits of :func:`digits_right` to two places."""
     found = digits_right(row)
     return None if found is None else round(found, 2)
 
 
-def digits_right(row: Measured) -> float | None:
+def digits_right(row: Row) -> float | None:
     """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
 
     At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
@@ -190,7 +174,7 @@ _PART = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Rounding:
-    """What all states are rounded to.
+    """The rounding that all states have.
 
     kind: "significant" digits, "decimals" after the point, or "single" precision.  digits: how many, 24 bits for the
     last.  error: the largest rounding of a component, relative to max(1, |value|).

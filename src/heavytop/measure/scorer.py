@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -15,6 +16,8 @@ from heavytop.exact.flint.balls import (
     ball_from,
     ball_text,
     current_length,
+    midpoint,
+    radius,
     rational,
     whole_evaluation,
     working_precision,
@@ -127,7 +130,7 @@ class Statistics:
         return {each.text: run.series(each, time_text) for each, run in found if each.component != _RELATIVE}
 
     def content(self) -> dict[str, Any]:
-        """What was taken in so far, by component, as plain text and integers, exact."""
+        """The sums so far, by component, as plain text and integers, exact."""
         return {quantity.component: run.content() for quantity, run in self.quantities().items()}
 
     def restore(self, content: dict[str, Any]) -> None:
@@ -172,11 +175,11 @@ class Drift(Statistics):
 
     @whole_evaluation
     def following(self, state: Sequence[Any]) -> list[Sums]:
-        """What the drifts add up to with this native state; nothing is taken in."""
+        """The sums of the drifts with this native state; nothing is taken in."""
         return at_precision(self.bits, current_length(), lambda _: self.sums(to_balls(state)))
 
     def sums(self, y: Sequence[arb]) -> list[Sums]:
-        """The same with a state of balls, at a working precision of ``bits``."""
+        """The sums of the drifts with a state of balls, at a working precision of ``bits``."""
         return [
             self.running[name].following(value(self.parameters, y) - self.initial[name])
             for name, value in self.functions.items()
@@ -268,7 +271,7 @@ class SolutionError(Statistics):
 
     @whole_evaluation
     def following(self, time: Fraction, state: Sequence[Any]) -> Errors | None:
-        """What the errors add up to with this native state, and whether Ω is off by more than the threshold; None where
+        """The sums of the errors with this native state, and whether Ω is off by more than the threshold; None where
         there is no truth.  Nothing is taken in.
         """
         truth = self.known(time)
@@ -327,7 +330,7 @@ def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
 
 
 class DriftAndError:
-    """What the samples of a motion are worth: drift, where the state is whole, and error, where there is a reference.
+    """Measures of the samples of a motion: drift, where the state is whole, and error, where there is a reference.
 
     truth: the true motion, or why there is none.
     """
@@ -338,7 +341,7 @@ class DriftAndError:
 
     @property
     def against(self) -> Against:
-        """What the motion was compared with."""
+        """The reference of the motion."""
         if isinstance(self.truth, str):
             return Against("none", reason=f"no reference: {self.truth}")
         return self.truth.against
@@ -355,7 +358,7 @@ class DriftAndError:
         return {name: metric for each in self._parts() for name, metric in each.metrics().items()}
 
     def series(self, time_text: TimeText) -> dict[str, Series]:
-        """The same over the kept times."""
+        """The series of every drift and error over the kept times."""
         return {name: series for each in self._parts() for name, series in each.series(time_text).items()}
 
 
@@ -405,7 +408,7 @@ class Scorer(DriftAndError):
             self(time, state)
 
     def content(self) -> dict[str, Any]:
-        """What was taken in so far, as plain text and integers, exact."""
+        """The sums so far, as plain text and integers, exact."""
         return {"drift": self.drift.content()} | ({"error": self.error.content()} if self.error else {})
 
     def restore(self, content: dict[str, Any]) -> None:
@@ -418,46 +421,37 @@ class Scorer(DriftAndError):
 # The error of a motion at each of its samples, and the drift of its integrals there, as decimal logarithms.
 
 
+Exact = Sequence[Fraction]
 Logs = list[float | None]
 """log10 of a quantity at each sample; None where it is 0."""
 
 
-@whole_evaluation
 def sample_errors(
-    problem: Problem, states: Sequence[Sequence[Fraction]], known: Sequence[Sequence[Fraction]]
+    problem: Problem,
+    times: Sequence[Fraction],
+    states: Sequence[Sequence[Fraction]],
+    known: Sequence[Sequence[Fraction]],
 ) -> dict[str, Logs]:
-    """The error of each state, by ``relative`` (of the largest component), ``along`` and ``across`` the flow.
+    """The error of each state, by the components of :class:`SolutionError`.
 
     states, known: exact numbers, six each, at the same times.
     """
-    found: dict[str, Logs] = {"relative": [], "along": [], "across": []}
-    # as many bits as tell a state of the format from one that is right to as many digits again
-    bits = 2 * problem.precision.bits + GUARD_BITS
-    parameters = parameter_balls(problem, bits)
-    with working_precision(bits):
-        for state, true in zip(states, known, strict=True):
-            truth = [ball(value) for value in true]
-            delta = [ball(value - other) for value, other in zip(state, true, strict=True)]
-            along, across = split(delta, problem.system.field(parameters, truth))
-            values = {"relative": relative_error(delta, truth), "along": along, "across": across}
-            for name, value in values.items():
-                found[name].append(_log10(value))
-    return found
+    true = dict(zip(times, known, strict=True))
+    error = SolutionError(problem, Truth(Against("computed"), lambda time, bits: to_balls(true[time])), times)
+    for time, state in zip(times, states, strict=True):
+        error(time, state)
+    return {part: _logs(running) for part, running in error.running.items()}
 
 
-def _log10(value: Any) -> float | None:
-    """Of the middle of a ball; None where it may be 0."""
-    from heavytop.exact.flint.balls import midpoint, radius
-
-    middle = midpoint(value)
-    return None if middle <= radius(value) else log10(middle)
-
-
-def sample_drifts(problem: Problem, states: Sequence[Sequence[Fraction]]) -> dict[str, Logs]:
+def sample_drifts(problem: Problem, times: Sequence[Fraction], states: Sequence[Sequence[Fraction]]) -> dict[str, Logs]:
     """|I(y(t)) − I(y(0))| at each state, of every first integral that holds for the exact start."""
-    start = problem.start.flat
-    found: dict[str, Logs] = {}
-    for integral in problem.integrals():
-        at_start = integral.value(problem.parameters, start)
-        found[integral.name] = [log10(integral.value(problem.parameters, state) - at_start) for state in states]
-    return found
+    drift = Drift(replace(problem, xi=None), problem.integrals(), times)
+    for time, state in zip(times, states, strict=True):
+        drift(time, state)
+    return {name: _logs(running) for name, running in drift.running.items()}
+
+
+def _logs(running: Running) -> Logs:
+    """Logarithms of the middles of the kept balls; None where one may be 0."""
+    pairs = ((midpoint(value), radius(value)) for value in running.kept.values())
+    return [None if middle <= width else log10(middle) for middle, width in pairs]

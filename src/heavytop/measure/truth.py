@@ -1,4 +1,4 @@
-"""What a row is compared with: the true motion of its rounded problem, proven where that is in reach, else computed.
+"""The reference of a row: the true motion of its rounded problem, proven where that is in reach, else computed.
 
 Proven: a closed form that a second source certifies, or the validated enclosure: up to |t| = 100 as far as that is in
 reach at all, beyond where the model of its cost stays below :data:`CHEAP`.  No clock is asked: the same plan gives the
@@ -85,7 +85,7 @@ class ComputedReference:
 
     @property
     def against(self) -> Against:
-        """What it is, how far the runs agree as long as the format has digits, and how long that is."""
+        """Its kind, how far the runs agree as long as the format has digits, and how long that is."""
         return agreement([self])
 
     def state(self, time: Fraction, bits: int = 0) -> list[arb]:
@@ -110,7 +110,7 @@ class ComputedReference:
 
 
 def agreement(found: Sequence[ComputedReference]) -> Against:
-    """What the references of one ensemble are, all over the same times."""
+    """The kind of the references of one ensemble, all over the same times."""
     (coarse, fine), ends = found[0].words, found[0].ends
     radii = [each.radius(t) for each in found for t in each.balls if ends is None or abs(t) < abs(ends)]
     agreed = radius_text(max(radii)) if radii else ""
@@ -203,7 +203,7 @@ def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
 
 
 def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
-    """Those of the times within the horizon over 4^n, each longer than the one before; where there is none, its end."""
+    """Times within the horizon over 4^n, each list longer than the one before; where there is none, its end."""
     ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
     counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
     before = [[ends[n]] for n, count in counts.items() if not count]
@@ -301,7 +301,7 @@ class Truth:
         return self.ends is None or abs(time) < abs(self.ends)
 
     def remembered(self) -> Truth:
-        """The same, with each state worked out once: for several runs over the same times."""
+        """This truth with each state worked out once: for several runs over the same times."""
         return replace(self, state=cache(self.state))
 
 
@@ -338,20 +338,27 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
     """The true motion of a rounded problem at ``times``, exact numbers in the order of a run; why not, where it is
     neither proven nor computed.
 
+    Of a problem with ξ nine balls a time: Ω, γ and the ξ that begins at that of the problem.
     effort: of a computed one, :func:`heavytop.measure.truth.compute`.
     Raises Contradiction where a second source excludes a proven one: then something is wrong with this program.
     """
-    known = known_motion(problem, max(times, key=abs))
+    horizon = max(times, key=abs)
+    known = known_motion(replace(problem, xi=None), horizon)
     if isinstance(known, Known):
-        return known.truth
+        if problem.xi is None:
+            return known.truth
+        if (nine := _nine(known.solution, problem, horizon)) is not None:
+            return Truth(known.against, nine)
     found = _computed(problem, times, effort)
+    if isinstance(known, Known):
+        return found
     if isinstance(found, str):
         return f"{known}; {found}"
     return replace(found, against=replace_struct(found.against, reason=known))
 
 
 def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
-    """The same, enough for the scatter of runs that differ in their roundings: no second source is asked."""
+    """A truth for the scatter of runs that differ in their roundings alone: no second source is asked."""
     form = closed_form(problem)
     if form is not None:
         return Truth(Against("proven", form.method), form.state).remembered()
@@ -414,32 +421,10 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     return known or "certified to fewer digits than the format has"
 
 
-# The true motion of a rounded problem with its attitude, from the attitude vector that the problem begins with.
+# The attitude vector of a known motion, from that which the problem begins with.
 
 
 _SPARE_BITS = 8
-
-
-def truth_with_attitude(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
-    """As :func:`heavytop.measure.truth.truth`, of nine balls a time: Ω, γ and ξ; ξ begins at that of the problem.
-
-    Of a problem without ξ six balls, by that very function.
-    """
-    if problem.xi is None:
-        return truth(problem, times, effort)
-    known = known_motion(replace(problem, xi=None), max(times, key=abs))
-    if isinstance(known, Known):
-        nine = _nine(known.solution, problem, max(times, key=abs))
-        if nine is not None:
-            return Truth(known.against, nine)
-    try:
-        (found,) = of_rounded([problem], times, effort=effort)
-    except (InputError, OutOfReach) as error:
-        why = clause(error)
-        return f"{known}; {why}" if isinstance(known, str) else why
-    if found.ends == times[0]:
-        return f"all significant digits of the format are lost at t = {time_text(found.ends)}, the first sample"
-    return Truth(found.against, found.state, found.ends)
 
 
 def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evaluate | None:
@@ -490,7 +475,7 @@ _TOO_FEW = "the closed form is certified to too few digits"
 
 @dataclass(frozen=True, slots=True)
 class EnsembleReference:
-    """What an ensemble is compared with: the truth of each start, or why there is none.
+    """The references of an ensemble: the truth of each start, or why there is none.
 
     blur: how far each state may be off, absolute, for each start and time that is covered; shape (starts, samples).
     """
@@ -532,7 +517,7 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
 
 
 def _motion(problem: Problem) -> tuple[Any, ...]:
-    """What the motion depends on: inertia and weight times a common factor are the same motion."""
+    """The data on which the motion depends: inertia and weight times a common factor are the same motion."""
     p = problem.parameters
     own = p.mapped(lambda value: value / p.inertia[0])
     rotor = p.rotors if problem.system is GYROSTAT else own.rotors

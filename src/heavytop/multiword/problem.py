@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -30,6 +29,7 @@ from heavytop.multiword.codegen.machine_code import (
     pointer,
 )
 from heavytop.multiword.codegen.recurrence import Coefficients, coefficients
+from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 
 
@@ -141,11 +141,8 @@ class Scaled:
 def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
     """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
     omega = system.angular_velocity(p, y[:6])
-    return all(_parallel(vector, omega) for vector in (y[3:6], y[6:]) if vector) and not any(system.field(p, y[:6]))
-
-
-def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
-    return all(a[i] * b[j] == a[j] * b[i] for i, j in ((0, 1), (1, 2), (2, 0)))
+    turning = any(any(cross(vector, omega)) for vector in (y[3:6], y[6:]) if vector)
+    return not turning and not any(system.field(p, y[:6]))
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:

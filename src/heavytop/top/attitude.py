@@ -132,22 +132,6 @@ def near_quaternion(rows: Rows[Fraction], bits: int) -> tuple[Fraction, ...]:
     return tuple(value / length for value in multiple)
 
 
-def continuous(quaternions: Iterable[Sequence[Real]]) -> list[tuple[Real, ...]]:
-    """The same attitudes with signs that follow the motion.
-
-    The first has w ≥ 0, and its first non-zero component positive where w = 0; each other one is the nearer to the one
-    before of q and −q, meaningful where samples are less than a turn apart.
-    """
-    result: list[tuple[Real, ...]] = []
-    for q in quaternions:
-        if result:
-            turn = sum(float(a) * float(b) for a, b in zip(q, result[-1], strict=True)) < 0
-        else:
-            turn = next((float(value) < 0 for value in q if float(value) != 0), False)
-        result.append(tuple(-value for value in q) if turn else tuple(q))
-    return result
-
-
 def _elementary(axis: int, cosine: Any, sine: Any) -> tuple[Any, ...]:
     """The rows of the rotation about one axis."""
     after, last = (axis + 1) % 3, (axis + 2) % 3

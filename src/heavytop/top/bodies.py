@@ -10,7 +10,7 @@ from math import isqrt, lcm
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.precision import (
     Given,
     Vector,
@@ -300,6 +300,27 @@ class Body:
             f"inertia={texts}, about='{PIVOT}'{extra})"
         )
 
+    @classmethod
+    def realising(cls, top: HeavyTop) -> Body | None:
+        """A body that moves as the top does, in its axes; None where the triangle inequality forbids it.
+
+        Where the top has no mass it is a power of two so small that Steiner's part is at most 1/64 of every moment.
+        """
+        up = -1 if top.weight < 0 else 1
+        centre, square = vector([up * part for part in top.centre], "centre"), dot(top.centre, top.centre)
+        mass = top.mass
+        if mass is None:
+            most = min(top.inertia) / (64 * square) if top.weight * square else Fraction(1)
+            mass = Fraction(2) ** (most.numerator.bit_length() - most.denominator.bit_length() - 1)
+        body = cls(mass, abs(top.weight) / mass, centre, top.inertia, PIVOT)
+        slack = _ROUNDED_DATA * sum(top.inertia) / 2
+        return body if is_positive(body.central) and has_second_moments(body.central, slack) else None
+
+    @property
+    def central(self) -> Tensor:
+        """The inertia tensor about the centre of mass."""
+        return minus(self.tensor, steiner(self.mass, self.centre))
+
     @property
     def weight(self) -> Fraction:
         """P = m g."""
@@ -329,9 +350,8 @@ class Body:
         """The heavy top of these principal axes; it lacks what ``principal.left`` says."""
         turn = transposed(principal.axes)
         centre = rotated(turn, self.centre)
-        if self.rotor is None:
-            return HeavyTop(principal.moments, self.weight, centre)
-        return HeavyTop(principal.moments, self.weight, centre, rotor=rotated(turn, self.rotor))
+        rotor = None if self.rotor is None else rotated(turn, self.rotor)
+        return HeavyTop(principal.moments, self.weight, centre, rotor, self.mass)
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, though the equations do not mind."""
@@ -356,10 +376,8 @@ def _texts(values: Vector) -> str:
 
 
 def _number(value: Given, what: str) -> Fraction:
-    try:
+    with prefixed(what):
         return exact(value)
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 def _about(about: object, centre: Vector) -> str:
@@ -402,12 +420,11 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
 
 def _warnings_about_centre(body: Body) -> list[str]:
     """Whether the tensor about the centre of mass can be that of a body; where not, with the slip that mends it."""
-    central = minus(body.tensor, steiner(body.mass, body.centre))
     slack = _ROUNDED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
-    if has_second_moments(central, slack):
+    if has_second_moments(body.central, slack):
         return []
-    moments = ", ".join(six_digits(value) for value in _principal_moments(central))
-    six, at_pivot = six_of(central if body.about == CENTRE else body.tensor), body.about != CENTRE
+    moments = ", ".join(six_digits(value) for value in _principal_moments(body.central))
+    six, at_pivot = six_of(body.central if body.about == CENTRE else body.tensor), body.about != CENTRE
     slip = mending(MassProperties(six, body.mass, body.centre, at_pivot, slack))
     sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's."
     return [f"{sentence} {slip}".rstrip()]

@@ -14,7 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.files import read_whole
 from heavytop.precision import Vector, exact, round_to, vector
 from heavytop.top import inertia_slips
@@ -137,10 +137,8 @@ class _Numbers:
         text = text if text is not None else default
         if text is None:
             raise InputError(f"{self.where}: {what} is missing.", "Give it in the file.")
-        try:
+        with prefixed(f"{self.where}: {what} = {quoted(text)}"):
             return [self._one(part) for part in text.replace(",", " ").split()]
-        except InputError as error:
-            raise InputError(f"{self.where}: {what} = {quoted(text)}: {error.cause}", error.remedy) from None
 
     def _one(self, text: str) -> Fraction:
         value = exact(text)

@@ -48,6 +48,7 @@ class HeavyTop:
     centre: r = (a, b, c), the centre of mass on the principal axes.
     rotor: k = (k1, k2, k3), the constant angular momentum, relative to the body, of a rotor that it carries: the system
     is then `heavy_gyrostat`.  None for no rotor, which is another top than one with k = 0.
+    mass: of the body; None where it is not known, since only its product with gravity, P, moves a top.
 
     Each is an exact number; raises InputError for a moment that is not positive.
     """
@@ -56,9 +57,15 @@ class HeavyTop:
     weight: Fraction
     centre: Vector
     rotor: Vector | None
+    mass: Fraction | None
 
     def __init__(
-        self, inertia: Iterable[Any], weight: Given, centre: Iterable[Any], rotor: Iterable[Any] | None = None
+        self,
+        inertia: Iterable[Any],
+        weight: Given,
+        centre: Iterable[Any],
+        rotor: Iterable[Any] | None = None,
+        mass: Fraction | None = None,
     ) -> None:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
@@ -75,6 +82,7 @@ class HeavyTop:
         object.__setattr__(self, "weight", load)
         object.__setattr__(self, "centre", vector(centre, "centre"))
         object.__setattr__(self, "rotor", None if rotor is None else vector(rotor, "rotor"))
+        object.__setattr__(self, "mass", mass)
 
     def __repr__(self) -> str:
         rotor = "" if self.rotor is None else f", rotor={_text(self.rotor)}"

@@ -12,12 +12,12 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
+import claim_library
 import heavytop as ht
-from heavytop.features.claims import claim_library
+from claim_library import Equation, Library, Published, is_current
+from claims_page import page
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
-from heavytop.features.claims.claim_library import Equation, Library, Published, is_current
 from heavytop.features.claims.library.entry import Entry
-from heavytop.features.claims.page import page
 
 ENTRY: dict[str, Any] = {
     "id": "spin",

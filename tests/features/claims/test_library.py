@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 import pytest
 
+import claim_library
 import heavytop as ht
-from heavytop.features.claims import claim_library
 from heavytop.features.claims.audit import audit as auditing
 from heavytop.features.claims.audit.audit import claim_from_table
 from heavytop.features.claims.library import entry as entries

@@ -9,7 +9,8 @@ import pytest
 import sympy
 
 from heavytop.errors import InputError
-from heavytop.features.claims.algebra.evaluate import evaluate, wp, wpprime
+from heavytop.features.claims.algebra.elliptic import wp, wpprime
+from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
 

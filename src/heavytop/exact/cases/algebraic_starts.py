@@ -81,7 +81,6 @@ class AlgebraicMotion(WithBearing):
         return to_bits(evaluate, bits)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.Evaluated`."""
         motion, size = _motion(self).at(ball(time)), ball(self.curve.gamma_square()).sqrt()
         return [*motion[:3], *(component / size for component in motion[3:])]
 

@@ -139,7 +139,6 @@ class BobylevSteklov(ClosedForm):
     )
 
     def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         if lattice is None:
             return balls(self.start.flat)

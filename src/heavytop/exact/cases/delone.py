@@ -174,7 +174,6 @@ class Delone(WithBearing, ClosedForm):
     starts = (XI,)
 
     def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         length = current_length()
         with series_length(length + 1):
             cosine, sine = self._turn(time)
@@ -291,7 +290,6 @@ class DeloneHomoclinic(WithAngles):
         return -arb(8).sqrt() * (tanh * sech) / d, 2 * sin_theta - 1, sin_theta, cos_theta
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         alpha = ball(self.alpha)
         sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
         omega = [alpha / 2 * sin_phi, alpha * sin_theta, 2 * alpha * cos_theta]

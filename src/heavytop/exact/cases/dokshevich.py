@@ -26,7 +26,7 @@ from typing import Any
 
 from flint import acb, arb, arb_series
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision, sign
 from heavytop.exact.flint.balls import (
     BallLike,
@@ -178,7 +178,6 @@ class _Moving(WithBearing):
     __slots__ = ()
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.Evaluated`."""
         swing, frame = _swing(self), _frame(self)
         phase: BallLike = swing.phase(frame.rate * ball(time))[0]
         for _ in range(current_length() - 1):
@@ -419,8 +418,6 @@ def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> Al
     :func:`heavytop.precision.exact`.
     Raises InputError where there is no such top, and for a place out of range.
     """
-    try:
+    with prefixed("place"):
         where = exact(place)
-    except InputError as error:
-        raise InputError(f"place: {error.cause}", error.remedy) from None
     return AlgebraicDokshevich(vector(inertia, "inertia"), where)

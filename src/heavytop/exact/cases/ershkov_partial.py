@@ -95,7 +95,6 @@ class ErshkovPartial(WithAngles):
         return State((0, 0, self.alpha * self.i1 / self.i3), (0, 0, 1))
 
     def evaluate(self, time: Fraction) -> list[arb_series]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         tanh, sech = tanh_sech(ball(self.rate / 2) * instant(time))
         omega, gamma = hyperbolic(ball(self.alpha), ball(self.i1 / self.i3), tanh, sech)
         return [*omega, *gamma]

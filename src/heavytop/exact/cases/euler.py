@@ -54,7 +54,6 @@ class Euler(WithAttitude):
         return not any(cross(omega, self.top.angular_momentum(omega)))
 
     def motion(self, time: BallLike) -> tuple[list[Any], Carry]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         if lattice is not None:
             return lattice.motion(time)

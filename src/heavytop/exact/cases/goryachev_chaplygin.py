@@ -589,7 +589,6 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
         _require_done(GoryachevLevel.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:

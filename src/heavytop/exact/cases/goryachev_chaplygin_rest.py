@@ -102,7 +102,6 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         return GoryachevLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         motion = _motion(self)
         level = motion.level
         found = motion.state(instant(level.rate * time))

@@ -57,7 +57,6 @@ class Grioli(WithAttitude):
     )
 
     def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         n = self.top.moment
         length = ball(dot(n, n)).sqrt()
         axis = [component / length for component in balls(n)]

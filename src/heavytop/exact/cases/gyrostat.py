@@ -74,7 +74,6 @@ class Gyrostat(ClosedForm):
         return not any(cross(self.momentum, self.angular_velocity))
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         prepared = _prepared(self)
         momentum, point, inverse = self._momentum(time)
         omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]

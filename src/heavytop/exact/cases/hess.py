@@ -173,12 +173,10 @@ class Hess(WithBearing, ClosedForm):
         return HessLevel.of(self.top, self.start).rate * time
 
     def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         motion = _motion(self)
         return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`."""
         motion = _motion(self)
         return motion.bearing(_azimuth(self), ball(motion.level.rate * time))
 
@@ -351,7 +349,6 @@ class HessPendulum(WithAttitude):
     )
 
     def motion(self, time: Balls) -> tuple[list[Balls], Carry]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         path, began = _path(self)
         frame, speed = path.at(time)
         size = path.inertia[1] * speed

@@ -541,7 +541,6 @@ class Kovalevskaya(WithBearing, ClosedForm):
         _require_done(KovalevskayaLevel.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:

@@ -90,7 +90,6 @@ class Lagrange(ClosedForm):
         return Parameters(self.top.inertia, self.top.moment, _ZERO)
 
     def evaluate(self, time: Fraction) -> list[Any]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         prepared, length = _prepared(self), current_length()
         point = prepared.motion.lattice.point(time, length if length > 1 else 0)
         inverse = 1 / prepared.motion.denominator(point)
@@ -330,7 +329,6 @@ class LagrangeGyrostat(ClosedForm):
         return found
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         turned = self._turned(self.lagrange.evaluate(time), instant(time))
         return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
 

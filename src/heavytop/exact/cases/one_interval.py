@@ -349,12 +349,10 @@ class Steklov(WithBearing, ClosedForm):
         _require_reach(self)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         rate, torque = _units(self.top, self.start)
         return in_units(_motion(self).at(ball(rate * time)), rate, 1 / torque)
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.separable.oscillation.WithBearing`."""
         rate, _ = _units(self.top, self.start)
         return _motion(self).bearing(_azimuth(self), ball(rate * time))
 

@@ -80,7 +80,6 @@ class Pendulum(WithAttitude):
         return not any(self.axis)
 
     def motion(self, time: BallLike) -> tuple[list[BallLike], Carry]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self)
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
 

@@ -35,7 +35,6 @@ class Staude(WithAttitude):
         require("A permanent rotation", (equilibrium(self.system),), self.top, self.start)
 
     def motion(self, time: BallLike) -> tuple[list[Any], Carry]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         parameters = self.system.parameters(self.top, self.start)
         omega = self.system.angular_velocity(parameters, self.start.flat)
         return balls(self.start.omega), lambda fixed: rotate(fixed, omega, time)

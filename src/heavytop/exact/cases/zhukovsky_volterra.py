@@ -130,7 +130,6 @@ class ZhukovskyVolterra(ClosedForm):
         return Winding((a1 * a1 - a0 * a2) / a0, slope, a1 / a0, -a0)
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         if self.permanent:
             return [*balls(self.start.omega), *rotate(balls(self.start.gamma), self.start.omega, instant(time))]
         momentum, point, inverse = self._momentum(time)
@@ -151,7 +150,6 @@ class ZhukovskyVolterra(ClosedForm):
         return to_bits(evaluate, bits, self.own_time(time))
 
     def own_time(self, time: Fraction) -> Fraction:
-        """See :class:`heavytop.exact.closed_form.Evaluated`."""
         if "unit" not in self.made:
             parameters = HEAVY_GYROSTAT.parameters(self.top, self.start)
             self.made["unit"] = Fraction(2) ** unit_of_time(parameters, self.start.flat)

@@ -378,7 +378,7 @@ def _from_roots(roots: _Roots) -> Lattice:
     e, _, pair = roots.values
     apart = acb(e.real - pair.real, pair.imag)
     # √(e − pair) has these real and imaginary parts; each from the sum that does not cancel
-    size = (apart.real**2 + apart.imag**2).sqrt()
+    size = (apart.real * apart.real + apart.imag * apart.imag).sqrt()
     larger = ((size + abs(apart.real)) / 2).sqrt()
     smaller = apart.imag / (2 * larger)
     along, across = (larger, smaller) if apart.real > 0 else (smaller, larger)

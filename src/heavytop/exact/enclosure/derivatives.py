@@ -277,15 +277,12 @@ def _errors(tangent: Tangent, step: Step, columns: Columns) -> tuple[float, floa
     moved = factor * 2 * h * q * _ldexp(widest, -tangent.precision) * (step.powers + step.summed_error) * _UP
     of_sigma = 0.0
     if tangent.data:
-        gq, gl = (max(float(value) for value in bounds) * _UP for bounds in zip(*_slopes(tangent), strict=True))
+        slopes = [(datum.field.q, datum.field.l) for datum in tangent.data]
+        gq, gl = (max(float(value) for value in bounds) * _UP for bounds in zip(*slopes, strict=True))
         off = h * widest * (2 * q * float(sums[size:].max()) + 2 * gq * reach + gl) * _UP
         of_sigma = factor * (_defect(tangent, step, columns, h, (gq, gl)) + off) * _UP
     found = (of_phi * _UP, of_sigma * _UP, moved * _UP)
     return found if all(value < inf for value in found) else None
-
-
-def _slopes(tangent: Tangent) -> list[tuple[Fraction, Fraction]]:
-    return [(datum.field.q, datum.field.l) for datum in tangent.data]
 
 
 def _defect(

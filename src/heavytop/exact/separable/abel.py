@@ -231,7 +231,6 @@ class Rest:
         self.column = [arb(0), arb(0)]
 
     def position(self, phase: Balls) -> Balls:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return phase * 0 + self.middle
 
     def density(self, v: Balls) -> Balls:
@@ -243,7 +242,6 @@ class Rest:
         return phase * 0, phase * 0
 
     def bend(self, phase: Balls) -> Balls:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return phase * 0
 
     def phase(self, v: arb, slope: arb) -> arb:
@@ -251,11 +249,9 @@ class Rest:
         return arb(0)
 
     def integrals(self, phase: arb) -> list[arb]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return [arb(0), arb(0)]
 
     def estimates(self, phase: float) -> NDArray[np.float64]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return np.zeros(2)
 
 
@@ -273,7 +269,6 @@ class RestingVariable:
 
     @property
     def column(self) -> list[arb]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return [self._combined(*self.variable.column)]
 
     def density(self, v: Balls) -> Balls:
@@ -281,11 +276,9 @@ class RestingVariable:
         return (v - self.place) * self.variable.density(v)
 
     def integrals(self, phase: arb) -> list[arb]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return [self._combined(*self.variable.integrals(phase))]
 
     def estimates(self, phase: float) -> NDArray[np.float64]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         first, second = self.variable.estimates(phase)
         return np.array([second - float(self.place) * first])
 

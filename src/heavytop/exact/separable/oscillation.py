@@ -153,7 +153,6 @@ class Gap:
         return [2 * arb.pi() * mean for mean in self.means]
 
     def position(self, phase: Balls) -> Balls:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         return self.middle + self.reach * phase.cos()
 
     def ends(self, phase: Balls) -> tuple[Balls, Balls]:
@@ -174,7 +173,6 @@ class Gap:
         return arb.pi() + arb.atan2(-sine, -cosine)
 
     def integrals(self, phase: arb) -> list[arb]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         sums = self.sums.at(phase)
         return [c * phase + total + e for c, total, e in zip(self.means, sums, self.errors, strict=True)]
 
@@ -373,18 +371,15 @@ class Approach:
         return even_rows(lambda cosine: values(self.turning + self.length * (1 - cosine) / 2), self.terms)
 
     def position(self, phase: Balls) -> Balls:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         ratio, _ = tanh_sech(phase)
         return self.turning + self.length * (ratio * ratio)
 
     def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         ratio, rest = tanh_sech(phase)
         turning, limit = self.root * ratio, self.root * rest
         return (turning, limit) if self.length > 0 else (limit, turning)
 
     def bend(self, phase: Balls) -> Balls:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         _, rest = tanh_sech(phase)
         return rest * (-2 if self.length > 0 else 2)
 
@@ -394,12 +389,10 @@ class Approach:
         return (slope / (2 * left) * (self.length / left).sqrt()).asinh()
 
     def integrals(self, phase: arb) -> list[arb]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         sums = self.sums.at(2 * (phase / 2).tanh().atan())
         return [c * phase + total + e for c, total, e in zip(self.column, sums, self.errors, strict=True)]
 
     def estimates(self, phase: float) -> NDArray[np.float64]:
-        """See :class:`heavytop.exact.separable.abel.Variable`."""
         angle = 2 * atan(tanh(phase / 2))
         found: NDArray[np.float64] = self._rate_floats * phase + self._floats @ np.sin(self._orders * angle)
         return found

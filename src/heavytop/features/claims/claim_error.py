@@ -96,7 +96,7 @@ def _difference(claim: Values[arb], claimed_xi: Sequence[arb], state: Sequence[a
         gamma = tuple(state[3:6])
         claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
         true = euler_angles(gamma, tuple(xi), FUNCTIONS)
-        phi, theta, psi = (_modulo_turn(a - b) for a, b in zip(claimed, true, strict=True))
+        phi, theta, psi = (arb.atan2((a - b).sin(), (a - b).cos()) for a, b in zip(claimed, true, strict=True))
         return ModelError(
             largest(a - b for a, b in zip(claim.omega, state[:3], strict=True)),
             largest(a - b for a, b in zip(claim.gamma, gamma, strict=True)),
@@ -105,10 +105,6 @@ def _difference(claim: Values[arb], claimed_xi: Sequence[arb], state: Sequence[a
             psi,
             rotation_angle((claim.gamma, claimed_xi), (gamma, tuple(xi)), FUNCTIONS),
         )
-
-
-def _modulo_turn(angle: arb) -> arb:
-    return arb.atan2(angle.sin(), angle.cos())
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,9 @@ def audit(
     from heavytop.features.claims.audit.guard import SECONDS
 
     if library or not claim:
-        return _library(claim, system, branch, json) if library else _no_claim()
+        if not library:
+            raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
+        return _library(claim, system, branch, json)
     if branch is not None:
         require_branch(branch)
     if claim in PAPER:
@@ -55,10 +57,6 @@ def audit(
 
         show_on_terminal(audit_text(report))
     return report.exit_code
-
-
-def _no_claim() -> int:
-    raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
 
 
 def _library(claim: str, system: str | None, branch: str | None, json: bool) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.features.claims.claim_error import Compared, Curves, Drawings, PaperCurve, Portrait
+from heavytop.features.claims.claim_error import Compared, Drawings, PaperCurve, Portrait
 from heavytop.features.claims.library.ershkov import Branch
 from heavytop.report.document.svg import document, new_figure
 
@@ -120,7 +120,8 @@ def _comparison(compared: Compared) -> Any:
     names = ("φ (rad)", "θ (rad)", "ψ (rad)", "Ω1", "Ω2", "Ω3")
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=True)):
         for label, curves, colour, style, width in drawn:
-            axes.plot(curves.times, _column(curves, index), style, color=colour, lw=width, label=label)
+            column = curves.angles[:, index] if index < 3 else curves.states[:, index - 3]
+            axes.plot(curves.times, column, style, color=colour, lw=width, label=label)
         for branch, found in compared.parted.items():
             if found:
                 colour, dashes = _LINES[branch]
@@ -135,10 +136,6 @@ def _comparison(compared: Compared) -> Any:
         f"Claim, gyrostat and truth: $I_1=I_2$, $I_1/I_3={compared.ratio}$, $\\alpha=1$; truth: {compared.method}"
     )
     return figure
-
-
-def _column(curves: Curves, index: int) -> Any:
-    return curves.angles[:, index] if index < 3 else curves.states[:, index - 3]
 
 
 def _portrait(portrait: Portrait) -> Any:
@@ -159,9 +156,7 @@ def _portrait(portrait: Portrait) -> Any:
         axes.set(xlabel="M1", ylabel="M2", zlabel="M3")
         axes.set_box_aspect((1, 1, 1))
         axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-        axes.set_xticks([-1, 0, 1])
-        axes.set_yticks([-1, 0, 1])
-        axes.set_zticks([-1, 0, 1])
+        axes.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1], zticks=[-1, 0, 1])
         axes.view_init(elev=25, azim=50)
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.2), frameon=False)
     figure.suptitle("$I_1=I_2=2I_3$, $\\alpha=1$, $I_1=1$")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from textwrap import fill, wrap
-from typing import Protocol
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.features.claims.audit.audit import Judged
+from heavytop.features.claims.api import ClaimLibrary
 from heavytop.features.claims.audit.judge import ABOUT, VERDICTS, Audit, StatementVerdict
 from heavytop.features.claims.audit.values import SIZES
 from heavytop.features.claims.library.entry import Entry
@@ -21,23 +20,7 @@ _HEADS = {"holds": "Proven", "refuted": "Refuted", "undecided": "Undecided"}
 _STYLES = {"holds": "green", "refuted": "bold red", "undecided": "yellow"}
 
 
-class Listed(Protocol):
-    """Entries with their verdicts."""
-
-    @property
-    def entries(self) -> Sequence[Entry]: ...
-
-    @property
-    def verdicts(self) -> dict[str, Judged]: ...
-
-    @property
-    def changed(self) -> Sequence[str]: ...
-
-    @property
-    def undecided(self) -> Sequence[str]: ...
-
-
-def claims_text(found: Listed) -> RenderableType:
+def claims_text(found: ClaimLibrary) -> RenderableType:
     """The entries by verdict: id, title and source of each."""
     parts: list[RenderableType] = []
     for verdict, head in _HEADS.items():
@@ -59,7 +42,7 @@ def _folded(text: str, indent: int) -> list[str]:
     return wrap(text, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
-def unexpected_text(found: Listed) -> RenderableType:
+def unexpected_text(found: ClaimLibrary) -> RenderableType:
     """How many verdicts are the expected ones, and each that is not."""
     off = [entry for entry in found.entries if entry.id in (*found.changed, *found.undecided)]
     total = f"{len(found.entries) - len(off)} of {len(found.entries)} verdicts are the expected ones."

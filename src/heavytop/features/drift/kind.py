@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
-from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, run_with_attitude
 from heavytop.integrate.trajectory import Problem, ResumePoint, Trajectory
 from heavytop.kind import Kind, with_explanation
-from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
@@ -31,7 +29,7 @@ NAME = "drift"
 
 
 class Extent(NamedTuple):
-    """What is measured of a run beside the usual, or not."""
+    """Measurements of a run beside the usual."""
 
     attitude: bool = False
     noise: bool = True
@@ -51,6 +49,7 @@ class DriftTable(PlanTable, tag=NAME):
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too: of an integrator
     that declares that it carries the attitude; others are given Ω and γ alone, and the flag of the row says so.
     noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
+    step: of an integrator with fixed steps, in the place of its own.
     """
 
     cases: list[str]
@@ -58,18 +57,21 @@ class DriftTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
     attitude: bool = False
     noise: bool = True
+    step: str = ""
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         runs = []
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")
             runs.append((parse(run.precision).name, time_text(horizon), uniform(horizon, run.samples)))
-        subject = computed(self.integrator)
+        if self.step:
+            positive([self.step], "step")
+        subject = computed(self.integrator, step=self.step)
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
-                "",
+                f"/step={self.step}" if self.step else "",
                 self.integrator,
                 case,
                 *times,
@@ -98,8 +100,8 @@ class DriftKind(Kind):
         return (0.8 if task.options.noise else 0.1) + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
-        place reached with other flags.
+        """Measure one run.  Raises Contradiction where two proofs of the motion exclude each other, InputError for
+        a place reached with other flags.
         """
         if task.options.attitude and task.integrator.carries_attitude:
             return _with_attitude(task)
@@ -157,15 +159,8 @@ def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
 
 
 def _with_attitude(task: Task) -> Row:
-    """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
-    case, precision, integrator = task.given, task.precision, task.integrator
-    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
-    xi = resolve(case.body or case.top, case.given_start or case.start).xi
-    problem = Problem.of(case.top, case.start, precision, case.system, xi)
-    known = truth(replace(problem, xi=None), times)
-    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
-    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
-    return _row(task, run, scorer)
+    """The row of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
+    return _row(task, *run_with_attitude(task))
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

@@ -9,7 +9,7 @@ from typing import Any, overload
 
 from heavytop import arguments
 from heavytop.arguments import Number
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
@@ -31,7 +31,7 @@ from heavytop.measure.reference import DIGITS, Ball
 from heavytop.precision import DOUBLE, Precision, as_integer, exact, exact_text, physical
 from heavytop.top.amplification import amplification
 from heavytop.top.bodies import Body
-from heavytop.top.equations import HEAVY_TOP, System, area, energy
+from heavytop.top.equations import System, area, energy
 from heavytop.top.heavy_top import HeavyTop, State
 
 _DATA_BITS = 192
@@ -123,74 +123,34 @@ def events(
     if digits is None:
         form = arguments.precision(precision)
         body, state = arguments.motion(top, start, form)
-        return computed_events(
-            body,
-            state,
-            _until(until),
-            which,
-            way,
-            form,
-            integrator,
-            arguments.system(system, body),
-            arguments.tolerance(tolerance, form),
-            arguments.steps(step_limit),
-            most,
-            reached,
-        )
+        setup = Setup.of(body, state, form, arguments.system(system, body))
+        named_one, axes = named(integrator), None if setup.frame is None else setup.frame.axes
+        end, limits = _until(until), (arguments.tolerance(tolerance, form), arguments.steps(step_limit))
+        if which.rational:
+            own = which if axes is None else in_body_axes(which, axes)
+            first_term(own, setup.system, setup.system.parameters(setup.top, setup.start), setup.start.flat)
+        run = dense(named_one, setup.problem, end, *limits)
+        return locate(run, str(named_one), which, way, most, reached, axes)
     if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
         raise InputError(
             "Proven events (digits) know no precision, integrator, tolerance or step_limit.",
             "Leave these out, or digits.",
         )
     body, state = arguments.motion(top, start, of_any_size=True)
-    return known_events(
-        body,
-        state,
-        _until(until),
-        which,
-        way,
-        as_integer(digits, "digits"),
-        arguments.system(system, body),
-        most,
-        reached,
-    )
+    known = _until(until), which, way, as_integer(digits, "digits"), arguments.system(system, body), most, reached
+    return _known_events(body, state, *known)
 
 
-def computed_events(
-    top: HeavyTop | Body,
-    start: State,
-    until: Fraction,
-    function: EventFunction,
-    direction: int,
-    form: Precision,
-    integrator: str,
-    system: System = HEAVY_TOP,
-    tolerance: Fraction | None = None,
-    step_limit: int | None = None,
-    limit: int | None = None,
-    reached: Reached | None = None,
-) -> Events:
-    """Events of a motion that was checked; ``reached`` is called with the time of each step."""
-    setup = Setup.of(top, start, form, system)
-    axes = None if setup.frame is None else setup.frame.axes
-    if function.rational:
-        own = function if axes is None else in_body_axes(function, axes)
-        first_term(own, system, system.parameters(setup.top, setup.start), setup.start.flat)
-    name = named(integrator)
-    run = dense(name, setup.problem, until, tolerance, step_limit)
-    return locate(run, str(name), function, direction, limit, reached, axes)
-
-
-def known_events(
+def _known_events(
     top: HeavyTop | Body,
     start: State,
     until: Fraction,
     function: EventFunction,
     direction: int,
     digits: int,
-    system: System = HEAVY_TOP,
-    limit: int | None = None,
-    reached: Reached | None = None,
+    system: System,
+    limit: int | None,
+    reached: Reached | None,
 ) -> ReferenceEvents:
     """Proven events of a motion that was checked."""
     if digits not in DIGITS:
@@ -264,7 +224,7 @@ def poincare(
         raise InputError("There are no starts.", "Give at least one State.")
     found: list[Events | ReferenceEvents] = []
     for place, start in enumerate(listed):
-        try:
+        with prefixed(f"Start {place}"):
             found.append(
                 events(
                     top, start, until, function, direction, precision, integrator=integrator, system=system, limit=limit
@@ -272,8 +232,6 @@ def poincare(
                 if digits is None
                 else events(top, start, until, function, direction, digits=digits, system=system, limit=limit)
             )
-        except InputError as error:
-            raise InputError(f"Start {place}: {error.cause}", error.remedy) from None
     about = arguments.system(system, top)
     own = [resolve(top, start) for start in listed]
     parameters = [about.parameters(each.top, each.start) for each in own]

@@ -273,7 +273,7 @@ def _evaluated(node: ast.expr, source: str, depth: int = 0) -> Ratio:
         raise RecursionError
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
         left, right = (_evaluated(part, source, depth + 1) for part in (node.left, node.right))
-        return _as_ratio(_OPERATIONS[type(node.op)](left, right))
+        return Ratio.of(_OPERATIONS[type(node.op)](left, right))
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
         value = _evaluated(node.operand, source, depth + 1)
         return -value if isinstance(node.op, ast.USub) else value
@@ -285,10 +285,6 @@ def _evaluated(node: ast.expr, source: str, depth: int = 0) -> Ratio:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         return Ratio.of(exact(ast.get_source_segment(source, node) or ""))  # as it is written, not as a double
     raise InputError(f"{quoted(ast.unparse(node))} is not part of a rational function.", _REMEDY)
-
-
-def _as_ratio(value: Any) -> Ratio:
-    return value if isinstance(value, Ratio) else Ratio.of(value)
 
 
 def in_body_axes(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
@@ -341,11 +337,6 @@ def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     for index, rate in enumerate(field):
         found = found + polynomial.derivative(index) * rate
     return found
-
-
-def by_omega(polynomial: Any) -> list[Any]:
-    """∂f/∂Ω_i of a polynomial, three of them."""
-    return [polynomial.derivative(index) for index in range(3)]
 
 
 def _rational(value: Any) -> fmpq:

@@ -32,7 +32,6 @@ from heavytop.exact.enclosure.step import Step
 from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.features.events.functions import (
     EventFunction,
-    by_omega,
     composed,
     first_term,
     in_body_axes,
@@ -350,7 +349,7 @@ def _terms(function: EventFunction, solution: Validated, order: int) -> _Terms:
         first = rate_along(first, system, parameters)
     value, rate, below, first = map(terms_of, (function.numerator, rate, function.denominator, first))
     lacking = Fraction(0) if solution.uncertainty is None else solution.uncertainty.rate
-    derivatives = [terms_of(part) for part in by_omega(function.numerator)] if lacking else []
+    derivatives = [terms_of(function.numerator.derivative(i)) for i in range(3)] if lacking else []
     return _Terms(value, rate, below, first, derivatives, lacking)
 
 
@@ -437,10 +436,6 @@ def _rotated(axes: Any, vector: Sequence[arb]) -> list[arb]:
     return [sum((ball(a) * x for a, x in zip(row, vector, strict=True)), arb(0)) for row in axes]
 
 
-def _component(index: int) -> Callable[[_Piece], Any]:
-    return lambda piece: piece.components[index]
-
-
 @whole_evaluation
 def _refined(
     pieces: Sequence[_Piece],
@@ -463,7 +458,7 @@ def _refined(
         middle, half = (low + high) / 2, (high - low) / 2
         unit = ball(sign / motion.scaled.rate)
         time = (ball(middle) + arb(0, ball(half).upper())) * unit
-        state = [_hull(pieces, _component(index), low, high) for index in range(6)]
+        state = [_hull(pieces, lambda piece, i=index: piece.components[i], low, high) for index in range(6)]  # type: ignore[misc]
         if axes is not None:
             state = [*_rotated(axes, state[:3]), *_rotated(axes, state[3:])]
         below = _sign(_hull(pieces, lambda piece: piece.below, low, high))

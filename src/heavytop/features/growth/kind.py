@@ -69,7 +69,7 @@ class GrowthRun(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def options(self) -> dict[str, Any]:
-        """Those of the integrator."""
+        """The options of the integrator."""
         tolerance = {} if self.tolerance is None else {"tolerance": exact(self.tolerance)}
         return tolerance | ({"high_accuracy": True} if self.high_accuracy else {})
 
@@ -82,7 +82,7 @@ class GrowthTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
 
 
@@ -115,7 +115,7 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
 
 
 class _Done(msgspec.Struct):
-    """What of a row is done, by the index of the start: its text is the place of a row in progress."""
+    """The finished motions of a row, by the index of the start: its text is the place of a row in progress."""
 
     motions: dict[int, Ended]
 
@@ -133,11 +133,11 @@ class Growth(Kind):
         return super().carries_band(metric) and metric.quantity != FAILED
 
     def least_band(self, starts: int) -> float:
-        """Of a root mean square over a few starts, of which none may have drawn the tail that those of a rerun do."""
+        """The band of an RMS over a few starts, of which none may have drawn the tail that those of a rerun do."""
         return _BAND_OF_ONE / math.sqrt(starts)
 
     def cost(self, task: Task) -> float:
-        """Of all starts, a few of them side by side."""
+        """The cost of all starts, a few of them side by side."""
         return 5.0 + int(task.options.starts) * task.run_seconds / 2
 
     def measure(self, task: Task, saved: Saved) -> Row:
@@ -262,7 +262,7 @@ def _row(
 
 
 def _label(law: Law) -> str:
-    """What a law is about."""
+    """The quantity of a law, in words."""
     quantity = law.quantity or Quantity("")
     if quantity.name == DRIFT:
         return quantity.component

@@ -207,7 +207,7 @@ class BreakAwayLaw(Kind):
             yield f"{OFF_BY.text}: {found[2]}, where the slope is {found[0]} and {found[1]} is expected"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """What a bit of the format buys, and how far that is from the law; a line a case."""
+        """The time that a bit of the format buys, and how far that is from the law; a line a case."""
         slopes, off = ([float(row.metrics[each.text]) for row in rows if row.metrics] for each in (SLOPE, OFF_BY))
         if slopes:
             low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"

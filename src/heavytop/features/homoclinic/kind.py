@@ -52,7 +52,7 @@ class HomoclinicTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         tasks = []
         for case in map(find, self.cases):
             spacing = Fraction(round(64 / (samples(self.samples) * case.rate)) or 1, 64)
@@ -180,7 +180,7 @@ def _errors(row: Row) -> dict[str, Metric | None]:
 
 
 def _hidden(rows: Iterable[Row]) -> Iterator[str]:
-    """What an escape time does not show: a run that stays as long as heyoka's and is worse in another way."""
+    """Losses that an escape time does not show: a run that stays as long as heyoka's and is worse in another way."""
     ours = {(row.key.case, row.precision): row for row in rows if _by(row, HEYOKA)}
     for row in rows:
         own = ours.get((row.key.case, row.precision), row)

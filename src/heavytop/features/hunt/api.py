@@ -17,7 +17,7 @@ from heavytop.features.hunt.search import hunt as search
 from heavytop.features.hunt.text import hunt_text
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import close_all
-from heavytop.integrate.registry import IntegratorSource, named
+from heavytop.integrate.registry import named
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE_DOUBLE, Precision, as_integer, exact, physical, time_text
 
@@ -28,7 +28,7 @@ _BUDGET = 'Give a number of motions, "5000", or seconds, "60s".'
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """What a hunt came to; prints as `heavytop hunt` does.
+    """The result of a hunt; prints as `heavytop hunt` does.
 
     found: a dict each, worst first: exact texts of ``inertia``, ``weight``, ``centre``, ``omega`` and ``gamma`` after
     shrinking, ``system``, ``digits_lost``, ``ratio`` to the other integrator's error (None where one was aborted),
@@ -47,7 +47,7 @@ class Hunt:
         return hunt_text(self.hunted, self.found, self.again)
 
     def document(self) -> dict[str, Any]:
-        """What `heavytop hunt --json` prints."""
+        """The document of `heavytop hunt --json`."""
         return {"found": self.found, "motions": self.motions, "seed": self.seed}
 
 
@@ -82,33 +82,11 @@ def hunt(
     Raises:
         InputError: for an unknown integrator or family, an impossible budget, horizon, limit or seed.
     """
-    which = named(integrator)
-    form = arguments.precision(precision)
-    asked = asked_for(which, form, horizon, budget, family, against, limit, seed)
-    try:
-        hunted = search(asked, arguments.callback(advance, "advance"))
-    finally:
-        close_all()
-    name = integrator if isinstance(integrator, str) else asked.integrator.name
-    again = _again(asked, name, against, hunted.planned)
-    return Hunt(documents(hunted, name), hunted.motions, asked.seed, hunted, again)
-
-
-def asked_for(
-    which: str | IntegratorSource,
-    form: Precision,
-    horizon: Number,
-    budget: int | str,
-    family: str,
-    against: str | Callable[..., Any] | None,
-    limit: Number | None,
-    seed: int,
-) -> Asked:
-    """The search, checked; raises InputError as :func:`hunt` does."""
-    registry.require(which)
+    which, form = named(integrator), arguments.precision(precision)
     other = None if against is None else named(against)
-    if other is not None:
-        registry.require(other)
+    for each in (which, other):
+        if each is not None:
+            registry.require(each)
     if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")
@@ -116,19 +94,21 @@ def asked_for(
         raise InputError("horizon = 0 is no time.", "Give a time other than 0, such as 100.")
     if which == "heyoka" and form == DOUBLE_DOUBLE:
         raise InputError("heyoka has no double-double.", "Use --integrator multiword, or another format.")
-    number, seconds = _budget(budget)
+    motions, seconds = _budget(budget)
     beyond = None if limit is None else float(physical(exact(limit), "limit"))
     if beyond is not None and not beyond > 0:
         raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
     if other is not None and other == which:
         raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
-    one, two = _integrator(which), None if other is None else _integrator(other)
-    families: dict[str, Family] = {each: each for each in FAMILIES}
-    return Asked(one, form, time, families[family], two, beyond, number, seconds, _seed(seed))
-
-
-def _integrator(which: str | IntegratorSource) -> ChosenIntegrator:
-    return ChosenIntegrator(which) if isinstance(which, str) else ChosenIntegrator(which.name, source=which)
+    pair = ChosenIntegrator.of(which), None if other is None else ChosenIntegrator.of(other)
+    asked = Asked(pair[0], form, time, family, pair[1], beyond, motions, seconds, _seed(seed))
+    try:
+        hunted = search(asked, arguments.callback(advance, "advance"))
+    finally:
+        close_all()
+    name = integrator if isinstance(integrator, str) else asked.integrator.name
+    again = _again(asked, name, against, hunted.planned)
+    return Hunt(documents(hunted, name), hunted.motions, asked.seed, hunted, again)
 
 
 def _seed(value: int) -> int:

@@ -122,14 +122,8 @@ def _hello(integrator: ChosenIntegrator) -> int:
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
     with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
-        follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], _double())
+        follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], DOUBLE)
     return os.getpid()
-
-
-def _double() -> Precision:
-    from heavytop.precision import DOUBLE
-
-    return DOUBLE
 
 
 # Motions that a hunt tries: drawn at random in ways that integrators find hard, and changed from the worst so far.
@@ -163,11 +157,11 @@ class Dice:
         return int(count * self._random())
 
     def pick(self, things: Sequence[_T]) -> _T:
-        """One of them."""
+        """Any of these things."""
         return things[self.below(len(things))]
 
     def part(self) -> Fraction:
-        """Of (−1, 1), in thousandths."""
+        """A number of (−1, 1), in thousandths."""
         return Fraction(2 * self.below(1000) - 999, 1000)
 
     def power(self, least: int, most: int) -> Fraction:
@@ -313,7 +307,7 @@ def _scaled(motion: Motion, dice: Dice) -> Motion:
 
 
 def _faster(motion: Motion, dice: Dice) -> Motion:
-    """The same path at another pace: Ω times s, the weight times s²."""
+    """Another pace on the same path: Ω times s, the weight times s²."""
     top, start = motion
     pace = dice.power(-6, 1)
     omega = [pace * value for value in start.omega]
@@ -495,7 +489,7 @@ class Meter:
         return follow(integrator, *motion, self.times, self.precision)
 
     def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
-        """The same with the amplification over all directions and from every time on."""
+        """The motion with the amplification over all directions and from every time on."""
         problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
         largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
         return replace(found, amplification=max(largest, found.amplification))

@@ -67,7 +67,7 @@ def digits(value: Fraction) -> int:
 
 
 def complexity(motion: Motion) -> tuple[int, int, int]:
-    """What shrinking makes smaller: digits, numbers that are neither 0 nor 1, different numbers and signs."""
+    """The measure that shrinking lowers: digits, numbers that are neither 0 nor 1, different numbers and signs."""
     top, start = motion
     values = [*top.inertia, top.weight, *top.centre, *(top.rotor or ()), *start.omega, *start.gamma]
     odd = sum(value not in (0, 1) for value in values)
@@ -75,9 +75,9 @@ def complexity(motion: Motion) -> tuple[int, int, int]:
     return sum(map(digits, values)), odd + len(set(top.inertia)), sizes
 
 
-def shrunk(motion: Motion, shows: Shows, rounds: int = _MOST_ROUNDS) -> Motion:
+def shrunk(motion: Motion, shows: Shows) -> Motion:
     """A motion that shows the same and of which no single change that is tried makes a simpler one that does."""
-    for _ in range(rounds):
+    for _ in range(_MOST_ROUNDS):
         before = complexity(motion)
         for change in _CHANGES:
             motion = _first(motion, change(motion), shows)
@@ -112,7 +112,7 @@ def _of_body(motion: Motion) -> Iterator[Motion]:
 
 
 def _of_units(motion: Motion) -> Iterator[Motion]:
-    """The same motion in other units of mass and length."""
+    """Other units of mass and length for one motion."""
     top, start = motion
     for unit in {value for value in top.inertia if value != 1}:
         inertia = [value / unit for value in top.inertia]
@@ -147,20 +147,21 @@ def _of_inertia(motion: Motion) -> Iterator[Motion]:
                         yield with_data(top, inertia, top.weight, top.centre), start
 
 
-def _of_weight(motion: Motion) -> Iterator[Motion]:
-    top, start = motion
-    for simple in _simpler(top.weight):
-        yield with_data(top, top.inertia, simple, top.centre), start
+def _of_number(place: int) -> Callable[[Motion], Iterator[Motion]]:
+    """The weight, a component of the centre or of Ω."""
 
-
-def _of_centre(place: int) -> Callable[[Motion], Iterator[Motion]]:
     def change(motion: Motion) -> Iterator[Motion]:
         top, start = motion
-        for simple in _simpler(top.centre[place]):
-            centre = [simple if i == place else each for i, each in enumerate(top.centre)]
-            yield with_data(top, top.inertia, top.weight, centre), start
+        numbers = [top.weight, *top.centre, *start.omega]
+        for simple in _simpler(numbers[place]):
+            weight, *vectors = _replaced(numbers, place, simple)
+            yield with_data(top, top.inertia, weight, vectors[:3]), State(vectors[3:], start.gamma)
 
     return change
+
+
+def _replaced(values: Sequence[Fraction], place: int, value: Fraction) -> list[Fraction]:
+    return [value if i == place else each for i, each in enumerate(values)]
 
 
 def _of_rotor(motion: Motion) -> Iterator[Motion]:
@@ -170,17 +171,7 @@ def _of_rotor(motion: Motion) -> Iterator[Motion]:
         yield with_data(top, rotor_times=0), start
         for place, value in enumerate(top.rotor):
             for simple in _simpler(value):
-                rotor = [simple if i == place else each for i, each in enumerate(top.rotor)]
-                yield HeavyTop(top.inertia, top.weight, top.centre, rotor), start
-
-
-def _of_omega(place: int) -> Callable[[Motion], Iterator[Motion]]:
-    def change(motion: Motion) -> Iterator[Motion]:
-        top, start = motion
-        for simple in _simpler(start.omega[place]):
-            yield top, State([simple if i == place else each for i, each in enumerate(start.omega)], start.gamma)
-
-    return change
+                yield HeavyTop(top.inertia, top.weight, top.centre, _replaced(top.rotor, place, simple)), start
 
 
 def _of_gamma(motion: Motion) -> Iterator[Motion]:
@@ -232,9 +223,7 @@ _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
     _of_units,
     _of_gamma,
     _of_inertia,
-    _of_weight,
-    *(_of_centre(place) for place in range(3)),
-    *(_of_omega(place) for place in range(3)),
+    *map(_of_number, range(7)),
     _of_rotor,
 )
 
@@ -244,7 +233,7 @@ _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What is known of a found motion.
+    """The proof of a found motion.
 
     error: at least so large, where the truth is proven; as computed, where it is not.  other: that of the integrator
     that it is shown beside; None where that is unknown.  against: how the true motion is known.
@@ -315,7 +304,7 @@ Advance = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What is hunted.
+    """A search to be made.
 
     budget: motions, or None for ``seconds`` of processor time.  limit: in eps T^1.5, or the ratio to ``against``; None
     for two decades beyond what is explained.  first: motions that are measured before all others.
@@ -339,7 +328,7 @@ class Asked:
 
     @property
     def other(self) -> ChosenIntegrator:
-        """What the errors are shown beside: heyoka, or multiword where heyoka is hunted or lacks the format."""
+        """The integrator shown beside: heyoka, or multiword where heyoka is hunted or lacks the format."""
         if self.against is not None:
             return self.against
         own = self.integrator.name == HEYOKA or self.precision.name == "double-double"
@@ -348,7 +337,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Hunted:
-    """What came of it: found motions, shrunk and worst first; the worst that are explained; motions that were tried.
+    """The result of a search: found motions, shrunk and worst first; the worst that are explained; motions tried.
 
     law: the error over eps, amplification and √turns that nine tenths of the random tops stay below.
     median: of the errors of random tops.  unknown: motions whose truth was out of reach.  lost: whose amplification
@@ -454,7 +443,7 @@ class _Hunt:
         return m.explained(self.eps) * max(self.law, 1.0) > _LOST
 
     def _score(self, m: MeasuredMotion) -> float:
-        """What the search makes large: the error over what is explained, or over that of ``against``."""
+        """The measure that the search makes large: the error over what is explained, or over that of ``against``."""
         if not m.outcome or (self._is_lost(m) and not math.isinf(m.error)):
             return 0.0
         return m.error / max(self._beside(m), 1e-300)
@@ -527,7 +516,7 @@ class _Hunt:
 
 
 def _shape(motion: Motion) -> object:
-    """What is the same of motions that differ in the names and senses of their axes alone, or nearly."""
+    """A key that motions share which differ in the names and senses of their axes alone, or nearly."""
     top, start = motion
     vectors = (top.moment, top.rotor or (Fraction(0),) * 3, start.omega, start.gamma)
     axes = zip(top.inertia, *(map(abs, each) for each in vectors), strict=True)

@@ -1,4 +1,4 @@
-"""What a hunt came to, for people."""
+"""The result of a hunt, for people."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def hunt_text(hunted: Hunted, found: Sequence[dict[str, Any]], again: str) -> st
 
 
 def law_text(hunted: Hunted) -> str:
-    """What explains an error of this integrator."""
+    """The law that explains an error of this integrator."""
     return (
         f"{hunted.law:.2g} eps times the motion's own amplification times the root of its radians, "
         "the law of nine tenths of the random tops"

@@ -21,7 +21,7 @@ import numpy
 
 from heavytop.features.local_error.measurement import Call
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import Array, decimal_text, exact
+from heavytop.precision import Array, decimal_text, exact, plain_decimal
 from heavytop.records import Explained
 from heavytop.top.equations import NAMES, Parameters, System
 
@@ -170,7 +170,7 @@ class _Steps:
 
 
 def _weights(order: int) -> dict[int, float]:
-    """Of the ends after h, 2 h and 4 h: 1 for what is proportional to the length, 0 for its powers p + 1 and p + 2."""
+    """Weights of the ends after h, 2 h and 4 h: 1 of what is linear in the length, 0 of its powers p + 1 and p + 2."""
     n = numpy.array(_LENGTHS, dtype=float)
     found = numpy.linalg.solve(numpy.array([n, n ** (order + 1), n ** (order + 2)]), [1.0, 0.0, 0.0])
     return dict(zip(_LENGTHS, found.tolist(), strict=True))
@@ -204,7 +204,7 @@ def field_fault(problem: Problem, calls: Sequence[Call], order: int) -> Explaine
 
 def _plainness(fit: tuple[_Factor, Fraction, float]) -> tuple[bool, int]:
     """Smaller of a simpler explanation: what is left out or negated before what is multiplied, few digits first."""
-    return fit[1] not in (0, -1), len(_text(fit[1], 12))
+    return fit[1] not in (0, -1), len(plain_decimal(fit[1], 12))
 
 
 def _rounded(steps: _Steps, factor: _Factor, s: float, left: float) -> tuple[Fraction, float]:
@@ -216,14 +216,9 @@ def _rounded(steps: _Steps, factor: _Factor, s: float, left: float) -> tuple[Fra
     return (number, rounded) if rounded <= _ALIKE * left else (Fraction(s), left)
 
 
-def _text(number: Fraction, digits: int = 8) -> str:
-    text = decimal_text(number, digits)
-    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text
-
-
 def _said(factor: _Factor, number: Fraction) -> str:
     if number == 0:
         return f"{factor.text} is left out"
     if number == -1:
         return f"{factor.text} has the other sign"
-    return f"{factor.text} is {_text(number)} times what it is"
+    return f"{factor.text} is {plain_decimal(number, 8)} times what it is"

@@ -21,7 +21,7 @@ from heavytop.features.local_error.measurement import (
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
-from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.registry import is_third_party, load
 from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
@@ -51,7 +51,7 @@ class LocalErrorTable(PlanTable, tag=NAME):
     integrator: str = HEYOKA
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         times = tuple(positive([self.horizon], "horizon"))
         horizon, subject = time_text(times[-1]), computed(self.integrator)
         return [
@@ -82,15 +82,15 @@ class LocalErrorKind(Kind):
     def measure(self, task: Task, saved: Saved) -> Row:
         """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
         case, precision = task.given, task.precision
-        given = case.top, case.start, task.times[-1], precision, case.system
+        given = case.top, case.start, task.times[-1], precision
         if not task.integrator.one_step:
             return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
         if task.integrator.capabilities.steps:
-            run, taken = task.integrator.first_steps(*given)
+            run, taken = load(task.integrator.capabilities.steps)(*given, system=case.system)
             steps = zip(run.times, taken, strict=True)
         else:
-            run, steps = single_calls(task.integrator, *given)
+            run, steps = single_calls(task.integrator, *given, case.system)
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
@@ -122,7 +122,7 @@ class LocalErrorKind(Kind):
 
 
 def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
-    """Of a method with a memory: the error at the end, and the order that whole runs show."""
+    """The row of a method with a memory: the error at the end, and the order that whole runs show."""
     if integrator.control is None:
         raise Unsupported(
             f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "

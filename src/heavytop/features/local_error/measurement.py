@@ -84,7 +84,7 @@ class LocalError:
     def _following(
         self, step: TaylorStep | Call, truths: Mapping[int, Sequence[arb]], size: Fraction
     ) -> tuple[Sums, tuple[float, ...]]:
-        """What the errors add up to with this step, and the order seen in it, if any."""
+        """The sums of the errors with this step, and the order seen in it, if any."""
         with working_precision(self.bits):
             scale = ball(self.problem.precision.eps * size)
             gaps = {n: _largest_gap(_end(step, n), true) for n, true in truths.items()}
@@ -315,6 +315,6 @@ def _reached(runs: dict[int, list[Trajectory]], place: int) -> dict[int, Any]:
 
 
 def _from(problem: Problem, state: Sequence[Any]) -> Problem:
-    """The same problem from another state of its format."""
+    """The problem from another state of its format."""
     values = tuple(exact(value) for value in state)
     return replace(problem, start=State(values[:3], values[3:]), given=None)

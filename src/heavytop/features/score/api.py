@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers, required
@@ -28,7 +28,6 @@ from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Drift
 from heavytop.precision import Precision, ordered, vector
 from heavytop.records import Metric, Peer, Report, Row
 from heavytop.report.document.document import short
-from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -38,7 +37,6 @@ PathLike = str | os.PathLike[str]
 # Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.
 
 
-_BODY = "Give heavytop.HeavyTop(inertia, weight, centre) or heavytop.Body(...), and heavytop.State(...)."
 _SHAPES = {"quaternion": "(n, 4)", "matrix": "(n, 3, 3)"}
 
 
@@ -71,57 +69,6 @@ def _observed_rows(values: Any, name: str) -> list[list[Any]]:
     return found
 
 
-def is_plain(top: object, start: object, arrays: Mapping[str, Any], states: bool) -> bool:
-    """Whether these are Ω and γ of a top in principal axes alone."""
-    return states and set(arrays) == {"omega", "gamma"} and isinstance(top, HeavyTop) and _attitude(start) is None
-
-
-def _attitude(start: object) -> Attitude | None:
-    return start.attitude if isinstance(start, State) else None
-
-
-def convention(
-    order: str,
-    quaternion: str,
-    matrix: str,
-    sequence: str,
-    angles: str,
-    up: str,
-    pivot: Numbers,
-    point: Numbers | None,
-) -> Convention:
-    """The conventions of the arrays; raises InputError for a word that is not known."""
-    words = {"quaternion_order": order, "quaternion": quaternion, "matrix": matrix, "angles": angles, "up": up}
-    for name, word in {**words, "sequence": sequence}.items():
-        if not isinstance(word, str):
-            raise InputError(f"{name} = {quoted(word)} is not text.", "Give a str.")
-    where = None if point is None else vector(point, "point")
-    return Convention(**words, sequence=sequence.upper(), pivot=vector(pivot, "pivot"), point=where)
-
-
-def observed_arrays(
-    top: object,
-    start: object,
-    system: System,
-    said: Convention,
-    times: list[Fraction],
-    arrays: Mapping[str, list[list[Any]]],
-    form: Precision | None,
-    names: tuple[str, str],
-    normalize: bool,
-) -> GivenTrajectory:
-    """The trajectory of these arrays.  Raises InputError for what is no body and no start, and as the reading does."""
-    if not isinstance(top, HeavyTop | Body):
-        raise InputError(f"top = {quoted(top)} is no body.", _BODY)
-    if not isinstance(start, State):
-        raise InputError(f"start = {quoted(start)} is not a State.", _BODY)
-    if "euler" in arrays and not said.sequence:
-        raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
-    require_system(system)
-    flag = bool(arguments.flag(normalize, "normalize"))
-    return of_observed_arrays(top, raw_start(start), said, times, arrays, form, names, flag)
-
-
 _PARTS = ("omega", "gamma", "along", "across")
 _LABELS = {
     "omega": "error of Ω",
@@ -149,7 +96,7 @@ class Summary(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Score(Tabular):
-    """What a motion is worth.
+    """The score of a motion.
 
     outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
     drift: |I(t) − I(0)| by the name of the first integral, in its units.
@@ -301,19 +248,27 @@ def score(
         },
         None if states is None else _rows(states),
     )
-    if is_plain(top, start, arrays, states is not None):
-        body, state = arguments.motion(top, start)
-        given = of_arrays(cast(HeavyTop, body), state, about, instants, _rows(states), form, *names)
-    else:
-        said = convention(quaternion_order, quaternion, matrix, sequence, angles, up, pivot, point)
-        given = observed_arrays(top, start, about, said, instants, arrays, form, names, normalize)
+    state = arguments.is_a(start, State, "start")
+    if states is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
+        _, state = arguments.motion(body, state)
+        return scored(of_arrays(body, state, about, instants, _rows(states), form, *names), needed)
+    words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
+    words |= {"sequence": sequence, "up": up}
+    words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
+    where = None if point is None else vector(point, "point")
+    said = Convention(**words, pivot=vector(pivot, "pivot"), point=where)
+    if "euler" in arrays and not said.sequence:
+        raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
+    require_system(about)
+    flag = bool(arguments.flag(normalize, "normalize"))
+    given = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
     return scored(given, needed)
 
 
 def read_trajectory(
     path: PathLike, case: str | None = None, *, require: Number | None = None, normalize: bool = False
 ) -> tuple[GivenTrajectory, Fraction | None]:
-    """What :func:`scored` takes, from the file of a trajectory (`heavytop docs score`).
+    """The arguments of :func:`scored`, from the file of a trajectory (`heavytop docs score`).
 
     Arguments:
         path: a .json or .csv file; ``-`` for standard input.

@@ -1,4 +1,4 @@
-"""What explains the states of a run that are far off: a sign, a step too many, a row too late."""
+"""The explanation of states that are far off: a sign, a step too many, a row too late."""
 
 from __future__ import annotations
 

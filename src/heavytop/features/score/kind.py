@@ -22,7 +22,7 @@ class ScoreKind(Kind):
     place = 30
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Of the one motion that `score` wrote its answer and how its digits are lost; of several as of long runs."""
+        """The answer to the one motion that `score` wrote, and how its digits are lost; several as long runs."""
         if beside is not None and len(rows) == 1:
             yield from one_motion(rows[0], beside)
         else:

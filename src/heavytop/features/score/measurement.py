@@ -15,9 +15,9 @@ import numpy
 from heavytop.cases import Case
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
-from heavytop.features.score.diagnose.diagnosis import Diagnosis, diagnose
+from heavytop.features.score.diagnose.diagnosis import diagnose
 from heavytop.features.score.diagnose.readings import Seen, disagreement
-from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
+from heavytop.features.score.diagnose.samples import Diagnosis, FileAxes, turning_rate
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
@@ -37,9 +37,9 @@ from heavytop.measure.scalar import (
     to_ball,
 )
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
-from heavytop.measure.truth import Truth, truth, truth_with_attitude
+from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, round_to, shown, time_text
-from heavytop.records import Against, Metric, Peer, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import Metric, Peer, Quantity, Row, RowKey, Subject, by_name
 
 Progress = Callable[[], None]
 
@@ -73,7 +73,7 @@ def exact_problem(given: GivenTrajectory) -> Problem:
 
 
 def observed_of(given: GivenTrajectory) -> Observed:
-    """What the trajectory gives."""
+    """The columns that the trajectory gives."""
     assert given.observed is not None
     return given.observed
 
@@ -93,7 +93,7 @@ def _observed(given: GivenTrajectory, progress: Progress) -> Scored:
     found, problem = observed_of(given), exact_problem(given)
     times = [round_to(time, given.precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    true = truth_with_attitude(problem, times, _REFERENCE_EFFORT)
+    true = truth(problem, times, _REFERENCE_EFFORT)
     known = true if isinstance(true, str) else true.remembered()
     scorer = ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
     errors: list[float] = []
@@ -110,7 +110,7 @@ def _count(found: Observed) -> int:
 
 
 def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
-    """What explains the error: the digits written, lengths off 1, a convention, or another mistake."""
+    """Explanations of the error: the digits written, lengths off 1, a convention, or another mistake."""
     about: dict[str, Any] = {"step": _step(given)}
     count = len(_finite(given))
     times, states = given.times[:count], _finite(given)
@@ -207,8 +207,6 @@ def used(given: GivenTrajectory) -> str:
     return f"Scored: {', '.join(parts)}{up}."
 
 
-__all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "direction", "score"]
-
 PEER = "heyoka"
 _CLOCK = Fraction(1, 1000)
 """Of a step, by which the times of a clock may be off its multiples."""
@@ -286,7 +284,7 @@ def _step(given: GivenTrajectory) -> Fraction | None:
 
 
 def _on_multiples(given: GivenTrajectory) -> GivenTrajectory | None:
-    """The same at multiples of its step, where its times are all but these; None where they are, or are not."""
+    """The trajectory at multiples of its step, where its times are all but these; None where they are, or are not."""
     step = _step(given)
     if step is None:
         return None
@@ -317,7 +315,7 @@ def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessm
     said = diagnoses(given if told is None else told[2], _size(explained.row), explained.errors) if count else []
     written = None if given.observed is not None else rounding(_finite(given), given.precision)
     single = written is not None and written.kind == "single"
-    peer = _peer(given, found.problem, found.scorer, count, progress)
+    peer = _peer(given, found, count, progress)
     columns = "" if given.observed is None else used(given)
     clock = [] if told is None else [told[0]]
     return Assessment(found.row, peer, clock + said, given.format_guessed, single, columns)
@@ -404,26 +402,14 @@ def _size(row: Row) -> float | None:
     return float(metric)
 
 
-@dataclass(slots=True)
-class _Measured:
-    """As much of a row as its digits need."""
-
-    bits: int
-    metrics: dict[str, Metric]
-    reference: Against
-
-
-def _peer(
-    given: GivenTrajectory, problem: Problem, scorer: DriftAndError, count: int, progress: Progress
-) -> Peer | None:
+def _peer(given: GivenTrajectory, measured: Scored, count: int, progress: Progress) -> Peer | None:
     """heyoka's own run of the same problem over the same times, compared with the same known motion.
 
     None without one, and where heyoka does not get there.
     """
-    precision = given.precision
-    if isinstance(scorer.truth, str) or not count or precision == DOUBLE_DOUBLE:
+    precision, problem, known = given.precision, measured.problem, measured.scorer.truth
+    if isinstance(known, str) or not count or precision == DOUBLE_DOUBLE:
         return None
-    known: Truth = scorer.truth
     running, bits = Running(), precision.bits + GUARD_BITS
     limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
 
@@ -447,7 +433,8 @@ def _peer(
         return None
     with working_precision(bits):
         found = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
-    digits = digits_kept(_Measured(precision.bits, by_name({RELATIVE: found[RELATIVE]}), scorer.against))
+    metrics = by_name({RELATIVE: found[RELATIVE]})
+    digits = digits_kept(msgspec.structs.replace(measured.row, metrics=metrics))
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None
     return Peer(PEER, precision.name, digits, run.steps)

@@ -12,8 +12,8 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES, Diagnosis
-from heavytop.features.score.diagnose.samples import FLOOR
+from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES
+from heavytop.features.score.diagnose.samples import FLOOR, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
 from heavytop.measure.attitude_error import JOINT_VIOLATION
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
@@ -107,7 +107,7 @@ def is_convention(found: Diagnosis) -> bool:
 
 
 def sentence(found: Diagnosis) -> str:
-    """What fits, in which numbers, how far the error falls, and the digits that are right with it."""
+    """The mistake with its numbers, how far the error falls, and the digits that are right with it."""
     numbers = found.numbers
     if found.kind == "quaternion_length":
         return (
@@ -147,7 +147,7 @@ _MEANINGS = {
     "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
     "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
 }
-"""What the columns mean in these states, and what that comes to."""
+"""Meanings of the columns, and how they fit."""
 _SENTENCES = {
     "no_gravity": "The states fit a motion without gravity, P = 0",
     "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
@@ -170,10 +170,42 @@ _SENTENCES = {
     "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r: the product of M and Ω has the other sign",
     "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",
     "rows_reversed": "The states are listed from the last time to the first",
+    "axes_permuted": "The axes are in another order or reversed: {columns_said}",
+    "columns": "The columns mean something else: {columns_said}",
+    "inertia_axes": "The axes of the moments of inertia are in another order: the states fit with those of {order}",
+    "centre_axes": "The axes of the centre of mass are in another order: the states fit with those of {order}",
+    "top_axes": "The axes of the top are in another order: the states fit with those of {order}",
+    "centre_signs": "The states fit a centre of mass at ({centre})",
+    "system": "The states fit the system {other_system}, not {system}",
+    "times_shifted": "The times are shifted: the state given at t is that at t {signed}",
+    "component_sign": "The equation of {column} has the other sign: the states fit with its derivative negated",
+    "weight": "The states fit another weight: {named}",
+    "start": "The states fit another start: {named}",
+    "top": "The states fit another top: {named}",
+    "one_state": "Only the state at t = {t} is off (state {state})",
+    "some_states": "Only the states at t = {t} are off (states {state})",
+    "omega_scaled": "Ω is {factor} times what fits in these states: divided by it they fit",
+    "gamma_scaled": "γ is {factor} times what fits in these states: divided by it they fit",
+    "column_scaled": "{column} is {factor} times what fits in these states: divided by it they fit",
+    "column_constant": "{column} is {value} in every state: the other five columns fit",
+    "all_scaled": "Start and states give {factor}·Ω: with both divided by it they fit",
+    "row_missing": "A row is missing: from t = {t} on, the states are those of the next times",
+    "row_twice": "A row too many: from t = {t} on, the states are those of the times before",
+    "column_order": "The columns stand in another order: they are {columns}",
+    "axes_of_space": "{whose} given in axes fixed in space, of which axis {vertical} is vertical",
+    "frozen": "From t = {t} on nothing moves: {states} states are the same.",
+    "constant": "Every state is the same: nothing moves.",
+    "reset": "From t = {t} on the motion starts again: the program went back to its start",
+    "clock": "The times are off multiples of the step {step} by {off} at most, as a sum of steps is: at the multiples "
+    "themselves {digits} digits are right",
+    "significant": "The states are rounded to {digits} significant digits, which explains the error: {in_full}",
+    "decimals": "The states are rounded to {digits} decimals, which explains the error: {in_full}",
+    "single": "The states are rounded to single precision (24 bits), which explains the error: {in_full}",
 }
-"""The sentences of kinds without a number."""
+"""The sentences of the other kinds, of ``rounded`` by what the states are rounded to."""
+_IN_FULL = "written in full they may be better."
 _SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
-_OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass", "top_axes": "top"}
+_WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
 
 
 def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
@@ -192,7 +224,7 @@ def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
 
 
 def _scope(found: Diagnosis) -> str:
-    """Of which states the sentence is true, where not all were looked at."""
+    """The states of which the sentence is true, where not all were looked at."""
     if found.looked_at is None:
         return ""
     looked, states, until = found.looked_at
@@ -207,71 +239,21 @@ def _said(found: Diagnosis, system: str) -> str:
     numbers = found.numbers
     if found.kind in _MEANINGS:
         return " in these states".join(_MEANINGS[found.kind])
-    if found.kind in _SENTENCES:
-        return _SENTENCES[found.kind]
-    named = ", ".join(f"{name} = {value}" for name, value in numbers.items())
-    match found.kind:
-        case "axes_permuted":
-            return f"The axes are in another order or reversed: {_columns(numbers)}"
-        case "columns":
-            return f"The columns mean something else: {_columns(numbers)}"
-        case "inertia_axes" | "centre_axes" | "top_axes":
-            what = _OWNERS[found.kind]
-            order = ", ".join(numbers["axes"])
-            return f"The axes of the {what} are in another order: the states fit with those of axes {order} as 1, 2, 3"
-        case "centre_signs":
-            return f"The states fit a centre of mass at ({numbers['centre']})"
-        case "system":
-            return f"The states fit the system {_SYSTEM[system]}, not {system}"
-        case "times_shifted":
-            return f"The times are shifted: the state given at t is that at t {_signed(numbers['shift'])}"
-        case "time_unit":
-            return _time_unit(**numbers)
-        case "component_sign":
-            return f"The equation of {numbers['column']} has the other sign: the states fit with its derivative negated"
-        case "weight":
-            return f"The states fit another weight: {named}"
-        case "start":
-            return f"The states fit another start: {named}"
-        case "top":
-            return f"The states fit another top: {named}"
-        case "one_state":
-            return f"Only the state at t = {numbers['t']} is off (state {numbers['state']})"
-        case "some_states":
-            return f"Only the states at t = {numbers['t']} are off (states {numbers['state']})"
-        case "omega_scaled":
-            return f"Ω is {numbers['factor']} times what fits in these states: divided by it they fit"
-        case "gamma_scaled":
-            return f"γ is {numbers['factor']} times what fits in these states: divided by it they fit"
-        case "column_scaled":
-            return f"{numbers['column']} is {numbers['factor']} times what fits in these states: divided by it they fit"
-        case "column_constant":
-            return f"{numbers['column']} is {numbers['value']} in every state: the other five columns fit"
-        case "all_scaled":
-            return f"Start and states give {numbers['factor']}·Ω: with both divided by it they fit"
-        case "row_missing":
-            return f"A row is missing: from t = {numbers['t']} on, the states are those of the next times"
-        case "row_twice":
-            return f"A row too many: from t = {numbers['t']} on, the states are those of the times before"
-        case "column_order":
-            return f"The columns stand in another order: they are {numbers['columns']}"
-        case "axes_of_space":
-            whose = {"omega": "Ω is", "both": "Ω and γ are"}[numbers["of"]]
-            return f"{whose} given in axes fixed in space, of which axis {numbers['vertical']} is vertical"
-        case "frozen":
-            return f"From t = {numbers['t']} on nothing moves: {numbers['states']} states are the same."
-        case "constant":
-            return "Every state is the same: nothing moves."
-        case "reset":
-            return f"From t = {numbers['t']} on the motion starts again: the program went back to its start"
-        case "clock":
-            return (
-                f"The times are off multiples of the step {numbers['step']} by {numbers['off']} at most, as a sum of "
-                f"steps is: at the multiples themselves {numbers['digits']} digits are right"
-            )
-        case "rounded":
-            return _rounded(numbers)
-    return _integrals_off(numbers)
+    if found.kind == "time_unit":
+        return _time_unit(**numbers)
+    if (text := _SENTENCES.get(numbers.get("to", found.kind))) is None:
+        return _integrals_off(numbers)
+    more = {
+        "columns_said": _columns(numbers),
+        "order": f"axes {', '.join(numbers.get('axes', ''))} as 1, 2, 3",
+        "named": ", ".join(f"{name} = {value}" for name, value in numbers.items()),
+        "system": system,
+        "other_system": _SYSTEM.get(system, ""),
+        "signed": _signed(numbers.get("shift", "")),
+        "whose": _WHOSE.get(numbers.get("of", ""), ""),
+        "in_full": _IN_FULL,
+    }
+    return text.format(**more, **numbers)
 
 
 def _time_unit(factor: str, steps: str = "") -> str:
@@ -295,23 +277,14 @@ def _columns(numbers: dict[str, str]) -> str:
     if "order" in numbers:
         parts.append("γ stands before Ω")
     if "axes" in numbers:
-        vectors = {"both": "Ω and γ", "omega": "Ω", "gamma": "γ"}[numbers["of"]]
+        vectors = {"both": "Ω and γ", "omega": "Ω", "gamma": "γ"}.get(numbers.get("of", ""), "")
         axes = ", ".join(axis.replace("-", "−") for axis in numbers["axes"].split(","))
         parts.append(f"columns 1, 2, 3 of {vectors} are axes {axes}")
     return "; ".join(parts)
 
 
-def _rounded(numbers: dict[str, str]) -> str:
-    to = {
-        "significant": f"{numbers['digits']} significant digits",
-        "decimals": f"{numbers['digits']} decimals",
-        "single": "single precision (24 bits)",
-    }[numbers["to"]]
-    return f"The states are rounded to {to}, which explains the error: written in full they may be better."
-
-
 def _integrals_off(numbers: dict[str, str]) -> str:
-    """What each first integral does, those first that keep another value."""
+    """The course of each first integral, those first that keep another value."""
     off = [f"{name} ({value})" for name, value in numbers.items() if value not in (VARIES, AS_AT_START)]
     said = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
     for text, verb in ((AS_AT_START, "{} the value of the start"), (VARIES, "")):
@@ -391,7 +364,7 @@ def guessed(found: Assessment) -> str | None:
 
 
 def told(found: Assessment) -> list[str]:
-    """What explains the error, and what was guessed."""
+    """Explanations of the error, and what was guessed."""
     said = [diagnosis_text(each, found.row.system) for each in found.diagnoses]
     note = guessed(found)
     return [*([found.used] if found.used else []), *said, *([note] if note else [])]

@@ -1,4 +1,4 @@
-"""What the chunks of a survey come to together: one row with counts, quantiles and the worst motions."""
+"""The chunks of a survey together: one row with counts, quantiles and the worst motions."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ _FIRST = ("omega", "gamma", "inertia", "moment", "rotor")
 
 
 def histogram(values: NDArray[np.float64]) -> Histogram | None:
-    """Of the values above 0; None without any."""
+    """The histogram of the values above 0; None without any."""
     positive = values[values > 0]
     if not len(positive):
         return None
@@ -311,7 +311,7 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
 
 
 def _request(task: Task) -> dict[str, str]:
-    """What is asked of the motions of a survey: which tops, and what its table says."""
+    """The request of a survey: which tops, and what its table says."""
     assert isinstance(task.case, Chunk)
     assert task.case.sweep is not None
     return {"tops": task.case.sweep.exact_data, **(task.request or {})}

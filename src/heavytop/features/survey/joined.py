@@ -101,7 +101,7 @@ def _motion(row: Row, before: dict[str, Any], after: dict[str, Any], place: int)
 
 
 def _command(row: Row, columns: dict[str, Any], place: int, outcome: str) -> str:
-    """Of the rounded top and start: the same motion in double, one within a rounding of double in other formats."""
+    """The command of the rounded top and start: the motion itself in double, within a rounding in other formats."""
     numbers = [Fraction(repr(float(columns[name][place]))) for name in DATA]
     inertia, moment, rotor, omega, gamma = (numbers[k : k + 3] for k in range(0, 15, 3))
     top = HeavyTop(inertia, 1, moment, rotor if any(rotor) else None)

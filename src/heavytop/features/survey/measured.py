@@ -87,7 +87,7 @@ class Drawn:
 
     @property
     def system(self) -> System:
-        """The same of all."""
+        """The system of all motions."""
         return self.problems[0].system
 
     @property
@@ -107,7 +107,7 @@ class Drawn:
 
     @property
     def classes(self) -> list[str]:
-        """Of each motion, by the further integrals that it has."""
+        """The class of each motion, by the further integrals that it has."""
         return [_class(each) for each in self.integrals]
 
 

@@ -232,7 +232,7 @@ def trend(series: Series, rounding: float = 0.0) -> Trend | None:
 
 
 def alike(rows: Sequence[Row]) -> list[Row]:
-    """Of each method the point whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
+    """The point of each method whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
     found: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
     for index, row in enumerate(rows):
         name, error = row.key.subject.name, row.metrics.get("error_max")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -26,13 +26,14 @@ from heavytop.features.work_precision.curves import (
 )
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive, uniform
-from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
+from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, run_with_attitude
 from heavytop.integrate import registry
 from heavytop.integrate.registry import IntegratorSource, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kind import Kind, with_explanation
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, JOINT_VIOLATION, POSITION_ERROR
 from heavytop.measure.integrator import TOO_LONG, Repeats, doubtful_counts, require_counts, timed, tried
-from heavytop.measure.scalar import metric, of_fraction
+from heavytop.measure.scalar import RELATIVE, metric, of_fraction
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
@@ -54,6 +55,13 @@ _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30
 _OF_OTHERS = 0.6
 """Decades of rounding noise of third-party integrators, whose step control turns a rounding into another step: rerun
 with other roundings, CVODE and splitting methods move by up to a decade."""
+
+
+class Options(NamedTuple):
+    """What is measured of a run beside the usual."""
+
+    timings: bool = False
+    attitude: bool = False
 
 
 class Curve(msgspec.Struct, forbid_unknown_fields=True):
@@ -84,6 +92,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
     """Each point of each curve over the same horizon; ``samples`` uniform samples.
 
     timings: whether runs are repeated so often that two reports of one machine can be compared by their seconds.
+    attitude: whether a run with the attitude is measured too, of an integrator that carries it.
     """
 
     cases: list[str]
@@ -91,9 +100,10 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
     ladders: list[Curve]
     samples: int = 100
     timings: bool = False
+    attitude: bool = False
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
+        """A task for each row."""
         (horizon,) = positive([self.horizon], "horizon")
         times, end = uniform(horizon, self.samples), time_text(horizon)
         points = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
@@ -104,7 +114,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
                 f"{subject.name} {subject.setting}",
                 case,
                 *times,
-                self.timings,
+                Options(self.timings, self.attitude),
             )
             for case in map(find, self.cases)
             for precision, subject in points
@@ -156,12 +166,16 @@ class WorkPrecision(Kind):
         peer = registry.ready(task.integrator.which, _setting(task.key.subject))
 
         def integrate(times: Any, start: State = case.start) -> Trajectory:
-            top = case.top if start is case.start else problem.top
+            top = problem.top if case.system is GYROSTAT and start is not case.start else case.top
             return peer(top, start, times, precision, system=case.system)
 
         sampled = integrate(task.times)
         scorer = _scored(task, problem, sampled)
         metrics, error = _metrics(scorer, bool(sampled.times)), _error(scorer)
+        if sampled.joint_violation is not None:
+            metrics[Quantity(JOINT_VIOLATION, statistic="max")] = of_fraction(exact(sampled.joint_violation))
+        if task.options.attitude and task.integrator.carries_attitude:
+            metrics |= _of_attitude(task)
         if error is not None and not task.integrator.one_step:  # it may begin anew at each sample, and be off by less
             error = max(error, _error(_scored(task, problem, integrate(task.times[-1:]))) or error)
         seconds, alone = self._timed(task, integrate, sampled, error)
@@ -257,7 +271,7 @@ def _missing() -> Metric:
 
 
 def _setting(subject: Subject) -> tuple[str, Fraction] | None:
-    """What the integrator is asked for; None for the finest that it offers."""
+    """The setting of the integrator; None for the finest that it offers."""
     if FINEST in (subject.tolerance, subject.step):
         return None
     return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
@@ -265,7 +279,7 @@ def _setting(subject: Subject) -> tuple[str, Fraction] | None:
 
 def _repeats(task: Task) -> Repeats:
     """More of them where seconds are to be compared."""
-    if task.options:
+    if task.options.timings:
         return _FOR_COMPARISON
     return Repeats(_RUNS[0], _RUNS[-1], _ENOUGH_SECONDS)
 
@@ -294,9 +308,18 @@ def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
         omega, gamma = (scorer.error.running[part] for part in ("omega", "gamma"))
         metrics[ERROR_FINAL] = metric(omega.final.max(gamma.final))
         metrics[ERROR_MAX] = metric(omega.maximum.max(gamma.maximum))
+        metrics[RELATIVE] = metric(scorer.error.running["relative"].maximum)
     elif scorer.error is not None:
         metrics[ERROR_MAX] = _missing()
     return metrics
+
+
+def _of_attitude(task: Task) -> dict[Quantity, Metric]:
+    """The largest errors of attitude and position."""
+    _, scorer = run_with_attitude(task)
+    measured = ((each.quantity, each) for each in scorer.metrics().values())
+    names = (ATTITUDE_ERROR, POSITION_ERROR)
+    return {q: each for q, each in measured if q is not None and q.name in names and q.statistic == "max"}
 
 
 def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:

@@ -314,7 +314,7 @@ def _built(
         options["pars"] = numpy.full((_count(system), *shape), one)
     before = perf_counter()
     engine = build(
-        expressions(system, attitude, constants and _doubles(constants)),
+        expressions(system, attitude, constants and constants.mapped(float)),
         numpy.full((size, *shape), zero),
         fp_type=type(one),
         **options,
@@ -325,10 +325,6 @@ def _built(
 def _count(system: System) -> int:
     """How many numbers enter the field."""
     return len(system.entering(Parameters((1, 1, 1), (0, 0, 0), (0, 0, 0) if system is HEAVY_GYROSTAT else 0)))
-
-
-def _doubles(p: Parameters) -> Parameters:
-    return p.mapped(float)
 
 
 def _flags(engine: Any) -> dict[str, str]:

@@ -12,7 +12,17 @@ from typing import Any
 import numpy
 
 from heavytop.integrate.heyoka.engines import Compiled, compiled, load, not_finite
-from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, TaylorStep, Trajectory, sampled
+from heavytop.integrate.trajectory import (
+    Ended,
+    Observer,
+    Outcome,
+    Problem,
+    ResumePoint,
+    TaylorStep,
+    Trajectory,
+    sampled,
+    trajectory_of,
+)
 from heavytop.precision import DOUBLE, OrderedRing, Precision, exact, number, numbers
 from heavytop.top.amplification import rate
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -163,17 +173,6 @@ class Stepper:
         return self.engine.update_d_output(target).copy()
 
 
-def are_many(targets: Sequence[OrderedRing], precision: Precision) -> bool:
-    """Whether one call of heyoka may be worth its while."""
-    return len(targets) >= _MANY and precision.family in _ON_A_GRID
-
-
-def dense(engine: Any, targets: Sequence[Any], precision: Precision) -> bool:
-    """Whether there are few steps between :func:`are_many` targets; takes the first step of ``engine`` to see."""
-    engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
-    return abs(float(targets[-1])) <= _CLOSE * len(targets) * abs(float(engine.time))
-
-
 def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
     """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
 
@@ -207,8 +206,8 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
 @lru_cache(maxsize=64)
 def far(forwards: bool, precision: Precision) -> Any:
     """A time beyond every other."""
-    found = number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
-    return float(found) if precision.family == "double" else found  # heyoka takes Python's floats in half the time
+    time = number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+    return float(time) if precision.family == "double" else time  # heyoka takes Python's floats in half the time
 
 
 def at_rest(state: Any, coefficients: Any) -> bool:
@@ -285,8 +284,8 @@ def integrate_to_samples(
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
     unit = _unit(problem)
     if unit != 1 and place is None and len(engine.pars):  # constants compiled in have the unit given
-        scaled, seen = _in_unit(problem, unit), observer and _seen_in(observer, unit)
-        factor = number(unit, problem.precision)
+        scaled, factor = _in_unit(problem, unit), number(unit, problem.precision)
+        seen = observer and (lambda time, state: observer(time / unit, _from_unit(state, unit)))
         run = integrate_to_samples(
             tool, engine, scaled, [t * factor for t in targets], step_limit, seen, between, stepping=stepping
         )
@@ -299,18 +298,20 @@ def integrate_to_samples(
             time_reached=run.time_reached / unit,
             flags={**run.flags, "unit": f"2^{unit.numerator.bit_length() - unit.denominator.bit_length()}"},
         )
-    if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
-        found = _in_one_call(tool, engine, problem, targets, step_limit)
-        if found is not None:
-            return found
+    began = perf_counter()
+    if stepping is Stepper and all(option is None for option in (observer, between, place, mark)):
+        at_once = _at_once(engine, lambda: load(engine, problem), targets, step_limit, problem.precision)
+        if at_once is not None:
+            stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=at_once[0])
+            seconds = perf_counter() - began
+            return _trajectory(tool, problem, stepper, RoundedTimes(targets), at_once[1], Outcome.SUCCESS, seconds)
     load(engine, problem)
     if problem.precision.family == "double":
         targets = list(map(float, targets))  # as far() is
     forwards = bool(targets[-1] >= 0)
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
-    return _trajectory(
-        tool, engine, problem, stepper, *sampled(stepper, targets, tool.flags, perf_counter(), observer, place, mark)
-    )
+    ended = sampled(stepper, targets, tool.flags, perf_counter(), observer, place, mark)
+    return _trajectory(tool, problem, stepper, *ended)
 
 
 def _unit(problem: Problem) -> Fraction:
@@ -337,10 +338,6 @@ def _from_unit(state: Any, unit: Fraction) -> Any:
     return numpy.concatenate([state[:3] * float(unit), state[3:]])
 
 
-def _seen_in(observer: Observer, unit: Fraction) -> Observer:
-    return lambda time, state: observer(time / unit, _from_unit(state, unit))
-
-
 def states_at(
     engine: Any, parameters: Any, start: Any, targets: Sequence[Any], step_limit: int | None, precision: Precision
 ) -> tuple[Any, Outcome, Any, int]:
@@ -354,13 +351,9 @@ def states_at(
         engine.state[:] = start
         engine.time = targets[0] * 0
 
-    if are_many(targets, precision):
-        begin()
-        if dense(engine, targets, precision):
-            begin()
-            found = on_a_grid(engine, targets, precision, step_limit)
-            if found is not None:
-                return found[1], Outcome.SUCCESS, targets[-1], found[0]
+    at_once = _at_once(engine, begin, targets, step_limit, precision)
+    if at_once is not None:
+        return at_once[1], Outcome.SUCCESS, targets[-1], at_once[0]
     begin()
     forwards = bool(targets[-1] >= 0)
     stepper = Stepper(engine, forwards, step_limit, far(forwards, precision))
@@ -373,47 +366,25 @@ def states_at(
     return states, Outcome.SUCCESS, targets[-1], stepper.steps
 
 
-def _in_one_call(
-    tool: Compiled, engine: Any, problem: Problem, targets: Sequence[Any], step_limit: int | None
-) -> Trajectory | None:
-    """The motion at many targets close to each other, by heyoka alone; None where there are few, or where it fails."""
-    began = perf_counter()
-    if not are_many(targets, problem.precision):
+def _at_once(
+    engine: Any, begin: Callable[[], None], targets: Sequence[Any], step_limit: int | None, precision: Precision
+) -> tuple[int, Any] | None:
+    """Steps and states at many targets close to each other, in one call; None where there are few, or where it fails.
+
+    begin: sets the engine to the beginning, once to see how long the first step is, and once more.
+    """
+    if len(targets) < _MANY or precision.family not in _ON_A_GRID:
         return None
-    load(engine, problem)
-    if not dense(engine, targets, problem.precision):
+    begin()
+    engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
+    if abs(float(targets[-1])) > _CLOSE * len(targets) * abs(float(engine.time)):
         return None
-    load(engine, problem)
-    found = on_a_grid(engine, targets, problem.precision, step_limit)
-    if found is None:
-        return None
-    stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=found[0])
-    seconds = perf_counter() - began
-    return _trajectory(tool, engine, problem, stepper, RoundedTimes(targets), found[1], Outcome.SUCCESS, seconds)
+    begin()
+    return on_a_grid(engine, targets, precision, step_limit)
 
 
-def _trajectory(
-    tool: Compiled,
-    engine: Any,
-    problem: Problem,
-    stepper: Stepper,
-    times: Sequence[Fraction],
-    states: Any,
-    outcome: Outcome,
-    seconds: float,
-) -> Trajectory:
-    return Trajectory(
-        problem,
-        "heyoka",
-        times,
-        states,
-        outcome,
-        times[-1] if outcome is Outcome.SUCCESS and times else exact(stepper.time),
-        stepper.steps,
-        engine.order,
-        {"compile": tool.seconds, "run": seconds},
-        tool.flags,
-    )
+def _trajectory(tool: Compiled, problem: Problem, run: Stepper, *ended: *Ended) -> Trajectory:
+    return trajectory_of(problem, "heyoka", run, run.engine.order, tool.seconds, tool.flags, *ended)
 
 
 def first_steps(
@@ -446,16 +417,5 @@ def first_steps(
             if outcome is Outcome.SUCCESS and stepper.rest is None:
                 steps.append(TaylorStep(before, engine.last_h, stepper.polynomial(), engine.state.copy()))
                 times.append(exact(engine.time))
-        order = engine.order
-    return Trajectory(
-        problem,
-        "heyoka",
-        tuple(times),
-        tuple(step.end for step in steps),
-        outcome,
-        times[-1] if times else Fraction(0),
-        len(steps),
-        order,
-        {"compile": tool.seconds, "run": perf_counter() - began},
-        tool.flags,
-    ), steps
+        ends = tuple(step.end for step in steps)
+        return _trajectory(tool, problem, stepper, tuple(times), ends, outcome, perf_counter() - began), steps

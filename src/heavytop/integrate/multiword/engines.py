@@ -103,11 +103,6 @@ class Arithmetic(ABC):
         """
 
 
-@lru_cache(maxsize=64)
-def _tolerance_text(tolerance: Fraction) -> str:
-    return decimal_text(tolerance, 6)
-
-
 @dataclass(frozen=True, slots=True)
 class DoubleDouble(Arithmetic):
     """106 bits that float, with plain doubles above an order n0.
@@ -125,7 +120,7 @@ class DoubleDouble(Arithmetic):
             "arithmetic": "double-double",
             "words": "2",
             "bits": str(double_double_run.BITS),
-            "tolerance": _tolerance_text(self.tolerance),
+            "tolerance": decimal_text(self.tolerance, 6),
             "order": str(self.schedule.order),
             "step_rule": f"radius of convergence times 2^{self.schedule.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",

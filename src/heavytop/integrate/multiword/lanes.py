@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind, processors
+from heavytop.guard import processors
+from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind
 from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (

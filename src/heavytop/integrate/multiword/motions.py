@@ -12,7 +12,15 @@ from typing import Any
 from heavytop.errors import InputError, OutOfReach
 from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.registry import expected_steps
-from heavytop.integrate.trajectory import Observer, Outcome, Problem, ResumePoint, Trajectory, sampled
+from heavytop.integrate.trajectory import (
+    Observer,
+    Outcome,
+    Problem,
+    ResumePoint,
+    Trajectory,
+    sampled,
+    trajectory_of,
+)
 from heavytop.multiword.codegen.machine_code import Doubles
 from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.fixed_point.arithmetic import Grid
@@ -105,18 +113,8 @@ def integrate_to_samples(
         seconds = perf_counter() - began
     else:
         times, states, outcome, seconds = sampled(pace, targets, flags, began, observer, place, mark)
-    return Trajectory(
-        problem,
-        "multiword",
-        times,
-        states,
-        outcome,
-        times[-1] if outcome is Outcome.SUCCESS and times else pace.time,
-        pace.run.steps,
-        pace.run.order,
-        {"compile": compiling, "run": seconds},
-        flags,
-    )
+    ended = times, states, outcome, seconds
+    return trajectory_of(problem, "multiword", pace, pace.run.order, compiling, flags, *ended)
 
 
 def _require_reach(problem: Problem, scaled: Scaled, end: Fraction) -> None:
@@ -302,6 +300,11 @@ class _Pace:
     step_limit: int | None
     between: Callable[[], None] | None
     _chunk: int = _FIRST_CHUNK
+
+    @property
+    def steps(self) -> int:
+        """That stand."""
+        return self.run.steps
 
     @property
     def time(self) -> Fraction:

@@ -13,7 +13,8 @@ import re
 import select
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import pairwise
@@ -26,18 +27,22 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy
 
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, PeerFailed, Unsupported
 from heavytop.guard import Guard, how_it_ended
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, vector
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
 from heavytop.processes import stopwatch
 from heavytop.records import UNRESOLVED_SECONDS
+from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
+from heavytop.top.inertia_slips import six_of
 from heavytop.written_numbers import number as written_number
 
 HELLO = "heavytop-integrator 1"
+PYTHON = "{python}"
+"""In a command, the interpreter that heavytop runs on."""
 NOT_COUNTED = {"steps": "not counted"}
 """The flag of a run whose program did not say how many steps it took."""
 _MOST_LINE = 1 << 20
@@ -66,7 +71,7 @@ _OF_STATES = b"0123456789+-.eE \tsta"
 _as_doubles = msgspec.json.Decoder(list[float]).decode
 """Reads a JSON list of numbers, each rounded correctly, in a tenth of the time that `float` takes."""
 _STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 7, 9)}
-_PAIRS = {"steps": int, "evaluations": int, "seconds": float}
+_PAIRS = {"steps": int, "evaluations": int, "seconds": float, "joint": float}
 
 
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -75,7 +80,8 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: what it is set by.
     precisions, systems, directions, attitude, one_step, fixed_grid, singular_at: what it declares that it can do, as
     :class:`heavytop.integrate.peers.contract.Declared`.  timeout: seconds of one request.
-    hex: whether it is given hexadecimal numbers.  folder: of the file; its working directory.
+    hex: whether it is given hexadecimal numbers.  bodies: whether it is given a body with mass, gravity and the tensor
+    about the centre of mass.  folder: of the file; its working directory.
     """
 
     name: str
@@ -92,6 +98,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     fixed_grid: bool = False
     singular_at: tuple[tuple[str | int | float, str | int | float, str | int | float], ...] = ()
     hex: bool = False
+    bodies: bool = False
     folder: str = ""
 
     @property
@@ -112,8 +119,12 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
     def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
-        """What it is asked for, in the form that it declares."""
-        return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion")
+        """What it is asked for, in the form that it declares; raises Unsupported where it needs a body and none is."""
+        top = (problem.given or (problem.top, problem.start))[0]
+        body = Body.realising(top) if self.bodies else None
+        if self.bodies and body is None:
+            raise Unsupported(f"{self.name} needs a body, and none has these moments.", "`heavytop list` marks bodies.")
+        return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion", body)
 
     def load(self) -> CommandIntegrator:
         """What integrates with it; nothing is started yet."""
@@ -121,7 +132,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def argv(self) -> list[str]:
         """The program as an absolute path and its arguments; raises PeerFailed where there is none to run."""
-        program, *rest = self.command
+        program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
         place = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
         if not os.path.isfile(place):
             raise PeerFailed(f"{self.name}: there is no program {said(program)}")
@@ -220,6 +231,7 @@ class CommandIntegrator:
             spent if own is None else spent | {"program": own},
             flags,
             reply.counts.get("evaluations"),
+            joint_violation=reply.counts.get("joint"),
         )
 
 
@@ -242,6 +254,7 @@ class ProgramRequest:
 
     times: exact numbers of the format; none for a request that does nothing.  control: of the format, or None.
     quaternion: whether the program computes with one: it is given that of the start, and answers (Ω, w, x, y, z).
+    body: for a program that is given one.
     width: of a state of the answer.
     """
 
@@ -252,7 +265,9 @@ class ProgramRequest:
         control: Fraction | None,
         hexadecimal: bool,
         quaternion: bool = False,
+        body: Body | None = None,
     ) -> None:
+        self.body = body
         self.problem, self.times, self.control, self.hex = problem, list(times), control, hexadecimal
         self.quaternion = quaternion
         self.width = 7 if quaternion else 6 if problem.xi is None else 9
@@ -269,15 +284,22 @@ class ProgramRequest:
             "moment": self._numbers(p.moment),
             "rotor": self._numbers(rotor),
             "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
-            "quaternion": self._quaternion() if self.quaternion else [],
+            "quaternion": self._rounded(quaternion(self.problem)) if self.quaternion else [],
             "precision": [precision.name],
             "setting": self._numbers([] if self.control is None else [self.control]),
             "times": [str(len(self.times)), *self.written.texts],
         }
+        if self.body is not None:
+            lines |= {f"body {name}": self._rounded(values) for name, values in self._body(self.body).items()}
         return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"
 
-    def _quaternion(self) -> list[str]:
-        return self._numbers([exact(number(value, self.problem.precision)) for value in quaternion(self.problem)])
+    def _body(self, body: Body) -> dict[str, Sequence[Fraction]]:
+        scalars: dict[str, Sequence[Fraction]] = {"mass": [body.mass], "gravity": [body.gravity]}
+        about_centre = {"centre": body.centre, "inertia": six_of(body.central)}
+        return scalars | about_centre | {"attitude": quaternion(self.problem)}
+
+    def _rounded(self, values: Sequence[Fraction]) -> list[str]:
+        return self._numbers([rounded(value, self.problem.precision) for value in values])
 
     def _numbers(self, values: Sequence[Any]) -> list[str]:
         return numbers_texts(values, self.problem.precision, self.hex)
@@ -430,20 +452,28 @@ class Reply:
 
 
 class _Greeting:
-    """What takes the first line of a program."""
+    """Takes the first line of a program: ``ready``, its name and version."""
 
-    due = 0
+    due, text = 0, ""
 
-    def __init__(self, take: Callable[[bytes], bool]) -> None:
-        self.take = take
+    def __init__(self, name: str) -> None:
+        self.name = name
 
-    def nap(self, seconds: float) -> float:
+    def nap(self, _seconds: float) -> float:
         """None is needed."""
-        return 0.0 * seconds
+        return 0.0
 
-    def take_states(self, lines: list[bytes]) -> int:
+    def take_states(self, _lines: list[bytes]) -> int:
         """None."""
         return 0
+
+    def take(self, line: bytes) -> bool:
+        """Raises PeerFailed for another line."""
+        text = line.decode("utf-8", "replace")
+        if text.split()[:1] != ["ready"]:
+            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
+        self.text = said(text.partition("ready")[2])
+        return True
 
 
 class Session:
@@ -480,19 +510,13 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
         self._poll.register(self._err, select.POLLIN)
-        self.greeting = ""
+        greeting = _Greeting(self.name)
         try:
-            self._exchange(f"{HELLO}\n".encode(), _Greeting(self._greeted), "ready")
+            self._exchange(f"{HELLO}\n".encode(), greeting, "ready")
         except BaseException:
             self.close()
             raise
-
-    def _greeted(self, line: bytes) -> bool:
-        text = line.decode("utf-8", "replace")
-        if text.split()[:1] != ["ready"]:
-            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
-        self.greeting = said(text.partition("ready")[2])
-        return True
+        self.greeting = greeting.text
 
     def empty_request(self, problem: Problem) -> float:
         """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""

@@ -17,8 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import reduce
-from math import ceil, gcd, isfinite
+from math import ceil, gcd, isfinite, lcm
 from numbers import Real
 from threading import RLock
 from time import perf_counter
@@ -198,7 +197,8 @@ class Declared:
 
         Raises Unsupported where that is a small part of ``step``.
         """
-        spacing = reduce(_common_measure, times, Fraction(0))
+        scale = lcm(*(time.denominator for time in times))
+        spacing = Fraction(gcd(*(int(time * scale) for time in times)), scale)
         if not (self.fixed_grid and spacing):
             return step
         fitted = spacing / ceil(spacing / step)
@@ -215,11 +215,6 @@ def _along(gamma: Vector, direction: Vector) -> bool:
     """Whether two directions are one, to within 1e-6 rad."""
     across, along = cross(gamma, direction), dot(gamma, direction)
     return along > 0 and dot(across, across) <= _OFF_SPHERE**2 * along**2
-
-
-def _common_measure(a: Fraction, b: Fraction) -> Fraction:
-    """The largest number of which both are multiples."""
-    return Fraction(gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
 
 
 def quaternion(problem: Problem) -> tuple[Fraction, ...]:

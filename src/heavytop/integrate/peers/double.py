@@ -308,17 +308,11 @@ def field_kind() -> str:
     return "python" if compiler().__module__ == __name__ else "numba"
 
 
-def _with_rate(n: Any) -> Parameters:
-    return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
-
-
-def _with_rotor(n: Any) -> Parameters:
-    return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8]))
-
-
 def reader(system: System) -> Callable[[Any], Parameters]:
     """A function from the numbers of :class:`Request` to the parameters of the field, which numba compiles."""
-    return _with_rotor if system is HEAVY_GYROSTAT else _with_rate
+    if system is HEAVY_GYROSTAT:
+        return lambda n: Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8]))
+    return lambda n: Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
 
 
 def count(system: System) -> int:

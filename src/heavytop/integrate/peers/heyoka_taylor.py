@@ -12,24 +12,22 @@ from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.precision import DOUBLE
 
 
-def constants(
-    top: HeavyTop,
-    start: State,
-    times: Sequence[Fraction],
-    precision: Precision = DOUBLE,
-    *,
-    system: System = HEAVY_TOP,
-    tolerance: Fraction | None = None,
-    xi: tuple[Fraction, ...] | None = None,
-) -> Trajectory:
+@with_tolerance
+def constants(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
     """heyoka with the top's numbers compiled into its code, anew for each top; the peers are given them at run time."""
-    given = Problem.of(top, start, precision, system).parameters
-    run = propagate(top, start, times, precision, system=system, xi=xi, tolerance=tolerance, constants=given)
+    assert problem.given is not None
+    run = propagate(
+        *problem.given,
+        times,
+        problem.precision,
+        system=problem.system,
+        xi=problem.xi,
+        tolerance=tolerance,
+        constants=problem.parameters,
+    )
     return replace(run, integrator="heyoka:constants")
 
 

@@ -311,7 +311,8 @@ class LaneOrders:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
-        self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
+        # where a coefficient is 0 in every lane, a bit
+        self.absent = {k: self.code.all_of(self._coefficient(k)[0] == 0) for k in (2, *(k for k, *_ in self.terms))}
 
     def write(self, pair_order: Operand, low_order: Operand, order: Operand) -> tuple[Operand, list[Operand]]:
         """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
@@ -340,10 +341,6 @@ class LaneOrders:
     def _coefficient(self, k: int) -> Constant:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
         return high, middle, low
-
-    def _is_zero(self, k: int) -> Operand:
-        """Whether a coefficient is 0 in every lane, a bit."""
-        return self.code.all_of(self._coefficient(k)[0] == 0)
 
     def _sums(self, group: Products, sums: Callable[[Products], list[Operand]]) -> list[Operand]:
         """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""

@@ -124,10 +124,8 @@ class _Round:
         _, self.code = function(module, "advance", INT, arguments)
         self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = self.code.arguments[:6]
         *arrays, self.most = self.code.arguments[6:]
-        self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
-
-    def _address(self, place: int) -> Operand:
-        return self.code.address(self.clock, 8 * place)
+        units = self.code.address(self.clock, 8 * UNITS)
+        self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), units)
 
     def _clock(self, place: int) -> Operand:
         return self.code.load(self.clock, 8 * place)

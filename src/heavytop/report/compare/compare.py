@@ -116,15 +116,12 @@ def compare(
         if (match := others.take_elsewhere(row.identity)) is not None:
             found[place] = rows.compare(row, match)[:1]
         changes.add(row, match, found[place])
-    if mended := changes.mended():
-        found = [[each.set_off(mended) for each in findings] for findings in found]
     for row in others.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
             found.append(changes.add(None, row, [new]))
-    if changes.take_yardstick():
-        found = [[each.as_same() if each.of_yardstick else each for each in findings] for findings in found]
-    findings = [finding for each in found for finding in each]
+    excused = changes.excused()
+    findings = [each.as_same() if excused(each) else each for findings_of_row in found for each in findings_of_row]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)

@@ -1,4 +1,4 @@
-"""What changed between two reports, ranked: at most eight sentences, and a line a row.
+"""The changes between two reports, ranked: at most eight sentences, and a line a row.
 
 A sentence is made from the records of the two rows, never from another sentence.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, groupby, pairwise, product
@@ -92,18 +92,10 @@ class Change(NamedTuple):
         """Digits lost; of errors of other kinds the decades of the largest loss."""
         if self.digits is not None:
             return self.digits[0] - self.digits[1]
-        return max((moved for each in self.findings if (moved := self.decades(each)) is not None), default=0.0)
+        return max((moved for each in self.findings if (moved := self.decades(each.metric)) is not None), default=0.0)
 
-    def set_off(self, mended: Collection[tuple[str, str]]) -> Change:
-        """Without the slight losses of those integrators."""
-        return self._replace(findings=[each for each in self.findings if each.set_off(mended) is each])
-
-    def decades(self, finding: Finding) -> float | None:
-        """Decades by which the error of a finding grew; None for what is no error, or not a number in both rows."""
-        return self.decades_of(finding.metric)
-
-    def decades_of(self, name: str) -> float | None:
-        """The same of a metric by its name."""
+    def decades(self, name: str) -> float | None:
+        """Decades by which the error of that name grew; None for what is no error, or not a number in both rows."""
         old, new = (self.metric(row, name) for row in (self.old, self.new))
         if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
             return None
@@ -115,14 +107,9 @@ class Change(NamedTuple):
         return None if row is None else row.metrics.get(name)
 
     @property
-    def log_steps(self) -> float:
-        """log10 of the steps of the baseline; -inf where it counts none."""
-        return math.log10(self.old.steps) if self.old is not None and self.old.steps else -math.inf
-
-    @property
     def largest_loss(self) -> float:
         """Decades of the largest loss of an error."""
-        worse = (self.decades(each) for each in self.findings if each.verdict is Verdict.WORSE)
+        worse = (self.decades(each.metric) for each in self.findings if each.verdict is Verdict.WORSE)
         return max((moved for moved in worse if moved is not None), default=0.0)
 
     def about(self, finding: Finding) -> Quantity | None:
@@ -131,7 +118,7 @@ class Change(NamedTuple):
         return found and found.over("")
 
     def measured(self, finding: Finding) -> Quantity | None:
-        """The same with its statistic."""
+        """The quantity of a finding with its statistic."""
         for row in (self.old, self.new):
             if row is not None and finding.of in ("", "series"):
                 found = (row.series if finding.of else row.metrics).get(finding.name)
@@ -162,7 +149,8 @@ class Changes:
 
     def add(self, old: Row | None, new: Row | None, findings: list[Finding]) -> list[Finding]:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
-        self._third_party = self._third_party or (old is not None and _is_third_party(old))
+        subject = None if old is None else old.key.subject
+        self._third_party |= subject is not None and subject.what == "computed" and is_third_party(subject.name)
         changed = [each for each in findings if each.verdict is not Verdict.SAME]
         if changed:
             changed.sort(key=lambda each: RANK.index(each.verdict))
@@ -180,30 +168,31 @@ class Changes:
             key = _curve(old.identity)
             self.points.setdefault(key, []).append(SettingPoint(steps, (logs[0], logs[1])))
 
-    def mended(self) -> set[tuple[str, str]]:
-        """The integrators that gained more than their slight losses, which are the same then and left out.
+    def excused(self) -> Callable[[Finding], bool]:
+        """Which findings are no verdict; their rows are taken out.
 
-        Of two methods of which each is slightly better somewhere, that with the largest loss is worse.
+        Slight losses of an integrator that gained more than these: of two methods of which each is slightly better
+        somewhere, that with the largest loss is worse.  And what changed of heyoka beside a third-party integrator.
         """
         gained: dict[tuple[str, str], float] = {}
         lost: dict[tuple[str, str], float] = {}
         for change in self.rows:
             for each in change.findings:
                 if each.slight or (each.verdict is Verdict.BETTER and not each.of):
-                    side, moved = (lost if each.slight else gained), change.decades(each)
+                    side, moved = (lost if each.slight else gained), change.decades(each.metric)
                     side[each.method] = max(side.get(each.method, 0.0), math.inf if moved is None else abs(moved))
-        found = {method for method, most in lost.items() if gained.get(method, 0.0) > most}
-        if found:
-            left = (change.set_off(found) for change in self.rows)
-            self.rows = [change for change in left if change.findings]
-        return found
 
-    def take_yardstick(self) -> bool:
-        """Sets apart what changed of heyoka beside a third-party integrator; whether anything did."""
-        if self._third_party:
-            self.yardstick = [change for change in self.rows if change.findings[0].of_yardstick]
-            self.rows = [change for change in self.rows if not change.findings[0].of_yardstick]
-        return bool(self.yardstick)
+        def is_mended(finding: Finding) -> bool:
+            return finding.slight and gained.get(finding.method, 0.0) > lost[finding.method]
+
+        def is_yardstick(finding: Finding) -> bool:
+            return self._third_party and finding.of_yardstick
+
+        rows = (c._replace(findings=[each for each in c.findings if not is_mended(each)]) for c in self.rows)
+        verdicts = [change for change in rows if change.findings]
+        self.yardstick = [change for change in verdicts if is_yardstick(change.findings[0])]
+        self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
+        return lambda finding: is_mended(finding) or is_yardstick(finding)
 
     def coarser(self, change: Change) -> str:
         """``are the same`` or ``lost less`` where the finest setting of an integrator on a case lost most, in as many
@@ -216,7 +205,7 @@ class Changes:
         if len(points) < 2 or not all(each.old and each.old.steps and each.new and each.new.steps for each in changed):
             return ""
         finest = max(point.steps[0] for point in points)
-        lost = {each.log_steps: each.largest_loss for each in changed}
+        lost = {math.log10(each.old.steps): each.largest_loss for each in changed if each.old}
         if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
             return ""
         most = lost.pop(finest)
@@ -275,10 +264,6 @@ def _yardstick(changes: Changes) -> list[str]:
     return [f"heyoka, measured for scale and not judged, changed in {rows}{_on([first.identity])}: {line(first)}."]
 
 
-def _is_third_party(row: Row) -> bool:
-    return row.key.subject.what == "computed" and is_third_party(row.key.subject.name)
-
-
 def _still_failed(rows: Sequence[Row]) -> list[str]:
     """A sentence for the rows that failed in both reports; none where there is no such row."""
     if not rows:
@@ -288,7 +273,7 @@ def _still_failed(rows: Sequence[Row]) -> list[str]:
 
 
 def _why(row: Row) -> str:
-    """What ended a row: the reason that its integrator gives, or its outcome and how far it came."""
+    """The end of a row: the reason that its integrator gives, or its outcome and how far it came."""
     if row.outcome == FAILED:
         return row.reference.reason
     stopped = f"at t = {short(row.time_reached)} of {short(row.horizon)}"
@@ -296,8 +281,8 @@ def _why(row: Row) -> str:
 
 
 def line(change: Change) -> str:
-    """What happened to one row, in a few words: digits lost or gained, else its largest change for the worse."""
-    worst = max(change.findings, key=lambda each: (-RANK.index(each.verdict), change.decades(each) or -math.inf))
+    """The change of one row in a few words: digits lost or gained, else its largest change for the worse."""
+    worst = max(change.findings, key=lambda each: (-RANK.index(each.verdict), change.decades(each.metric) or -math.inf))
     if not worst.metric:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
     digits, count = change.digits, len(list(folded(change)))
@@ -399,7 +384,7 @@ def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
 
 
 def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
-    """The same of −Δ log error/Δ log steps between one setting and the next finer one."""
+    """Integrator, change and sentence, of −Δ log error/Δ log steps between one setting and the next finer one."""
     changed: dict[tuple[str, str, str], set[Identity]] = {}
     for row in (change.identity for change in changes.rows):
         changed.setdefault(_curve(row), set()).add(row)
@@ -418,7 +403,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
 
 
 def _explained(changes: Changes) -> Iterator[Sentence]:
-    """What explains the states that are far off now and were not: of each integrator what explains most rows."""
+    """The explanations of states that are far off now and were not: of each integrator that of most rows."""
     found: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
     for change in changes.worst_first:
         new, old = (each.explained if each else msgspec.UNSET for each in (change.new, change.old))
@@ -449,24 +434,18 @@ def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence
         cases.sort(key=lambda case: case[0] != reason)
         named = [change.identity for _, change in cases]
         whose, on = _whose(named), _on(named) if became in _NAMED else ""
-        said = f"{plural(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}{on}"
+        if len(cases) == 1:
+            became = became.replace("are ", "is ").replace("stop ", "stops ")
+        said = f"{plural(len(cases), 'row')}{whose} {became}{on}"
         yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
 
 
 _NAMED = ("failed", "stop earlier", "are worse", "are better")
-"""What became of rows where the sentence says of which."""
-_SINGULAR = {
-    "are missing": "is missing",
-    "are new": "is new",
-    "are better": "is better",
-    "are worse": "is worse",
-    "stop earlier": "stops earlier",
-    "are no longer supported": "is no longer supported",
-}
+"""Fates of rows where the sentence says of which."""
 
 
 def _became(change: Change) -> tuple[str, str]:
-    """What became of a row as a whole, and why."""
+    """The fate of a row as a whole, and why."""
     if change.verdict is Verdict.MISSING:
         return "are missing", ""
     if change.verdict is Verdict.NEW:
@@ -520,7 +499,7 @@ def _steps(change: Change) -> float:
 def _ends_as_before(change: Change) -> bool:
     """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
     computed = change.old is not None and change.old.key.subject.what == "computed"
-    moved = [] if change.old is None or not computed else [change.decades_of(name) for name in _finals(change.old)]
+    moved = [] if change.old is None or not computed else [change.decades(name) for name in _finals(change.old)]
     return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
 
 
@@ -573,7 +552,7 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
             worst, quantity = findings[0], change.about(findings[0])
             if worst.verdict in verdicts and not _told_elsewhere(change, worst, quantity):
                 name = quantity.name if quantity else worst.name
-                size = change.decades(worst) or 0.0
+                size = change.decades(worst.metric) or 0.0
                 found.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
     for cases in sorted(found.values(), key=lambda cases: -max(size for size, _, _ in cases)):
         _, change, finding = max(cases, key=lambda case: case[0])
@@ -581,10 +560,10 @@ def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdic
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
         if finding.of == "series":
             values = " at its samples"
-        why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
+        why = f", {finding.reason}" if finding.reason and change.decades(finding.metric) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {plural(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding) is not None)
+        error = Verdict.WORSE in verdicts and (finding.of == "series" or change.decades(finding.metric) is not None)
         coarser = {changes.coarser(c) for _, c, _ in cases} if error else {""}
         below = "" if "" in coarser else _LOWER_ORDER.format(min(coarser, key=len))
         yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}{below}.", together)

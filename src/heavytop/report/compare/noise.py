@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Sequence
 from fnmatch import translate
 from fractions import Fraction
 from functools import cached_property
@@ -45,7 +44,7 @@ _REMEDY = "`heavytop docs compare` shows every key of a policy."
 
 
 class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What one metric may do.  Numbers are exact text or TOML numbers; unset ones are taken from the whole policy.
+    """The allowance of one metric.  Numbers are exact text or TOML numbers; unset ones are taken from the whole policy.
 
     floor: errors below floor·eps of the row's format are all the same.
     loss_bits or loss_digits: an error may grow by that much; where neither is given by 2 bits, one of truncation by a
@@ -244,7 +243,6 @@ MARGIN = 2.0
 _FASTER = 0.5
 """A chaotic motion that double does not follow may be amplified faster by such a part than until there."""
 _DRIFT = "drift"
-Motion = tuple[System, Parameters, tuple[Fraction, ...]]
 _RELATIONS = ("hess", "goryachev_chaplygin")
 """Conserved on one level set alone: the motion amplifies what leaves it."""
 
@@ -262,7 +260,8 @@ class RoundingBound:
 
     def explains(self, quantity: Quantity | None, size: float) -> bool:
         """Whether rounding makes an error of that quantity, or a difference of two, as large as 10^size."""
-        found = MARGIN + (1 - self.row.bits) * BITS + math.log10(self._roundings) / 2 + self._unit(quantity)
+        roundings = max(self._turns, float(self.row.steps))
+        found = MARGIN + (1 - self.row.bits) * BITS + math.log10(roundings) / 2 + self._unit(quantity)
         if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
             return size <= found
         found += math.log10(self._turns)
@@ -280,26 +279,23 @@ class RoundingBound:
         return part * self._amplified(time) <= 2 * MARGIN
 
     @cached_property
-    def _given(self) -> tuple[HeavyTop, State] | None:
+    def _case(self) -> tuple[HeavyTop, State, System, Parameters] | None:
         data = self.row.data
         if data is None or not data.omega or not data.gamma:
             return None
+        inertia, centre, rotor, omega, gamma = (
+            tuple(map(exact, part)) for part in (data.inertia, data.centre, data.rotor, data.omega, data.gamma)
+        )
         try:
-            rotor = _exact(data.rotor) if data.rotor else None
-            top = HeavyTop(_exact(data.inertia), exact(data.weight), _exact(data.centre), rotor)
-            return top, State(_exact(data.omega), _exact(data.gamma))
+            top, start = HeavyTop(inertia, exact(data.weight), centre, rotor or None), State(omega, gamma)
+            which = system(self.row.system)
+            return top, start, which, which.parameters(top, start)
         except InputError:
             return None
 
-    @cached_property
-    def _motion(self) -> Motion | None:
-        if self._given is None:
-            return None
-        try:
-            which = system(self.row.system)
-            return which, which.parameters(*self._given), tuple(self._given[1].flat)
-        except InputError:
-            return None
+    @property
+    def _motion(self) -> tuple[System, Parameters, tuple[Fraction, ...]] | None:
+        return None if self._case is None else (*self._case[2:], tuple(self._case[1].flat))
 
     @cached_property
     def _rate(self) -> Fraction:
@@ -308,10 +304,6 @@ class RoundingBound:
     @cached_property
     def _turns(self) -> float:
         return 1 + float(min(self._rate * abs(exact(self.row.horizon)), Fraction(10**300)))
-
-    @property
-    def _roundings(self) -> float:
-        return max(self._turns, float(self.row.steps))
 
     def _amplified(self, horizon: str) -> float:
         """log10 of A up to a time."""
@@ -333,16 +325,11 @@ class RoundingBound:
 
     def _integral(self, name: str) -> float:
         """log10 of the size of the terms of a first integral."""
-        assert self._motion is not None
-        assert self._given is not None
-        which, p, _ = self._motion
-        found = next((each for each in holding(*self._given, which) if each.name == name), None)
+        assert self._case is not None
+        top, start, which, p = self._case
+        found = next((each for each in holding(top, start, which) if each.name == name), None)
         size = Fraction(0) if found is None else largest(found, p, self._rate)
         return (log10(size) or 0.0) if size else 0.0
-
-
-def _exact(texts: Sequence[str]) -> tuple[Fraction, ...]:
-    return tuple(map(exact, texts))
 
 
 _BY_CHANCE = 1.4
@@ -367,7 +354,7 @@ def allowed_loss(old: Metric, new: Metric) -> float:
 
 
 def allowed_gain(old: Metric, new: Metric) -> float:
-    """The same for a change to the better, with both bands as they are."""
+    """Half-width in decades for a change to the better, with both bands as they are."""
     return math.hypot(old.band or 0.0, new.band or 0.0)
 
 

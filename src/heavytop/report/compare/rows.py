@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from statistics import median
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from heavytop.measure.growth import BENT, CLASSES, Interval
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
-from heavytop.precision import exact, log10
+from heavytop.precision import exact
 from heavytop.records import (
     NOISE,
     NOT_MEASURED,
@@ -53,6 +53,7 @@ from heavytop.report.compare.verdicts import (
     judge_outcomes,
     judge_repeated,
     judge_seconds,
+    log_of,
     size,
     weaker,
 )
@@ -163,14 +164,14 @@ def _apart(what: str, old: Interval, new: Interval, middle: float, rerun: bool, 
 
 
 def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
-    """What the law of the candidate says less of: its detection power, its span, the time of the last digit."""
+    """The verdict where the candidate's law says less: its detection power, its span, the time of the last digit."""
     for name in ("first", "last", "detects"):
         if getattr(old, name) is not None and getattr(new, name) is None:
             return Verdict.INCOMPARABLE, f"the law no longer says {name}"
-    spans = [_log(law.first) - _log(law.last) for law in (old, new)]
-    if _log(new.last) < _log(old.last) - math.log10(_SPAN) or spans[1] > spans[0] + math.log10(_SPAN):
+    spans = [log_of(law.first) - log_of(law.last) for law in (old, new)]
+    if log_of(new.last) < log_of(old.last) - math.log10(_SPAN) or spans[1] > spans[0] + math.log10(_SPAN):
         return Verdict.INCOMPARABLE, f"fitted from {new.first} to {new.last}, not from {old.first} to {old.last}"
-    if _log(new.detects) > _log(old.detects) + max(_DETECTS, noise):
+    if log_of(new.detects) > log_of(old.detects) + max(_DETECTS, noise):
         return Verdict.WORSE, f"detects a fault of {new.detects} a step, not of {old.detects}"
     if "unresolved" in (old.growth, new.growth) and None in (old.lost_at, new.lost_at):
         return None  # it is not extrapolated
@@ -178,21 +179,13 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
         return None  # extrapolated by two powers
     if new.lost_at is not None:
         power = CLASSES.get(new.growth, math.inf)
-        earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)
+        earlier = (math.inf if old.lost_at is None else log_of(old.lost_at)) - log_of(new.lost_at)
         if earlier > _LOST_AT + (noise / power if power else 0.0):
             before = old.lost_at or "any"
             return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
     elif old.lost_at is not None:
         return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
     return None
-
-
-def _log(text: str | None) -> float:
-    """log10 of decimal text; 0 for none, -inf for 0."""
-    if text is None:
-        return 0.0
-    found = log10(exact(text))
-    return -math.inf if found is None else found
 
 
 # One series of a baseline against the same series of a candidate.
@@ -204,7 +197,7 @@ _LOST_SHARE = 10
 
 
 def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly: bool) -> Judged:
-    """The same samples, as many of them numbers, and no larger: single samples are noise, their median is not.
+    """Require the same samples, as many of them numbers, and no larger: single samples are noise, their median is not.
 
     allowed: decades by which the median of the ratios may grow, or where the series must agree ``exactly`` the part of
     its largest value by which each may be off.  floor: log10 below which all errors are the same.
@@ -255,17 +248,13 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def metric(self) -> str:
-        """What policies and other programs call it: ``drift_energy_max``, ``growth drift_energy``."""
+        """Its name in policies and other programs: ``drift_energy_max``, ``growth drift_energy``."""
         return f"{self.of} {self.name}".lstrip()
 
     @property
     def method(self) -> tuple[str, str]:
         """Whose it is: the integrator and its format."""
         return self.row.key.subject.name, self.row.key.precision
-
-    def set_off(self, mended: Collection[tuple[str, str]]) -> Finding:
-        """The finding; where it is slight and its integrator gained more than that, the same."""
-        return self.as_same() if self.slight and self.method in mended else self
 
     def as_same(self) -> Finding:
         """The finding, but that it is none."""
@@ -376,7 +365,7 @@ class RowComparison:
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
 
     def _limits(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """What is beyond its limit in a row that has no numbers in the baseline."""
+        """Findings of metrics beyond their limits in a row that has no numbers in the baseline."""
         if new.outcome == SUCCESS and self.policy.rule:
             rules = self.lookup.row(old.key.kind, old.case)
             for name, metric in new.metrics.items():
@@ -470,7 +459,7 @@ class RowComparison:
             yield Finding(key, name, judged[0], before, after, judged[1], "growth")
 
     def _series(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
-        """What changed in a series: that of a candidate which is the same is not a finding."""
+        """Findings of series that changed: an equal one is no finding."""
         for name, series in old.series.items():
             limits = self.lookup.metric(rules, f"series {name}")
             match = new.series.get(name)
@@ -492,7 +481,7 @@ class RowComparison:
                 yield Finding(key, name, judged[0], found[0], found[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """What makes numbers of a row incomparable beside the numbers themselves."""
+        """Findings beside the numbers themselves that make these incomparable."""
         if old.finite and not new.finite:
             yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
         if old.steps != new.steps and self.policy.flags != "ignore":
@@ -560,7 +549,7 @@ class RowComparison:
         return weaker(old.reference, new.reference)
 
     def _inconsistent(self, old: Row, new: Row) -> str:
-        """What in one of the rows contradicts something else in it."""
+        """The first contradiction within one of the rows; empty without any."""
         for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
             if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
                 return f"the {which} contradicts itself: {problem}"
@@ -571,7 +560,7 @@ class RowComparison:
         return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
 
     def _is_by_rounding(self, metric: Metric, match: Metric, old: Row) -> bool:
-        """Of a row whose noise was not measured: whether roundings alone make errors as large as either of the two."""
+        """Whether roundings alone make errors as large as either, in a row whose noise was not measured."""
         if old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
             return False
         kind = kind_of(old, self.kinds)
@@ -603,7 +592,7 @@ class RowComparison:
         return allowed and lost > limits.truncation and self._is_truncation(metric, match, old, new)
 
     def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
-        """The same of what a series is largest."""
+        """Whether roundings alone make the largest values of a series."""
         pairs = zip(_of_series(name, old, "max"), _of_series(name, new, "max"), strict=False)
         found = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
         return bool(found) and all(found)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
-from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
@@ -21,6 +20,7 @@ from heavytop.records import (
     UNRESOLVED_SECONDS,
     UNSUPPORTED,
     Against,
+    Certified,
     Metric,
     Row,
 )
@@ -43,7 +43,7 @@ from one radius to eleven."""
 
 
 class Verdict(Enum):
-    """What became of a metric, or of a whole row."""
+    """The verdict on a metric, or on a whole row."""
 
     SAME = "same"
     BETTER = "better"
@@ -332,18 +332,29 @@ def weaker(old: Against, new: Against) -> str:
         return f"compared with {_kind(old)} and with {_kind(new)}"
     if old.how == "equations" and old.method != new.method:
         return f"compared with {old.method!r} and {new.method!r}"
-    if _is_proven(old) and not _is_proven(new):
+    proven = [a.how == "proven" and all(c.proven != "computed" for c in a.certificates) for a in (old, new)]
+    if proven[0] and not proven[1]:
         return "the reference is no longer proven"
-    if _earlier(old.until, new.until):
+    if new.until and not (old.until and log_of(new.until) >= log_of(old.until) + math.log10(_TIME_KEPT)):
         return "the reference is valid until an earlier time"
-    if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES):
+    decades = _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES
+    if old.radius and not (new.radius and log_of(new.radius) <= log_of(old.radius) + decades):
         return "the radius of the reference is larger, or not said"
-    if not _kept(_digits(old), _digits(new), lambda before, after: after >= _DIGITS_KEPT * before):
-        return f"the reference is certified to {_digits_text(new)} digits, not {_digits_text(old)}"
-    starts = _starts(old), _starts(new)
-    if starts[0] is not None and (starts[1] is None or starts[1] < _TIME_KEPT * starts[0]):
+    return _certified_less(old.certificates, new.certificates)
+
+
+def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
+    digits, after = ([math.inf if each.digits is None else each.digits for each in part] for part in (old, new))
+    if not _kept(digits, after, lambda before, after: after >= _DIGITS_KEPT * before):
+        known, lacking = (
+            " and ".join("all" if math.isinf(each) else str(each) for each in part) or "no" for part in (digits, after)
+        )
+        return f"the reference is certified to {lacking} digits, not {known}"
+    starts = [next((each.starts for each in part if each.starts is not None), None) for part in (old, new)]
+    if starts[0] is not None and (starts[1] or 0) < _TIME_KEPT * starts[0]:
         return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
-    if not _kept(_times(old), _times(new), lambda before, after: after >= before + math.log10(_TIME_KEPT)):
+    times, earlier = ([log_of(each.time) for each in part] for part in (old, new))
+    if not _kept(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
         return "the reference is certified at an earlier time"
     return ""
 
@@ -354,46 +365,15 @@ def _kind(reference: Against) -> str:
     )
 
 
-def _is_proven(reference: Against) -> bool:
-    return reference.how == "proven" and all(each.proven != "computed" for each in reference.certificates)
-
-
-def _digits(reference: Against) -> tuple[float, ...]:
-    return tuple(math.inf if each.digits is None else each.digits for each in reference.certificates)
-
-
-def _digits_text(reference: Against) -> str:
-    return " and ".join("all" if math.isinf(each) else str(each) for each in _digits(reference)) or "no"
-
-
-def _starts(reference: Against) -> int | None:
-    """How many starts are certified."""
-    return next((each.starts for each in reference.certificates if each.starts is not None), None)
-
-
-def _times(reference: Against) -> tuple[float, ...]:
-    """log10 |t| of each certificate."""
-    return tuple(_log(each.time) for each in reference.certificates)
-
-
-def _log(text: str) -> float:
-    """log10 |number|, -inf for 0; nan for what is not a number, which is within no bound."""
+def log_of(text: str | None) -> float:
+    """log10 |number|, 0 without one, -inf for 0; nan for what is not a number, which is within no bound."""
     try:
-        size = log10(exact(text))
+        size = 0.0 if text is None else log10(exact(text))
     except InputError:
         return math.nan
     return -math.inf if size is None else size
 
 
-def _grew(old: str, new: str, decades: float) -> bool:
-    return bool(old) and (not new or not _log(new) <= _log(old) + decades)
-
-
-def _earlier(old: str, new: str) -> bool:
-    """Whether a truth that had an end, or none, ends at less than half of the time now."""
-    return bool(new) and not (old and _log(new) >= _log(old) + math.log10(_TIME_KEPT))
-
-
-def _kept(old: tuple[Any, ...], new: tuple[Any, ...], enough: Callable[[Any, Any], bool]) -> bool:
+def _kept(old: Sequence[float], new: Sequence[float], enough: Callable[[float, float], bool]) -> bool:
     """Whether each number that the baseline says is there, and is enough."""
     return len(new) >= len(old) and all(map(enough, old, new))

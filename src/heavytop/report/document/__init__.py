@@ -1,1 +1,1 @@
-"""What a measurement says as typed blocks: headline, cards, tables, charts, notes, and the protocol of a kind."""
+"""Measurements as typed blocks: headline, cards, tables, charts, notes, and the protocol of a kind."""

@@ -1,4 +1,4 @@
-"""What a report says of its rows: blocks with typed cells.  A kind of measurement gives one list of them, and the
+"""The document of a report: blocks with typed cells.  A kind of measurement gives one list of them, and the
 terminal, the page, JSON and Markdown show it.
 """
 
@@ -100,7 +100,7 @@ class Key:
 
 
 class Answers(NamedTuple):
-    """What the pictures of a section come to: cells under their columns; the first of each row names it."""
+    """The results that the pictures of a section show: cells under their columns; the first of each row names it."""
 
     caption: str
     columns: Sequence[str]

@@ -1,4 +1,4 @@
-"""What a report needs to know of a kind of measurement.  The kinds are in :mod:`heavytop.features.kinds`."""
+"""A kind of measurement as reports need it.  The kinds are in :mod:`heavytop.features.kinds`."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class ReportedKind(Protocol):
         return False
 
     def contradictions(self, row: Row) -> Iterator[str]:
-        """What contradicts something else in a row of this kind that succeeded, as ``FIELD: REASON``."""
+        """Contradictions within a row of this kind that succeeded, as ``FIELD: REASON``."""
         return iter(())
 
     def join(
@@ -75,7 +75,7 @@ class ReportedKind(Protocol):
         return None
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """What its measured rows, one at least, come to.  beside: what `score` wrote beside its row."""
+        """The blocks of its measured rows, one at least.  beside: what `score` wrote beside its row."""
         return ()
 
 
@@ -95,7 +95,7 @@ def kind_of(row: Row, kinds: Kinds) -> ReportedKind:
 
 
 def document(report: Report, kinds: Kinds, shown: In) -> dict[str, list[Block]]:
-    """What each kind that has measured rows says there; the kinds that are not known say nothing."""
+    """The blocks of each kind that has measured rows, shown there; the kinds that are not known say nothing."""
     measured: dict[str, list[Row]] = {}
     for row in report.rows:
         if row.outcome not in UNMEASURED:
@@ -108,6 +108,6 @@ def document(report: Report, kinds: Kinds, shown: In) -> dict[str, list[Block]]:
 
 
 def headlines(found: Document, kinds: Kinds) -> list[Headline]:
-    """Those of a document, in the order of the places of their kinds."""
+    """The headlines of a document, in the order of the places of their kinds."""
     order = sorted(found, key=lambda name: kinds[name].place)
     return [block for name in order for block in found[name] if isinstance(block, Headline)]

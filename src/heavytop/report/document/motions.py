@@ -1,4 +1,4 @@
-"""What the records of motions beside two reports come to, of one row that both have."""
+"""Motions that got worse, by the records beside two reports, of one row that both have."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from heavytop.records import Identity
 
 
 class LossLimits(Protocol):
-    """What a policy allows of one metric, in decades: its floor in eps, loss, and the factor of its noise."""
+    """The allowance of one metric, in decades: its floor in eps, loss, and the factor of its noise."""
 
     @property
     def floor(self) -> float: ...
@@ -41,7 +41,7 @@ class WorseMotion(msgspec.Struct, frozen=True):
 
 
 class WorseMotions(msgspec.Struct, frozen=True):
-    """Of one survey: how many motions both have, how many of them got worse, the first few, those that lost most first.
+    """Motions of one survey: how many both reports have, how many got worse, and those that lost most.
 
     reason: why the two are not joined by motion; empty where they are.
     """
@@ -54,7 +54,7 @@ class WorseMotions(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """What a comparison says of it; empty where no motion got worse."""
+        """A sentence of the comparison; empty where no motion got worse."""
         name = f"{self.row.case} by {self.row.integrator} {self.row.key.precision}"
         if self.reason:
             return f"The motions of {name} are not compared one by one: {self.reason}."

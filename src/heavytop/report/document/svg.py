@@ -199,7 +199,7 @@ _WIDE = 4.5
 
 
 def _inline(figure: Any, name: str) -> str:
-    """What stands in the <svg> of a page: ids of its own and only where needed, short numbers, the page's colours.
+    """The content of the <svg> of a page: ids of its own and only where needed, short numbers, the page's colours.
 
     The ids of clip paths and markers are hashes with ``name``; the others are numbered alike in every figure.
     """

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from heavytop.display import printable
 from heavytop.measure.certify import bits_of
-from heavytop.measure.derivatives import PARAMETERS, STARTS, DerivativeBall, Derivatives
+from heavytop.measure.derivatives import PARAMETERS, STARTS, Ball, Derivatives
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.precision import REAL_BITS, dot, exact, exact_text
@@ -280,7 +280,7 @@ def derivative_lines(times: Sequence[str], found: Derivatives) -> list[Renderabl
     return parts
 
 
-def _entries(time: str, matrix: Sequence[Sequence[DerivativeBall]], columns: Sequence[str]) -> Table:
+def _entries(time: str, matrix: Sequence[Sequence[Ball]], columns: Sequence[str]) -> Table:
     table = Table(box=None, show_header=False)
     table.add_row("t", Text(time, overflow="fold"))
     for name, row in zip(NAMES, matrix, strict=True):

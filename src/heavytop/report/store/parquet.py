@@ -19,31 +19,18 @@ _GROUP = 1 << 15
 """Lines in a row group, which is what is held in memory."""
 
 _OF_ROW = {
-    "measure": "string",
-    "case": "string",
-    "system": "string",
-    "integrator": "string",
-    "precision": "string",
+    **dict.fromkeys(("measure", "case", "system", "integrator", "precision"), "string"),
     "bits": "int32",
-    "outcome": "string",
-    "horizon": "string",
-    "time_reached": "string",
+    **dict.fromkeys(("outcome", "horizon", "time_reached"), "string"),
     "steps": "int64",
     "finite": "bool_",
-    "measured": "string",
-    "against": "string",
+    **dict.fromkeys(("measured", "against"), "string"),
     "starts": "int32",
 }
 _OF_METRIC = {"kind": "string", "value": "string", "log10": "float64", "bound": "string", "band": "float64"}
-_OF_LAW = {
-    "exponent": "float64",
-    "low": "float64",
-    "high": "float64",
-    "first": "string",
-    "last": "string",
-    "detects": "string",
-    "lost_at": "string",
-}
+_OF_LAW = dict.fromkeys(("exponent", "low", "high"), "float64") | dict.fromkeys(
+    ("first", "last", "detects", "lost_at"), "string"
+)
 _OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3, "rotor": 3}
 """How many components each has; 0 for a number."""
 _DATA = [f"{name}{i}" for name, count in _OF_DATA.items() for i in (range(1, count + 1) if count else ("",))]

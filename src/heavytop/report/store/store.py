@@ -131,7 +131,7 @@ def read(path: Path, kinds: Kinds) -> Report:
 
 
 def read_brief(path: Path, kinds: Kinds) -> Brief:
-    """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
+    """The report at ``path`` for a comparison; errors in a row are found as the rows are gone through."""
     return Brief(*_read(path, _Parts), kinds)
 
 

@@ -12,7 +12,8 @@ from math import comb, prod
 import sympy
 from flint import arb, fmpq_mpoly
 
-from heavytop.features.claims.algebra.evaluate import evaluate, wpinverse
+from heavytop.features.claims.algebra.elliptic import wpinverse
+from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import Sign
@@ -99,20 +100,37 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
         needs = {Need(ConditionKind.NONZERO, sympy.cos(u))}
     elif function in ("coth", "csch"):
         needs = {Need(ConditionKind.NONZERO, sympy.sinh(u))}
-    elif function in ("wp", "wpprime"):
+    elif function in ("wp", "wpprime", "wzeta"):
         text = f"{u} is no period of wp(u, {arguments[1]}, {arguments[2]})"
         needs = {Need(ConditionKind.NONZERO, wpinverse(*arguments), text)}
-    elif function in ("wp3", "wp3prime"):
+    elif function in ("wp3", "wp3prime", "wzeta3", "wsigma3"):
         _, g2, g3 = arguments
         needs = {Need(ConditionKind.POSITIVE, g2**3 - 27 * g3**2)}
-    elif function in NAMES:
-        m = arguments[1]
-        needs = {Need(ConditionKind.NONNEGATIVE, m), Need(ConditionKind.NONNEGATIVE, 1 - m, f"{m} ≤ 1")}
+    elif function in _OF_PARAMETER:
+        below, above = _OF_PARAMETER[function]
+        m = arguments[-1]
+        needs = {Need(below, m)} if below else set()
+        needs.add(Need(above, 1 - m, f"{m} {'<' if above is ConditionKind.POSITIVE else '≤'} 1"))
+        if function == "ellipticPi":
+            needs.add(Need(ConditionKind.POSITIVE, 1 - u, f"{u} < 1"))
+        if function == "thetaArgument":
+            needs.add(Need(ConditionKind.NONZERO, arguments[1]))
     elif function == "atan2":
         needs = {Need(ConditionKind.POSITIVE, u**2 + arguments[1] ** 2)}
     else:
         needs = set()
     return frozenset(need for need in needs if not _is_plain(need))
+
+
+_P, _N = ConditionKind.POSITIVE, ConditionKind.NONNEGATIVE
+_OF_PARAMETER: dict[str, tuple[ConditionKind | None, ConditionKind]] = {
+    **dict.fromkeys((*NAMES, "am"), (_N, _N)),
+    **dict.fromkeys(("Theta", "Eta", "thetan", "jacobiZeta", "modulus", *(f"theta{i}" for i in range(1, 5))), (_N, _P)),
+    **dict.fromkeys(("nome", "thetaRate", "thetaArgument"), (_P, _P)),
+    **dict.fromkeys(("ellipticF", "ellipticK", "ellipticPi"), (None, _P)),
+    "ellipticE": (None, _N),
+}
+"""What the last argument, a parameter m or a nome q, is compared with 0, and 1 with it."""
 
 
 def _is_plain(need: Need) -> bool:
@@ -129,7 +147,7 @@ def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
             continue
         if part.is_Pow:
             base, exponent = part.args
-            if exponent.is_Rational and exponent.q == 2:
+            if exponent.is_Rational and exponent.q % 2 == 0:
                 found |= condition("sqrt", (base,))
             if exponent.is_negative:
                 found |= condition("/", (base,))

@@ -16,6 +16,7 @@ from typing import Any
 import sympy
 from flint import fmpq_mpoly
 
+from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.functions import Refine, Transcendental
 from heavytop.features.claims.algebra.rational import Tower, forces_zero
@@ -27,7 +28,6 @@ _MAX_EXPONENT = 64
 _MAX_REFINEMENTS = 12
 _HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
 _INVERSE = ("asin", "acos", "atan", "atan2")
-_WEIERSTRASS = ("wp", "wpprime", "wp3", "wp3prime", "wpinverse")
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class Field:
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """symbol = bound + excess."""
         floor = self.enter(bound)
-        index = _index(self.enter(symbol))
+        index = used(self.enter(symbol).numerator).pop()
         if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
             excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
             self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
@@ -311,11 +311,11 @@ class Field:
             return tower.divide(tower.absolute(first), first)
         if name == "log":
             return self._transcendental.logarithm(first)
-        if name in _WEIERSTRASS:
+        if name in WEIERSTRASS:
             return self._transcendental.weierstrass(name, (first, arguments[1], arguments[2]))
         if name in NAMES:
             return self._transcendental.jacobi(name, first, arguments[1])
-        if name in _INVERSE:
+        if name in _INVERSE or name in FREE:
             return self._transcendental.function(name, tuple(arguments))
         raise Unprovable(f"{name} has no place in the algebra.")
 
@@ -323,9 +323,10 @@ class Field:
         base, exponent = e.args
         if exponent.is_Integer and abs(int(exponent)) <= _MAX_EXPONENT:
             return self.tower.power(self.enter(base), int(exponent))
-        if exponent.is_Rational and exponent.q == 2 and abs(int(exponent.p)) <= _MAX_EXPONENT:
-            return self.tower.power(self.tower.root(self.enter(base)), int(exponent.p))
-        raise Unprovable(f"The power {exponent} is no small multiple of 1/2.")
+        if exponent.is_Rational and exponent.q in (2, 4) and abs(int(exponent.p)) <= _MAX_EXPONENT:
+            root = self.tower.root(self.enter(base))
+            return self.tower.power(root if exponent.q == 2 else self.tower.root(root), int(exponent.p))
+        raise Unprovable(f"The power {exponent} is no small multiple of 1/4.")
 
     # --- and back ---------------------------------------------------------------------------------------------------
 
@@ -341,11 +342,6 @@ class Field:
             (square,) = self.tower.generators[index].arguments
             self._expressions[index] = sympy.sqrt(self.expression(square))
         return self._expressions[index]
-
-
-def _index(value: Quotient) -> int:
-    """The generator that a symbol is."""
-    return used(value.numerator).pop()
 
 
 def _placeholder(index: int) -> sympy.Symbol:
@@ -420,7 +416,7 @@ class Regularity:
                 return found
         if g.kind == "defined":
             return f"the definition of {g.meaning} is too large for the algebra"
-        if g.kind in ("wp", "wpinverse"):
+        if g.kind in ("wp", "wpinverse", "wzeta"):
             return f"{g.meaning} has poles"
         wanted = "> 0" if analytic else "≥ 0"
         if g.kind == "root":

@@ -14,7 +14,8 @@ import sympy
 from flint import fmpq_mpoly, fmpz
 
 from heavytop.features.claims.algebra import structure
-from heavytop.features.claims.algebra.evaluate import WEIERSTRASS, evaluate, wpinverse
+from heavytop.features.claims.algebra.elliptic import FREE, WEIERSTRASS, wpinverse
+from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.rational import Tower
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS, Sign
@@ -118,6 +119,10 @@ _RANGES = {
 }
 # 1 where the function increases, -1 where it decreases
 _MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
+_OF_ANGLE = ("am", "ellipticF", "ellipticE", "ellipticPi")
+"""Odd functions that increase."""
+_POSITIVE = {"thetan": True, "wsigma3": True, "modulus": False}
+"""Whether it is never 0."""
 Circle = tuple[Quotient, Quotient]
 
 
@@ -183,10 +188,9 @@ class Transcendental:
         if still and len(still) < len(terms):
             moving = [term for term in terms if not self._field.is_constant(term)]
             return [self._tower.sum(still), self._tower.sum(moving)]
-        return terms if all(self._is_multiple(term) for term in terms) else [argument]
-
-    def _is_multiple(self, argument: Quotient) -> bool:
-        return any(self._tower.ratio(argument, base) is not None for kind, base, _ in self._bases if kind == "exp")
+        bases = [base for kind, base, _ in self._bases if kind == "exp"]
+        multiples = all(any(self._tower.ratio(term, base) is not None for base in bases) for term in terms)
+        return terms if multiples else [argument]
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
@@ -284,14 +288,12 @@ class Transcendental:
 
     def _circle_of_number(self, value: Quotient) -> Circle | None:
         """(sin, cos) of a multiple of π/12, in square roots."""
-        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if self._is_number(value) else None
+        is_number = used(value.numerator) <= self._tower.signs.numbers.keys()
+        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if is_number else None
         if turn is None or 12 % turn.denominator:
             return None
         angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
         return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
-
-    def _is_number(self, value: Quotient) -> bool:
-        return used(value.numerator) <= self._tower.signs.numbers.keys()
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
         """((sin, cos) of an inverse function, n) where the value is n times it."""
@@ -304,6 +306,8 @@ class Transcendental:
         if index is None or coefficient.q != 1 or abs(coefficient.p) > _MAX_MULTIPLE:
             return None
         g = t.generators[index]
+        if g.kind == "am":
+            return (self.jacobi("sn", *g.arguments), self.jacobi("cn", *g.arguments)), int(coefficient.p)
         if g.kind not in _INVERSE:
             return None
         u, one = g.arguments[0], t.number(1)
@@ -453,7 +457,7 @@ class Transcendental:
             same = same_as(name, arguments[0], self._field, self._known)
             if same is not None:
                 return same
-            make = getattr(sympy, name)
+            make = FREE.get(name) or getattr(sympy, name)
             meaning = make(*(self._field.expression(argument) for argument in arguments), evaluate=False)
             sign = Sign(0, False)
             if name in ("asin", "atan"):
@@ -463,7 +467,13 @@ class Transcendental:
                     (self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments)))
                 )
                 sign = Sign(1, self._tower.sign(below).strict)
+            elif name in _OF_ANGLE:
+                sign = self._tower.sign(arguments[FREE[name].moving - 1])
+            elif name in _POSITIVE:
+                sign = Sign(1, _POSITIVE[name])
             index = self._new(name, meaning, arguments, sign)
+            if name == "modulus":
+                self._tower.signs.declare(1 - self._tower.gens[index], Sign(1, True))
             if name == "atan":
                 one_sided = sign.value if sign.strict else 0
                 low, high = 0 if one_sided > 0 else -1, 0 if one_sided < 0 else 1

@@ -194,7 +194,9 @@ class Region:
         cut = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
         round_ = set().union(*(zero.free_symbols for zero in self._always))
         return not near & cut and all(
-            not bound.free_symbols & round_ and is_small_polynomial(bound) and _degree(bound, fixed) <= 1
+            not bound.free_symbols & round_
+            and is_small_polynomial(bound)
+            and sympy.Poly(bound, *bound.free_symbols.difference(fixed)).total_degree() <= 1
             for bound in bounds
             if bound.free_symbols & near
         )
@@ -398,10 +400,6 @@ class Region:
             tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)
             for factor, _ in tower.signs.factors(p)[1]
         )
-
-
-def _degree(bound: sympy.Expr, fixed: Collection[sympy.Symbol]) -> int:
-    return int(sympy.Poly(bound, *bound.free_symbols.difference(fixed)).total_degree())
 
 
 _CONTINUOUS = "the formulas are real and continuous all over the domain"

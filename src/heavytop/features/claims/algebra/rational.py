@@ -188,15 +188,12 @@ class Tower(PolynomialRing):
             raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
         if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
             raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
-        self._divided_by(denominator)
+        if not denominator.is_constant():
+            self.divisors.setdefault(str(denominator), denominator)
         common = numerator.gcd(denominator) if numerator else denominator
         numerator, denominator = numerator / common, denominator / common
         lead = denominator.leading_coefficient()
         return Quotient(numerator / lead, denominator / lead)
-
-    def _divided_by(self, p: fmpq_mpoly) -> None:
-        if not p.is_constant():
-            self.divisors.setdefault(str(p), p)
 
     def sum(self, parts: Iterable[Quotient]) -> Quotient:
         """The sum of quotients."""

@@ -26,7 +26,7 @@ from flint import arb, fmpq
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra import structure
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
-from heavytop.features.claims.algebra.evaluate import WEIERSTRASS
+from heavytop.features.claims.algebra.elliptic import FORMULAS
 from heavytop.features.claims.algebra.structure import Defined
 from heavytop.precision import exact
 
@@ -35,7 +35,7 @@ FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
     "atan2": (sympy.atan2, 2),
     **{name: (getattr(structure, name), 2) for name in structure.NAMES},
-    **{name: (function, 3) for name, function in WEIERSTRASS.items()},
+    **FORMULAS,
 }
 _MAX_LENGTH = 10_000
 _MAX_NODES = 2_000
@@ -254,7 +254,8 @@ class _Parser(Descent):
         if token[:1].isdigit() or token[:1] == ".":
             return self._number(token)
         if token[:1].isalpha():
-            return self._function(token) if token in FUNCTIONS else self._name(token)
+            is_call = token in FUNCTIONS and (token not in self._names or self._next() == "(")
+            return self._function(token) if is_call else self._name(token)
         raise self._error(f"a number, a name or '(' expected, not {token[:20]!r}")
 
     def _number(self, token: str) -> Formula:

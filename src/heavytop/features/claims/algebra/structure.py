@@ -160,7 +160,7 @@ def sign_of(e: sympy.Expr) -> Sign:
 def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
     inside = sign_of(base)
     strict = inside.strict or bool(exponent < 0)
-    if exponent.q == 2 or exponent.p % 2 == 0:
+    if exponent.q % 2 == 0 or exponent.p % 2 == 0:
         return Sign(1, strict)
     return Sign(inside.value, strict) if exponent.q == 1 else UNKNOWN
 

@@ -18,13 +18,14 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, invalid
+from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
 # Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
@@ -80,11 +81,10 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
     try:
-        return ValueClaim(msgspec.convert(table, ValueFile), entry)
+        with prefixed(where):
+            return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {invalid(error)}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
-    except InputError as error:
-        raise InputError(f"{where}: {error.cause}", error.remedy) from None
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
@@ -140,7 +140,9 @@ def audit_claim(
     """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
     about, began = claim.about(asked), perf_counter()
     if isinstance(claim, ValueClaim):
-        return Audit(claim.name, about.name, claim.source, claim.rows(about), kind=claim.kind, entry=claim.entry)
+        return Audit(
+            claim.content.name, about.name, claim.content.source, claim.rows(about), kind=claim.kind, entry=claim.entry
+        )
     rows = judge(claim.statements(about), claim.setting, progress)
     deciding = would_decide(claim, about, rows, perf_counter() - began)
     why, solves = claim.explain(about, rows)
@@ -254,12 +256,8 @@ def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda:
         done()
         return found
 
-    with ThreadPoolExecutor(max_workers=_processors()) as pool:
+    with ThreadPoolExecutor(max_workers=processors()) as pool:
         return dict(zip((entry.id for entry in todo), pool.map(one, todo), strict=True))
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _kept(entry: Entry) -> Judged | None:
@@ -315,14 +313,10 @@ def child() -> None:
     try:
         answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
     except HeavyTopError as error:
-        answer = Answer(error=(_printable(error.cause), error.remedy))
+        # a path may hold bytes that are no characters
+        answer = Answer(error=(error.cause.encode(errors="replace").decode(), error.remedy))
     except MemoryError:
         answer = Answer(memory=True)
     except RecursionError:
         answer = Answer(depth=True)
     sys.stdout.buffer.write(msgspec.json.encode(answer))
-
-
-def _printable(text: str) -> str:
-    """Text that JSON can carry: a path may hold bytes that are no characters."""
-    return text.encode(errors="replace").decode()

@@ -14,7 +14,7 @@ import sympy
 from flint import arb
 from msgspec import structs
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
@@ -24,6 +24,7 @@ from heavytop.features.claims.algebra.conditions import (
     solve_relations,
     written,
 )
+from heavytop.features.claims.algebra.elliptic import FORMULAS
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
 from heavytop.features.claims.algebra.reader import (
@@ -202,18 +203,10 @@ def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
     return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
 
 
-def of_bodies(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[Need, ...]:
-    """∫ x xᵀ dm = ½ tr I − I is positive semidefinite: its principal minors are >= 0; () for numbers."""
-    matrix = sympy.Matrix(inertia)
-    if not matrix.free_symbols:
-        return ()
-    spread = sympy.eye(3) * matrix.trace() / 2 - matrix
-    return tuple(Need(ConditionKind.NONNEGATIVE, minor) for minor in _principal_minors(spread) if minor.free_symbols)
-
-
 TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
-RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variable) for variable in STATE)}
+"""Names that no parameter may have: an elliptic function is one only before a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """Of numerator and denominator of a number in a sample: 2000 digits."""
@@ -254,11 +247,8 @@ class Context:
         """The systems that the claim says something about."""
         if self.carried is not None:
             return (HEAVY_GYROSTAT,)
-        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self._turns_about_two)
-
-    @property
-    def _turns_about_two(self) -> bool:
-        return self.rotor is not None and not isinstance(self.top.inertia[0], tuple)
+        turns_about_two = self.rotor is not None and not isinstance(self.top.inertia[0], tuple)
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or turns_about_two)
 
     def parameters(self, system: System) -> Parameters:
         """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
@@ -342,10 +332,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
 
 def sample_number(text: str, what: str) -> Fraction:
     """The exact number of a sample, a state or a time; raises InputError for one of thousands of digits."""
-    try:
+    with prefixed(what):
         value = exact(text)
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
     if max(value.numerator.bit_length(), value.denominator.bit_length()) > _MOST_BITS:
         raise InputError(f"{what} = {quoted(text)[1:-1]} is too long a number.", "Use numbers of at most 2000 digits.")
     return value
@@ -423,16 +411,19 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
 
 
 def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
-    """No principal moment of a rigid body exceeds the sum of the other two; () for moments that are numbers.
+    """No principal moment of a rigid body exceeds the sum of the other two; of a tensor ∫ x xᵀ dm = ½ tr I − I is
+    positive semidefinite: its principal minors are >= 0.  () for numbers.
 
     A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
     top that no body is.
     """
-    if isinstance(inertia[0], tuple):
-        return of_bodies(inertia)
-    if not any(moment.free_symbols for moment in inertia):
+    matrix = sympy.Matrix(inertia)
+    if not matrix.free_symbols:
         return ()
-    return tuple(Need(ConditionKind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
+    if not isinstance(inertia[0], tuple):
+        return tuple(Need(ConditionKind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
+    minors = _principal_minors(sympy.eye(3) * matrix.trace() / 2 - matrix)
+    return tuple(Need(ConditionKind.NONNEGATIVE, minor) for minor in minors if minor.free_symbols)
 
 
 def of_file(asked: System | None, written: str | None, usual: System) -> System:

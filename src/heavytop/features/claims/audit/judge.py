@@ -129,24 +129,20 @@ class Audit(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``heavytop audit --json``."""
-        return (
-            {
-                "claim": self.claim,
-                "system": self.system,
-                "kind": self.kind,
-                "verdict": self.verdict,
-                "source": self.source,
-                "solves": list(self.solves),
-                "constants": dict(self.constants),
-                "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
-                "equations": [row.to_json() for row in self.rows],
-            }
-            | ({} if self.entry is None else {"entry": msgspec.to_builtins(self.entry)})
-            | self._missing()
-        )
-
-    def _missing(self) -> dict[str, Any]:
-        return {"would_decide": dict(self.deciding)} if self.deciding else {}
+        document = {
+            "claim": self.claim,
+            "system": self.system,
+            "kind": self.kind,
+            "verdict": self.verdict,
+            "source": self.source,
+            "solves": list(self.solves),
+            "constants": dict(self.constants),
+            "why": [msgspec.to_builtins(step) for step in self.why],
+            "equations": [row.to_json() for row in self.rows],
+        }
+        if self.entry is not None:
+            document["entry"] = msgspec.to_builtins(self.entry)
+        return document | ({"would_decide": dict(self.deciding)} if self.deciding else {})
 
     def _table(self) -> TitledTable:
         lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
@@ -158,7 +154,11 @@ def judge(
     statements: Sequence[Statement], setting: Setting, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[StatementVerdict, ...]:
     """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
-    statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
+    statements = [
+        # an identity that says nothing of a motion rests on what stands in it
+        s if s.formulas != Formulas() else replace(s, formulas=Formulas(needs=conditions_of([s.residual])))
+        for s in statements
+    ]
     prover, solved = Prover(statements, setting), setting.with_solutions()
     second = Prover(statements, solved) if setting.solutions else None
     rows = []
@@ -167,19 +167,10 @@ def judge(
         if row.holds is None and second is not None:
             # with a relation solved for a parameter more is seen, if not always
             with_solutions = _judge_one(statement, solved, second)
-            row = min(row, with_solutions, key=_what_is_open)
+            row = min(row, with_solutions, key=lambda r: (r.holds is None, sum(not c.discharged for c in r.conditions)))
         rows.append(row)
         progress(len(rows), len(statements))
     return tuple(rows)
-
-
-def _what_is_open(row: StatementVerdict) -> tuple[bool, int]:
-    return row.holds is None, sum(not condition.discharged for condition in row.conditions)
-
-
-def _bare(statement: Statement) -> Statement:
-    """An identity that says nothing of a motion rests on what stands in it."""
-    return replace(statement, formulas=Formulas(needs=conditions_of([statement.residual])))
 
 
 def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> StatementVerdict:

@@ -15,7 +15,7 @@ from heavytop.features.claims.algebra.conditions import Need
 from heavytop.features.claims.algebra.statement import Domain, Formulas, Statement
 from heavytop.features.claims.audit.judge import ExplanationStep
 from heavytop.precision import cross, dot
-from heavytop.top.attitude import gamma_from_angles, omega_from_angles
+from heavytop.top.attitude import attitude_from_angles, gamma_from_angles, omega_from_angles
 from heavytop.top.equations import (
     GYROSTAT,
     HEAVY_GYROSTAT,
@@ -90,14 +90,7 @@ class ClaimedMotion:
 
 def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
     """γ and ξ of the angles: they are continuous where the attitude is, at the poles too."""
-    sine, cosine = sympy.sin(phi), sympy.cos(phi)
-    tilt = sympy.cos(theta)
-    xi = (
-        sympy.cos(psi) * cosine - tilt * sine * sympy.sin(psi),
-        -sympy.cos(psi) * sine - tilt * cosine * sympy.sin(psi),
-        sympy.sin(theta) * sympy.sin(psi),
-    )
-    return (*gamma_from_angles(phi, theta, SYMBOLIC), *xi)
+    return (*gamma_from_angles(phi, theta, SYMBOLIC), *attitude_from_angles(phi, theta, psi, SYMBOLIC))
 
 
 def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:

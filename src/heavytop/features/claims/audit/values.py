@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from flint import arb
 
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, prefixed, quoted
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     ball,
@@ -28,18 +28,25 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
+from heavytop.features.claims.audit.context import Tensor, Text, Three, of_file
 from heavytop.features.claims.audit.judge import StatementVerdict
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import decimal_text, dot, exact, round_to
-from heavytop.top.attitude import Output
-from heavytop.top.bodies import motion_of
+from heavytop.top.attitude import Attitude, Output, rotated, transposed
+from heavytop.top.bodies import Body, motion_of
+from heavytop.top.equations import (
+    HEAVY_GYROSTAT,
+    HEAVY_TOP,
+    Integral,
+    Parameters,
+    System,
+    holding,
+    require_no_other_rotor,
+)
 from heavytop.top.heavy_top import HeavyTop, State
 
 if TYPE_CHECKING:
     from heavytop.exact.bodies import BodyMotion
-    from heavytop.top.attitude import Attitude
-    from heavytop.top.bodies import Body
-    from heavytop.top.equations import Integral, Parameters, System
 
 
 # A number as it stands in print: its value, the unit of its last digit, and how many of its digits are right.
@@ -85,8 +92,7 @@ class PrintedNumber:
 
     def right(self, error: Fraction) -> int:
         """How many digits are right of a number that is off by ``error`` ≥ 0: the most that are so to half a unit."""
-        room = self.unit / 2
-        count = self.digits
+        room, count = self.half_unit, self.digits
         while count and error > room:
             count, room = count - 1, room * 10
         return count
@@ -96,10 +102,6 @@ class PrintedNumber:
         """Half a unit of the last digit: by so much the true number may be off and be printed so."""
         return self.unit / 2
 
-
-Text = Annotated[str, msgspec.Meta(max_length=20_000)]
-Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
-Matrix = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
 
 SIZES = {"omega": 3, "gamma": 3, "quaternion": 4, "position": 3}
 """Components of each quantity; a first integral has one."""
@@ -128,7 +130,7 @@ class BodyTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     mass: Text
     gravity: Text
     centre: Three
-    inertia: Matrix
+    inertia: Tensor
     about: str | None = None
     rotor: Three | None = None
 
@@ -140,7 +142,7 @@ class StartTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     omega_space: Three | None = None
     gamma: Three | None = None
     quaternion: list[Text] | None = None
-    matrix: Matrix | None = None
+    matrix: Tensor | None = None
     euler: Text | None = None
     axis_angle: Text | None = None
     normalize: bool = False
@@ -236,28 +238,15 @@ class ValueClaim:
         object.__setattr__(self, "figures", tuple(_figures(self.content.value)))
         object.__setattr__(self, "given", _given(self.content))
 
-    @property
-    def name(self) -> str:
-        """As the file has it."""
-        return self.content.name
-
-    @property
-    def source(self) -> str:
-        """As the file has it."""
-        return self.content.source
-
     def about(self, asked: System | None) -> System:
         """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
 
         Raises InputError where the file names another one, or the system does not admit the body.
         """
-        from heavytop.features.claims.audit.context import of_file
-        from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, require_no_other_rotor
-
         usual = HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT
-        found = of_file(asked, self.content.system, usual)
-        require_no_other_rotor(found, self.given[0])
-        return found
+        about = of_file(asked, self.content.system, usual)
+        require_no_other_rotor(about, self.given[0])
+        return about
 
     def rows(self, about: System) -> tuple[StatementVerdict, ...]:
         """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
@@ -304,10 +293,8 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
 
 
 def _number(text: str, what: str) -> Fraction:
-    try:
+    with prefixed(what):
         return exact(text)
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
 
 
 def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
@@ -324,10 +311,8 @@ def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
         )
     values = msgspec.to_builtins(content.top or content.body) | msgspec.to_builtins(content.start)
     normalize = values.pop("normalize")
-    try:
+    with prefixed("top, body or start"):
         body, start = motion_of(values, normalize)
-    except InputError as error:
-        raise InputError(f"top, body or start: {error.cause}", error.remedy) from None
     if start.attitude is None:
         start.require_unit_gamma(remedy="Give exact numbers such as 3/5, 0, 4/5, or normalize = true in [start].")
     return body, start
@@ -356,7 +341,8 @@ def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Ju
     same = [judge_figure(figure, known[figure.component - 1]) for figure in group]
     if group[0].quantity != "quaternion":
         return same
-    other = [judge_figure(figure, _negative(known[figure.component - 1])) for figure in group]
+    opposite = [-value if isinstance(value, Fraction) else value.neg(exact=True) for value in known]
+    other = [judge_figure(figure, opposite[figure.component - 1]) for figure in group]
 
     def rank(judged: Sequence[Judgement]) -> tuple[int, Fraction]:
         verdicts = [each.holds for each in judged]
@@ -364,10 +350,6 @@ def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Ju
         return worst, sum((each.off[1] ** 2 for each in judged), Fraction(0))
 
     return min(same, other, key=rank)
-
-
-def _negative(value: Fraction | arb) -> Fraction | arb:
-    return -value if isinstance(value, Fraction) else value.neg(exact=True)
 
 
 def _row(figure: Figure, judged: Judgement, method: str, missing: str) -> StatementVerdict:
@@ -480,7 +462,6 @@ class _KnownNumbers:
     @cached_property
     def _integrals(self) -> dict[str, Integral]:
         """The first integrals that are constant along the motion, by name."""
-        from heavytop.top.equations import holding
 
         resolved = self.motion.resolved
         found = holding(resolved.top, resolved.start, self.system)
@@ -518,17 +499,10 @@ class _KnownNumbers:
 
     def _integral(self, integral: Integral, bits: int) -> Fraction | arb:
         """A first integral at the start: exactly, or as a ball of an irrational attitude."""
-        resolved = self.motion.resolved
+        resolved, body, start = self.motion.resolved, self.body, self.start
         if self._exact:
             p = self.system.parameters(resolved.top, resolved.start)
             return exact(integral.value(p, resolved.start.flat))
-        return self._integral_in_given_axes(integral, bits)
-
-    def _integral_in_given_axes(self, integral: Integral, bits: int) -> Fraction | arb:
-        """The same where the principal axes or the attitude are irrational."""
-        from heavytop.top.equations import Parameters
-
-        body, start = self.body, self.start
         tensor = body.inertia if isinstance(body, HeavyTop) else body.tensor
         p = Parameters(tensor, body.moment, body.rotor or (Fraction(0),) * 3)
         if start.attitude is None or start.attitude.exact_rows() is not None:
@@ -537,8 +511,6 @@ class _KnownNumbers:
 
     @whole_evaluation
     def _integral_of_balls(self, integral: Integral, p: Parameters, attitude: Attitude, bits: int) -> arb:
-        from heavytop.top.attitude import rotated, transposed
-
         with working_precision(bits + 4 * _SPARE_BITS):
             rows = attitude.rows(FUNCTIONS, ball)
             omega, space = _balls(self.start.omega), self.start.omega_space

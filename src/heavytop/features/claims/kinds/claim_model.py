@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from fractions import Fraction
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 from flint import arb
 
@@ -250,7 +250,7 @@ class ClaimModel(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
-        claim, branch = claim_of(task.given), _branch(task.key.subject)
+        claim, branch = claim_of(task.given), cast(Branch, task.key.subject.branch)
         truth, against = true_motion(claim, task.times)
         errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}
         metrics: dict[Quantity, Metric] = {}
@@ -350,10 +350,6 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
         return known.state(time, bits), list(xi)
 
     return delone, proven.against
-
-
-def _branch(subject: Subject) -> Branch:
-    return "printed" if subject.branch == "printed" else "smooth"
 
 
 def _values(row: Row, component: str) -> dict[str, str]:

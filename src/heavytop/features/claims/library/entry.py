@@ -7,7 +7,7 @@ how it was read, the verdict that is expected and what a reader should learn fro
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -116,13 +116,8 @@ def library() -> dict[str, Entry]:
 
 def file_of(name: str) -> Path | None:
     """The file of the entry with that id or alias; None where there is none."""
-    for entry in _named(name):
-        return FOLDER / f"{entry.id}.toml"
-    return None
-
-
-def _named(name: str) -> Iterator[Entry]:
-    return (entry for entry in library().values() if name == entry.id or name in entry.aliases)
+    named = (entry.id for entry in library().values() if name in (entry.id, *entry.aliases))
+    return next((FOLDER / f"{name}.toml" for name in named), None)
 
 
 def require_tag(tag: str) -> str:

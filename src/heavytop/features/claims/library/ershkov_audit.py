@@ -134,7 +134,6 @@ class PartialClaim:
     def explain(
         self, _about: System, _rows: Sequence[StatementVerdict]
     ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """See :class:`heavytop.features.claims.audit.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 
     def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:
@@ -293,7 +292,6 @@ class GeneralClaim:
     def explain(
         self, _about: System, _rows: Sequence[StatementVerdict]
     ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        """See :class:`heavytop.features.claims.audit.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 
     def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:

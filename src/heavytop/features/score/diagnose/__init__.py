@@ -1,1 +1,1 @@
-"""What went wrong with a trajectory that another program computed: hypotheses, each tried."""
+"""Mistakes in a trajectory that another program computed: hypotheses, each tried."""

@@ -16,6 +16,7 @@ from itertools import permutations, product
 
 import numpy
 
+from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, other_axes
 from heavytop.features.score.diagnose.readings import (
     BodyData,
     Course,
@@ -27,7 +28,6 @@ from heavytop.features.score.diagnose.readings import (
     rates_off,
     simulate,
     turning,
-    with_tensor,
 )
 from heavytop.features.score.diagnose.samples import (
     ALIKE,
@@ -37,17 +37,16 @@ from heavytop.features.score.diagnose.samples import (
     FLOOR,
     LIKELY_DROP,
     Array,
+    Diagnosis,
+    looked_at,
     named,
     notable,
     principal,
 )
 from heavytop.measure.attitude_error import FORMS
-from heavytop.precision import decimal_text
+from heavytop.precision import decimal_text, shown
 from heavytop.top.attitude import SEQUENCES
 
-MOST_SAMPLES = 24
-_TURNS = 60.0
-_FEW = 6
 WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""
 _NEIGHBOURS = 60
@@ -63,7 +62,6 @@ _NO_SHIFT = Fraction(0)
 _MOST_OTHERS = 3
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
-_UNITS_OF_OMEGA = {"degrees": 180 / numpy.pi, "turns": 0.5 / numpy.pi, "rpm": 30 / numpy.pi}
 _LENGTHS = {"1000": 1e3, "100": 1e2, "1/1000": 1e-3, "1/100": 1e-2, "1/0.3048": 1 / 0.3048, "0.3048": 0.3048}
 _GRAVITIES = {
     "9.81": 9.81,
@@ -82,21 +80,6 @@ BOTH, COLUMNS, START, DATA, RATES = "start and columns", "columns", "start", "da
 
 
 @dataclass(frozen=True, slots=True)
-class Mistake:
-    """What explains the columns.
-
-    kind: which; docs/score.md lists them.  numbers: what fits, by name, as text.  error, left: the largest error
-    relative to the size of each quantity, before and after it is mended.  looked: how many of the samples.
-    """
-
-    kind: str
-    numbers: dict[str, str]
-    error: float
-    left: float
-    looked: int
-
-
-@dataclass(frozen=True, slots=True)
 class _Try:
     """One supposition: how columns and start are read, and the body.  drop: how far the error must fall.
 
@@ -112,15 +95,6 @@ class _Try:
     shift: Fraction = Fraction(0)
     rates: bool = False
     still: bool = False
-
-
-def sampled(seen: Seen) -> Seen:
-    """At most :data:`MOST_SAMPLES` samples over the first turns of the body, or a few where they lie far apart."""
-    rate = turning(seen.body, seen.start.begin(seen.said, seen.body.tensor))
-    early = sum(abs(float(time)) * rate <= _TURNS for time in seen.times)
-    last = max(early, min(len(seen.times), _FEW))
-    spread = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
-    return seen.at(sorted(spread | set(range(min(last, _FEW)))))
 
 
 class _Courses:
@@ -145,22 +119,22 @@ class _Courses:
 
 
 class Suppositions:
-    """What may be wrong with a file, and the error of each of its samples with it.
+    """Mistakes that a file may have, and the error of each of its samples with them.
 
     step: of the method, where the file says it.
     """
 
     def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
-        self.every, self.seen = seen, sampled(seen)
-        self.courses = _Courses(self.seen)
-        self.early = _Courses(
-            self.seen.at(list(range(min(len(self.seen.times), FIRST[-1] + (not self.seen.times[0])))))
-        )
-        self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
+        rate = turning(seen.body, self.start)
+        self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
+        self.courses = _Courses(self.seen)
+        first = FIRST[-1] + (not self.seen.times[0])
+        self.early = _Courses(self.seen.at(list(range(min(len(self.seen.times), first)))))
+        self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
         self.tried: list[tuple[_Try, Array]] = []
 
-    def sure(self, first: int | None = None, drop: float = 0.0) -> Mistake | None:
+    def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
         """The simplest mistake among those that explain the columns about as well as the best; None where none does.
 
         first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
@@ -173,13 +147,13 @@ class Suppositions:
         if not self.tried:
             self.tried = [(each, self._left(each)) for each in _suppositions(self)]
         tried = [(each, each_error) for each, each_error in self.tried if first is None or each.drop == DROP]
-        found = _best(tried, own, looked, drop)
+        found = self._best(tried, own, looked, drop)
         if found is None and first is None and not drop and _forms(self.seen) & set(FORMS):
             pairs = [(each, self._left(each)) for each in _pairs(self.seen)]
-            found = _best(pairs, own, looked)
+            found = self._best(pairs, own, looked)
         return found
 
-    def of_rates(self) -> Mistake | None:
+    def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
         seen = self.every.at(list(range(min(_NEIGHBOURS, len(self.every.times)))))
         off = rates_off(seen, seen.said)
@@ -191,7 +165,13 @@ class Suppositions:
             key=lambda each: each[0],
             default=(own, "", {}),
         )
-        return Mistake(kind, {**numbers, "of": RATES}, own, left, len(seen.times)) if left * DROP <= own else None
+        return self._told(kind, {**numbers, "of": RATES}, own, left, seen) if left * DROP <= own else None
+
+    def _told(self, kind: str, numbers: dict[str, str], own: float, left: float, seen: Seen) -> Diagnosis:
+        """The diagnosis, found in the samples that were ``seen``."""
+        looked, states = len(seen.times), len(self.every.times)
+        until = None if looked == states else (looked, states, shown(seen.times[-1]))
+        return Diagnosis(kind, numbers, own, left, until)
 
     @cached_property
     def _refused(self) -> float:
@@ -227,22 +207,23 @@ class Suppositions:
             seen = replace(seen, columns={k: v for k, v in seen.columns.items() if not k.startswith("omega")})
         return errors(seen, course, each.columns or seen.said, body)
 
-
-def _best(tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0) -> Mistake | None:
-    largest = [(each, float(left[:looked].max())) for each, left in tried]
-    explained = [(each, left) for each, left in largest if left * (drop or each.drop) <= own]
-    if not explained:
-        return None
-    best = min(max(left, FLOOR) for _, left in explained)
-    alike = [(each, left) for each, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
-    first, _ = alike[0]
-    # of one kind the number that fits best
-    first, left = min((pair for pair in alike if pair[0].kind == first.kind), key=lambda pair: max(pair[1], FLOOR))
-    # with a number that was fitted more can be explained
-    equal = [each for each, _ in alike if each.drop <= first.drop]
-    others = list(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))[:_MOST_OTHERS]
-    numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(others)} if others else {})
-    return Mistake(first.kind, numbers, own, left, looked)
+    def _best(
+        self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
+    ) -> Diagnosis | None:
+        largest = [(each, float(left[:looked].max())) for each, left in tried]
+        explained = [(each, left) for each, left in largest if left * (drop or each.drop) <= own]
+        if not explained:
+            return None
+        best = min(max(left, FLOOR) for _, left in explained)
+        alike = [(each, left) for each, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
+        first, _ = alike[0]
+        # of one kind the number that fits best
+        first, left = min((pair for pair in alike if pair[0].kind == first.kind), key=lambda pair: max(pair[1], FLOOR))
+        # with a number that was fitted more can be explained
+        equal = [each for each, _ in alike if each.drop <= first.drop]
+        others = list(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))[:_MOST_OTHERS]
+        numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(others)} if others else {})
+        return replace(self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)])), likely=bool(drop))
 
 
 def _suppositions(given: Suppositions) -> Iterator[_Try]:
@@ -367,7 +348,7 @@ def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
     if forms & {"omega", "omega_space"}:
         frame = "body" if "omega_space" in forms else "space"
         yield "omega_frame", {"frame": frame, "key": f"frame = {frame}"}, replace(said, swapped=True)
-        for unit, factor in _UNITS_OF_OMEGA.items():
+        for unit, factor in UNITS_OF_OMEGA.items():
             yield f"omega_in_{unit}", {}, replace(said, omega=factor)
         yield "omega_reversed", {}, replace(said, omega=-1.0)
         yield "momentum", {}, replace(said, momentum=True)
@@ -376,7 +357,7 @@ def _vectors(said: Reading, forms: set[str]) -> Iterator[Named]:
 
 
 def _angles(said: Reading) -> Iterator[Named]:
-    """Of Euler angles: another unit, another sequence, about axes of space, other signs, and two of these."""
+    """Euler angles in another unit, another sequence, about axes of space, with other signs, and two of these."""
     yield "degrees", {"unit": "radians" if said.degrees else "degrees"}, replace(said, degrees=not said.degrees)
     yield "extrinsic", {"sequence": said.sequence}, replace(said, extrinsic=True)
     yield "angles_negated", {}, replace(said, negated=True)
@@ -394,7 +375,7 @@ def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
     yield "gravity_sign", {}, replace(body, gravity=-body.gravity)
     if body.force and body.centre.any():
         yield "no_gravity", {}, replace(body, gravity=0.0)
-    at_centre = body if body.about_centre else with_tensor(body, body.inertia - body.steiner)
+    at_centre = body if body.about_centre else replace(body, inertia=body.inertia - body.steiner)
     if body.mass and body.centre.any():
         yield "free_about_centre_of_mass", {}, replace(at_centre, gravity=0.0, about_centre=False, mass=None)
     if body.mass and body.steiner.any():
@@ -402,28 +383,23 @@ def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
         yield "inertia_about", {"about": where}, replace(body, about_centre=not body.about_centre)
     off = body.inertia - numpy.diag(numpy.diag(body.inertia))
     if off.any():
-        yield "products_of_inertia", {}, with_tensor(body, body.inertia - 2 * off)
+        yield "products_of_inertia", {}, replace(body, inertia=body.inertia - 2 * off)
         moments, axes = principal(body.inertia)
         for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
             named_so, again = axes @ turn, turn.T * moments @ turn
-            yield "tensor_axes_conjugated", {}, with_tensor(body, named_so.T @ again @ named_so)
+            yield "tensor_axes_conjugated", {}, replace(body, inertia=named_so.T @ again @ named_so)
     for name, factor in _GRAVITIES.items():
         yield "gravity_unit", {"factor": name}, replace(body, gravity=body.gravity * factor)
     yield "centre_reversed", {}, replace(body, centre=-body.centre)
     yield from _in_space_axes(seen)
     for name, factor in _INERTIAS.items():
-        yield "inertia_unit", {"factor": name}, with_tensor(body, body.inertia * factor)
+        yield "inertia_unit", {"factor": name}, replace(body, inertia=body.inertia * factor)
     for name, factor in _LENGTHS.items():
         yield "centre_unit", {"factor": name}, replace(body, centre=body.centre * factor)
-    for order in list(permutations(range(3)))[1:]:
-        places, numbers = list(order), {"axes": "".join(str(i + 1) for i in order)}
-        turned = body.inertia[numpy.ix_(places, places)]
-        yield "inertia_axes", numbers, with_tensor(body, turned)
-        yield "centre_axes", numbers, replace(body, centre=body.centre[places])
-        yield "body_data_axes", numbers, replace(body, inertia=turned, centre=body.centre[places])
-    for signs in list(product((1.0, -1.0), repeat=3))[1:-1]:
-        numbers = {"centre": ", ".join(f"{value:.6g}" for value in body.centre * signs)}
-        yield "centre_signs", numbers, replace(body, centre=body.centre * signs)
+    rotor = numpy.zeros(3) if body.rotor is None else body.rotor
+    for kind, numbers, inertia, centre, turned in other_axes(body.inertia, body.centre, rotor):
+        other = replace(body, inertia=inertia, centre=centre, rotor=None if body.rotor is None else turned)
+        yield "body_data_axes" if kind == "top_axes" else kind, numbers, other
 
 
 def _in_space_axes(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
@@ -432,7 +408,7 @@ def _in_space_axes(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]
     plain = seen.start.begin(replace(seen.said, up="z"), body.tensor).rotation
     for turn in (plain, plain.T):
         turned, centre = turn.T @ body.inertia @ turn, turn.T @ body.centre
-        yield "inertia_in_space_axes", {}, with_tensor(body, turned)
+        yield "inertia_in_space_axes", {}, replace(body, inertia=turned)
         yield "centre_in_space_axes", {}, replace(body, centre=centre)
         yield "data_in_space_axes", {}, replace(body, inertia=turned, centre=centre)
 

@@ -1,4 +1,4 @@
-"""What went wrong in a motion that is off, told by trying it: a supposition counts only if it explains the states.
+"""Mistakes in a motion that is off, told by trying them: a supposition counts only if it explains the states.
 
 Every supposition is a motion that is computed and compared with the states.  It is told if the error falls by two
 decades with it, by three where a number was fitted to the states; otherwise nothing is said.
@@ -7,7 +7,7 @@ decades with it, by three where a number was fitted to the states; otherwise not
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import chain
@@ -16,7 +16,7 @@ from sys import float_info
 import numpy
 
 from heavytop.features.score.diagnose import hypotheses
-from heavytop.features.score.diagnose.conventions import AS_LIKELY, WORTH_ASKING, Mistake, Suppositions
+from heavytop.features.score.diagnose.conventions import AS_LIKELY, WORTH_ASKING, Suppositions
 from heavytop.features.score.diagnose.readings import Seen, of_states
 from heavytop.features.score.diagnose.samples import (
     ALIKE,
@@ -28,13 +28,15 @@ from heavytop.features.score.diagnose.samples import (
     MOST_AT_ONCE,
     WITH_ATTITUDE,
     Array,
+    Diagnosis,
     Examined,
     FileAxes,
-    Units,
+    Hypothesis,
     examined,
+    in_units,
 )
 from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, rounding
-from heavytop.precision import Precision, decimal_text, shown
+from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -47,7 +49,7 @@ _CONSTANT = 100.0
 _OFF = 1e-3
 """... and by so much of what they may be; they vary if they vary by as much."""
 VARIES, AS_AT_START = "varies", "that of the start"
-"""What is said of first integrals that do not keep another value."""
+"""Words for first integrals that do not keep another value."""
 _FEWEST_ROWS = 4
 _FEWEST_STILL = 3
 _ALONE = 1000.0
@@ -66,25 +68,6 @@ _LONG = 1.5
 """The last interval between times is no measure of a state if it is so many times the longest other."""
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """A mistake that explains the states.
-
-    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
-    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
-    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
-    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
-    likely: whether the error falls by less than a statement asks for.
-    """
-
-    kind: str
-    numbers: dict[str, str] = field(default_factory=dict)
-    error: float | None = None
-    left: float | None = None
-    looked_at: tuple[int, int, str] | None = None
-    likely: bool = False
-
-
 def diagnose(
     top: HeavyTop,
     start: State,
@@ -98,7 +81,7 @@ def diagnose(
     seen: Seen | None = None,
     step: Fraction | None = None,
 ) -> list[Diagnosis]:
-    """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
+    """The explanation of the states of a motion: one mistake, or the digits they are written with; empty without any.
 
     relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
     errors: that of each state relative to the size of Ω and γ, up to where the reference ends; empty without one.
@@ -126,7 +109,7 @@ def diagnose(
 
 
 def _explanation(given: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
-    """What explains the states, from their motion or from the columns, over all samples or the first ones."""
+    """The explanation of the states, from their motion or from the columns, over all samples or the first ones."""
 
     @cache
     def on_samples(first: int | None) -> _Tried:
@@ -134,7 +117,7 @@ def _explanation(given: Examined | None, columns: Suppositions | None, columns_f
         return _tried(given, first)
 
     def told(first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
-        of_columns = (_of_columns(each, each.sure(first, drop), drop) for each in [columns] if each is not None)
+        of_columns = (each.sure(first, drop) for each in [columns] if each is not None)
         of_states = (_mistake(on_samples(first), drop) for _ in [given] if given is not None)
         found = chain(of_columns, of_states) if columns_first else chain(of_states, of_columns)
         each_told = (each for each in found if each is not None)
@@ -148,17 +131,9 @@ def _explanation(given: Examined | None, columns: Suppositions | None, columns_f
         exact = _looked_at(every, _lost_row(every))
     exact = exact or next((sure for first in FIRST if (sure := told(first)) is not None), None)
     if exact is None and columns is not None:
-        exact = _of_columns(columns, columns.of_rates())
+        exact = columns.of_rates()
     likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
     return exact or likely or (None if given is None else _looked_at(given, _integrals_off(given)))
-
-
-def _of_columns(columns: Suppositions, found: Mistake | None, drop: float = 0.0) -> Diagnosis | None:
-    if found is None:
-        return None
-    looked, of = found.looked, len(columns.every.times)
-    until = None if looked == of else (looked, of, shown(columns.seen.times[min(looked, len(columns.seen.times)) - 1]))
-    return Diagnosis(found.kind, found.numbers, found.error, found.left, until, bool(drop))
 
 
 def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
@@ -182,12 +157,12 @@ def _only_rounded(written: Rounding | None, error: float | None, given: Examined
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
-    """What was tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
+    """Hypotheses tried on some of the samples.  error: of the motion as given.  fitted: with fitted numbers too."""
 
     given: Examined
     truth: Array | None
     error: float
-    suppositions: list[Supposition]
+    hypotheses: list[Hypothesis]
     fitted: bool
 
 
@@ -196,7 +171,7 @@ def _tried(given: Examined, first: int | None) -> _Tried:
     given = given if first is None else given.at(given.rows[: first + (not given.times[0])])
     truth = given.supposed(given.times)
     error = _TOO_FAR if truth is None else given.error(truth)
-    tried = [*_suppositions(given, truth, first is None)] if error > WORTH_ASKING else []
+    tried = [*_hypotheses(given, truth, first is None)] if error > WORTH_ASKING else []
     return _Tried(given, truth, error, tried, first is None)
 
 
@@ -206,16 +181,16 @@ def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
     drop: a smaller one than usual, of suppositions without a fitted number.
     """
     given, error = tried.given, tried.error
-    explained = [each for each in tried.suppositions if each[2] * (drop or each[3]) <= error]
-    explained = [each for each in explained if each[3] == DROP or not drop]
+    explained = [each for each in tried.hypotheses if each.left * (drop or each.drop) <= error]
+    explained = [each for each in explained if each.drop == DROP or not drop]
     if not explained and error > _WRONG and tried.fitted and not drop:
-        others = hypotheses.suppositions(given, tried.truth)
-        explained = [(*each, FITTED_DROP) for each in others if each[2] * FITTED_DROP <= error]
+        others = hypotheses.of_equations(given, tried.truth)
+        explained = [each for each in others if each.left * FITTED_DROP <= error]
     if not explained:
         return None
-    best = min(max(left, FLOOR) for *_, left, _ in explained)
-    kind, numbers, left, _ = next(each for each in explained if each[2] <= (AS_LIKELY if drop else ALIKE) * best)
-    return _looked_at(given, Diagnosis(kind, numbers, error, left, likely=bool(drop)))
+    best = min(max(each.left, FLOOR) for each in explained)
+    first = next(each for each in explained if each.left <= (AS_LIKELY if drop else ALIKE) * best)
+    return _looked_at(given, Diagnosis(first.kind, first.numbers, error, first.left, likely=bool(drop)))
 
 
 def _reset(given: Examined | None) -> Diagnosis | None:
@@ -244,7 +219,7 @@ def _reset(given: Examined | None) -> Diagnosis | None:
         moved = again.supposed([time - every.times[row] + Fraction(grid[place]) for time in again.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
         if jumps and moved is not None and (left := again.error(moved)) * _AGAIN <= (error := float(own[rows].max())):
-            return Diagnosis("reset", {"t": _text(times[row], every.units.time)}, error, left)
+            return Diagnosis("reset", {"t": in_units(times[row], every.units.time)}, error, left)
     return None
 
 
@@ -258,7 +233,7 @@ def _still(
         return None
     if same == len(states):
         return Diagnosis("constant")
-    first = _text(given.all_times[-same], given.units.time)
+    first = in_units(given.all_times[-same], given.units.time)
     return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
 
 
@@ -315,69 +290,32 @@ def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors:
 
 
 def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
-    """The same, with how many of the states it was found in, where that is not all of them."""
+    """The diagnosis with how many of the states it was found in, where that is not all of them."""
     looked, all_of_them = len(given.rows), len(given.all_times)
     if found is None or looked == all_of_them:
         return found
-    return replace(found, looked_at=(looked, all_of_them, _text(given.times[-1], given.units.time)))
+    return replace(found, looked_at=(looked, all_of_them, in_units(given.times[-1], given.units.time)))
 
 
-Supposition = tuple[str, dict[str, str], float, float]
-"""Kind, numbers, the error that is left, and how far it must have fallen."""
-
-
-def _suppositions(given: Examined, truth: Array | None, fitted: bool) -> Iterator[Supposition]:
+def _hypotheses(given: Examined, truth: Array | None, fitted: bool) -> Iterator[Hypothesis]:
     """The simplest first, those with a fitted number last, if at all."""
-    reading = None if truth is None else hypotheses.reading(given, truth)
-    if reading is not None and reading[0].changes == 1:
-        yield _of_reading(*reading)
-    for data, left in hypotheses.without_numbers(given):
-        yield data.kind, dict(data.numbers), left, DROP
+    columns, error = (None, 0.0) if truth is None else hypotheses.reading(given, truth) or (None, 0.0)
+    if columns is not None and columns.changes == 1:
+        yield columns.leaving(error)
+    yield from hypotheses.without_numbers(given)
     clock = hypotheses.clock(given, fitted)
-    if clock is not None and not clock[0].fitted:
-        yield _of_clock(*clock, given.units)
-    if reading is not None and reading[0].changes > 1:
-        yield _of_reading(*reading)
+    if clock is not None and clock.drop == DROP:
+        yield clock
+    if columns is not None and columns.changes > 1:
+        yield columns.leaving(error)
     if not fitted:
         return
     if truth is not None:
-        yield from ((*each, FITTED_DROP) for each in hypotheses.scaled(given, truth))
-    if clock is not None and clock[0].fitted:
-        yield _of_clock(*clock, given.units)
-    fits = (
-        hypotheses.all_scaled,
-        hypotheses.another_weight,
-        hypotheses.another_start,
-        hypotheses.another_top,
-    )
-    for supposed in fits:
-        found = supposed(given)
-        if found is not None:
-            data, left = found
-            yield data.kind, dict(data.numbers), left, max(FITTED_DROP, data.required)
-
-
-def _of_reading(reading: hypotheses.ColumnsHypothesis, left: float) -> Supposition:
-    numbers: dict[str, str] = {}
-    if reading.meaning:
-        numbers["meaning"] = reading.meaning
-    if reading.axes != (1, 2, 3):
-        numbers |= {"axes": ",".join(map(str, reading.axes)), "of": reading.of}
-    if reading.swapped:
-        numbers["order"] = "gamma before omega"
-    if len(numbers) == 1 and reading.meaning:
-        return reading.meaning, {}, left, DROP
-    if reading.swapped and len(numbers) == 1:
-        return "columns_swapped", {}, left, DROP
-    return ("axes_permuted" if "meaning" not in numbers and not reading.swapped else "columns"), numbers, left, DROP
-
-
-def _of_clock(clock: hypotheses.TimesHypothesis, left: float, units: Units) -> Supposition:
-    numbers = {"shift": _text(clock.shift, units.time)} if clock.kind == "times_shifted" else {}
-    if clock.kind == "time_unit":
-        steps = hypotheses.steps_of_interval(clock.factor)
-        numbers = {"factor": f"{clock.factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
-    return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
+        yield from hypotheses.scaled(given, truth)
+    if clock is not None and clock.drop > DROP:
+        yield clock
+    fits = hypotheses.all_scaled, hypotheses.another_weight, hypotheses.another_start, hypotheses.another_top
+    yield from (hypothesis for fit in fits if (hypothesis := fit(given)) is not None)
 
 
 def _lost_row(every: Examined) -> Diagnosis | None:
@@ -398,7 +336,9 @@ def _lost_row(every: Examined) -> Diagnosis | None:
         left = [max(own[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
         row = int(numpy.argmin(left))
         if left[row] * _ALONE <= own.max():
-            return Diagnosis(kind, {"t": _text(times[row + 1], every.units.time)}, float(own.max()), float(left[row]))
+            return Diagnosis(
+                kind, {"t": in_units(times[row + 1], every.units.time)}, float(own.max()), float(left[row])
+            )
     return None
 
 
@@ -424,7 +364,7 @@ def _integrals_off(given: Examined) -> Diagnosis | None:
         if not varies <= _OFF * size:
             numbers[integral.name] = VARIES
         elif off > max(_CONSTANT * varies, _OFF * size):
-            numbers[integral.name] = f"{_text(values.mean(), unit)}, not {_text(at_start, unit)}"
+            numbers[integral.name] = f"{in_units(values.mean(), unit)}, not {in_units(at_start, unit)}"
         elif off <= _OFF * size:
             numbers[integral.name] = AS_AT_START
     told = set(numbers.values()) - {VARIES, AS_AT_START}
@@ -432,7 +372,7 @@ def _integrals_off(given: Examined) -> Diagnosis | None:
 
 
 def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
-    """What the integrals that are looked at may be, and their units."""
+    """Sizes of the integrals that are looked at, and their units."""
     p = given.system.parameters(given.top, given.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
     rotor = max(abs(float(value)) for value in given.top.rotor or (0,))
@@ -446,9 +386,3 @@ def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
         "momentum_squared": (area**2, area_unit**2),
         "spin": (given.rate, 1 / given.units.time),
     }
-
-
-def _text(value: float | Fraction, unit: Fraction) -> str:
-    """A number of the data's own units, to six digits."""
-    text = decimal_text(Fraction(value) * unit, 6)
-    return text.rstrip("0").rstrip(".") if "." in text and "E" not in text else text

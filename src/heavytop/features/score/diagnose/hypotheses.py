@@ -27,7 +27,9 @@ from heavytop.features.score.diagnose.samples import (
     SMALL,
     Array,
     Examined,
+    Hypothesis,
     floats,
+    in_units,
     named,
     notable,
 )
@@ -63,7 +65,7 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 
 @dataclass(frozen=True, slots=True)
 class ColumnsHypothesis:
-    """What the six columns may be.
+    """A meaning of the six columns.
 
     meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
     of: "both", "omega" or "gamma", the vectors whose axes these are.  swapped: γ stands before Ω.
@@ -93,6 +95,17 @@ class ColumnsHypothesis:
             gamma = gamma[:, order] * signs
         return numpy.hstack([gamma, omega] if self.swapped else [omega, gamma])
 
+    def leaving(self, left: float) -> Hypothesis:
+        """The mistake that such columns are."""
+        numbers = {"meaning": self.meaning} if self.meaning else {}
+        if self.axes != (1, 2, 3):
+            numbers |= {"axes": ",".join(map(str, self.axes)), "of": self.of}
+        if self.swapped:
+            numbers["order"] = "gamma before omega"
+        if len(numbers) == 1 and (self.meaning or self.swapped):
+            return Hypothesis(self.meaning or "columns_swapped", {}, left)
+        return Hypothesis("columns" if self.meaning or self.swapped else "axes_permuted", numbers, left)
+
 
 def _readings() -> Iterator[ColumnsHypothesis]:
     renamed = [(a, b, c) for a, b, c in permutations((1, 2, 3))]
@@ -120,7 +133,7 @@ def reading(given: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | 
     )
 
 
-def scaled(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+def scaled(given: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Ω, γ or one column times a constant factor: kind, numbers, and the error of the states divided by the factor."""
     groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
     groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
@@ -137,8 +150,8 @@ def scaled(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str],
         factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
         if factor and factor != -1 and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
-            text = decimal_text(factor, 8)
-            yield kind, {**numbers, "factor": text}, _divided(given, truth, columns, float(factor))
+            numbers["factor"] = decimal_text(factor, 8)
+            yield Hypothesis(kind, numbers, _divided(given, truth, columns, float(factor)), FITTED_DROP)
 
 
 def _divided(given: Examined, truth: Array, columns: slice, factor: float) -> float:
@@ -147,7 +160,7 @@ def _divided(given: Examined, truth: Array, columns: slice, factor: float) -> fl
     return replace(given, states=states).error(truth)
 
 
-def constant_column(given: Examined, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+def constant_column(given: Examined, truth: Array) -> Iterator[Hypothesis]:
     """A column that is the same in every state, and the error of the other five."""
     if len(given.rows) < _FEWEST:
         return
@@ -157,7 +170,7 @@ def constant_column(given: Examined, truth: Array) -> Iterator[tuple[str, dict[s
         states[:, column] = truth[:, column]
         value = Fraction(float(given.states[0, column])) / (given.units.time if column < 3 else 1)
         numbers = {"column": NAMES[column], "value": decimal_text(value, 6)}
-        yield "column_constant", numbers, replace(given, states=states).error(truth)
+        yield Hypothesis("column_constant", numbers, replace(given, states=states).error(truth), FITTED_DROP)
 
 
 _SINGULAR = 1e-4
@@ -176,24 +189,8 @@ _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
 
 
-@dataclass(frozen=True, slots=True)
-class DataHypothesis:
-    """What the data may be: the kind of mistake, and the numbers that fit by the name of what they replace.
-
-    fitted: whether they were fitted.  required: how far the error must fall, where more than usual.
-    """
-
-    kind: str
-    numbers: tuple[tuple[str, str], ...] = ()
-    fitted: bool = False
-    required: float = 0.0
-
-
-Found = tuple[DataHypothesis, float]
-
-
-def without_numbers(given: Examined) -> Iterator[Found]:
-    """Suppositions that need no fitted number, the likeliest first."""
+def without_numbers(given: Examined) -> Iterator[Hypothesis]:
+    """Mistakes of the data that need no fitted number, the likeliest first."""
     top, start = given.top, given.start
     if top.weight:
         yield _tried(given, "no_gravity", replace(top, weight=Fraction(0)))
@@ -205,50 +202,45 @@ def without_numbers(given: Examined) -> Iterator[Found]:
     yield _tried(given, "start_momentum", start=momentum)
     yield _as_momentum(given, momentum)
     for unit, factor in UNITS_OF_OMEGA.items():
-        yield DataHypothesis(f"all_in_{unit}"), _all_times(given, factor)
+        yield Hypothesis(f"all_in_{unit}", {}, _all_times(given, factor))
     other = GYROSTAT if given.system is HEAVY_TOP else HEAVY_TOP
     yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
     if top.rotor is not None:
         yield _tried(given, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
-    tensor, moment, rotor = given.tensor, given.in_file(top.moment), given.in_file(k)
+    own = given.tensor, given.in_file(top.centre), given.in_file(k)
+    for kind, numbers, *body in other_axes(*own):
+        if not all(map(numpy.array_equal, body, own)):
+            supposed = given.with_body(body[0], float(top.weight) * body[1], body[2])
+            yield Hypothesis(kind, numbers, supposed.error(supposed.supposed(given.times)))
+
+
+def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
+    """Kind, numbers, tensor, centre and rotor: their axes in another order, and other signs of the centre."""
     for order in list(permutations(range(3)))[1:]:
-        places = list(order)
-        axes = (("axes", "".join(str(i + 1) for i in order)),)
+        places, numbers = list(order), {"axes": "".join(str(i + 1) for i in order)}
         turned = tensor[numpy.ix_(places, places)]
-        yield _with_body(given, "inertia_axes", turned, moment, rotor, axes)
-        yield _with_body(given, "centre_axes", tensor, moment[places], rotor, axes)
-        yield _with_body(given, "top_axes", turned, moment[places], rotor[places], axes)
-    centre = given.in_file(top.centre)
+        yield "inertia_axes", numbers, turned, centre, rotor
+        yield "centre_axes", numbers, tensor, centre[places], rotor
+        yield "top_axes", numbers, turned, centre[places], rotor[places]
     for signs in list(product((1, -1), repeat=3))[1:-1]:
         texts = (_text(named(value, 1e-15 * abs(value))) for value in centre * signs)
-        yield _with_body(given, "centre_signs", tensor, moment * signs, rotor, (("centre", ", ".join(texts)),))
+        yield "centre_signs", {"centre": ", ".join(texts)}, tensor, centre * signs, rotor
 
 
-def _with_body(
-    given: Examined, kind: str, tensor: Array, moment: Array, rotor: Array, numbers: tuple[tuple[str, str], ...]
-) -> Found:
-    """The error with a body that has other axes."""
-    same = (given.tensor, given.in_file(given.top.moment), given.in_file(given.top.rotor or (Fraction(0),) * 3))
-    if all(numpy.array_equal(one, other) for one, other in zip((tensor, moment, rotor), same, strict=True)):
-        return DataHypothesis(kind), float("inf")
-    supposed = given.with_body(tensor, moment, rotor)
-    return DataHypothesis(kind, numbers), supposed.error(supposed.supposed(given.times))
-
-
-def _tried(given: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Found:
+def _tried(given: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Hypothesis:
     tops = (top or given.top, given.top)
     same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
     if same and (start is None or start == given.start) and kind != "system":
-        return DataHypothesis(kind), float("inf")
-    return DataHypothesis(kind), given.error(given.supposed(given.times, top, start))
+        return Hypothesis(kind, {}, float("inf"))
+    return Hypothesis(kind, {}, given.error(given.supposed(given.times, top, start)))
 
 
-def _as_momentum(given: Examined, start: State) -> Found:
+def _as_momentum(given: Examined, start: State) -> Hypothesis:
     """Start and states give M in place of Ω."""
     truth = given.supposed(given.times, start=start)
     if truth is not None:
         truth[:, :3] = truth[:, :3] @ given.tensor + given.in_file(given.top.rotor or (Fraction(0),) * 3)
-    return DataHypothesis("all_momentum"), given.error(truth)
+    return Hypothesis("all_momentum", {}, given.error(truth))
 
 
 def _all_times(given: Examined, factor: float) -> float:
@@ -258,7 +250,7 @@ def _all_times(given: Examined, factor: float) -> float:
     return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
 
 
-def all_scaled(given: Examined) -> Found | None:
+def all_scaled(given: Examined) -> Hypothesis | None:
     """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
     square = _weight_ratio(given)
     if square is None or square <= 0:
@@ -268,9 +260,8 @@ def all_scaled(given: Examined) -> Found | None:
     factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
     if not factor or not notable(factor, Fraction(1)):
         return None
-    return DataHypothesis("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(
-        given, float(factor)
-    )
+    numbers = {"factor": decimal_text(factor, 8)}
+    return Hypothesis("all_scaled", numbers, _all_times(given, float(factor)), FITTED_DROP)
 
 
 def _weight_ratio(given: Examined) -> float | None:
@@ -286,7 +277,7 @@ def _weight_ratio(given: Examined) -> float | None:
     return ratio if isfinite(ratio) else None
 
 
-def another_weight(given: Examined) -> Found | None:
+def another_weight(given: Examined) -> Hypothesis | None:
     """P from the energy."""
     ratio, old = _weight_ratio(given), given.top.weight
     if ratio is None or not isfinite(ratio * float(old)):
@@ -297,10 +288,10 @@ def another_weight(given: Examined) -> Found | None:
     weight, error = _roundest([(weight, given.error(given.supposed(given.times, top))) for weight, top in tops])
     if not notable(weight, old):
         return None
-    return DataHypothesis("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
+    return Hypothesis("weight", {"P": _text(weight * given.units.moment)}, error, FITTED_DROP)
 
 
-def another_start(given: Examined) -> Found | None:
+def another_start(given: Examined) -> Hypothesis | None:
     """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
 
     The error must fall by more than the motion itself magnifies it from the start to the first sample: where
@@ -328,8 +319,8 @@ def another_start(given: Examined) -> Found | None:
     # a method of low order carries an error of its first step along as another start
     if not any(large or _is_round(new, near) for _, new, _, large, near in changed):
         return None
-    numbers = tuple((name, _text(new / unit)) for name, new, unit, *_ in changed)
-    return DataHypothesis("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+    numbers = {name: _text(new / unit) for name, new, unit, *_ in changed}
+    return Hypothesis("start", numbers, error, FITTED_DROP * max(1.0, magnified))
 
 
 def _is_round(new: Fraction, near: float) -> bool:
@@ -345,7 +336,7 @@ def _shows_at_once(given: Examined, first: Array) -> bool:
     return early >= _AT_ONCE * largest
 
 
-def another_top(given: Examined) -> Found | None:
+def another_top(given: Examined) -> Hypothesis | None:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
     entries = _PRODUCTS if _is_full(given) else _PRODUCTS[:3]
     direction = _conserving(given, entries) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
@@ -358,11 +349,11 @@ def another_top(given: Examined) -> Found | None:
     units = [given.units.inertia] * len(numbers[3:]) + [given.units.moment] * 3
     names = [f"I{i + 1}{j + 1}" if _is_full(given) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
     entries_of = zip(names, before, numbers, units, strict=True)
-    changed = [(name, _text(new * unit)) for name, old, new, unit in entries_of if new != old]
+    changed = {name: _text(new * unit) for name, old, new, unit in entries_of if new != old}
     told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
     if not told or len(changed) > _MOST_CHANGED:
         return None
-    return DataHypothesis("top", tuple(changed), fitted=True), error
+    return Hypothesis("top", changed, error, FITTED_DROP)
 
 
 _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -446,10 +437,6 @@ def _text(value: Fraction) -> str:
 # These are asked after everything simpler.
 
 
-FoundEquations = tuple[str, dict[str, str], float]
-"""Kind, numbers, and the error that is left."""
-
-
 def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
     """The heavy top with γ' = Ω × γ."""
     return (*heavy_top(p, y)[:3], *cross(y[:3], y[3:6]))
@@ -461,9 +448,9 @@ _ANOTHER_MOTION = 0.03
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
-def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquations]:
-    """Each with the error that is left; one equation with the other sign only where nothing else fits."""
-    found: list[FoundEquations] = []
+def of_equations(given: Examined, truth: Array | None) -> Iterator[Hypothesis]:
+    """Other equations, axes and orders; one equation with the other sign only where nothing else fits."""
+    found: list[Hypothesis] = []
     if truth is not None:
         found += constant_column(given, truth)
         found += [_any_order(given, truth), *_axes_of_space(given, truth)] if len(given.frame.columns) == 6 else []
@@ -471,16 +458,16 @@ def suppositions(given: Examined, truth: Array | None) -> Iterator[FoundEquation
         found += _signs(given)
     yield from found
     error = given.error(truth)
-    if given.is_whole and error > _ANOTHER_MOTION and all(left * FITTED_DROP > error for *_, left in found):
+    if given.is_whole and error > _ANOTHER_MOTION and all(each.left * FITTED_DROP > error for each in found):
         for place, name in enumerate(NAMES):
             system = _negated(given.system, place, tuple(map(tuple, given.frame.axes.tolist())))
             supposed = replace(given, system=system).supposed(given.times)
-            yield "component_sign", {"column": name}, given.error(supposed)
+            yield Hypothesis("component_sign", {"column": name}, given.error(supposed), FITTED_DROP)
 
 
 @lru_cache(maxsize=18)
 def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) -> System:
-    """The same equations with the derivative of one component, in the axes of the file, negated."""
+    """The equations with the derivative of one component, in the axes of the file, negated."""
     along, block = axes[place % 3], slice(place - place % 3, place - place % 3 + 3)
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:
@@ -495,24 +482,22 @@ def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) ->
     return replace(system, name=name, field=field)
 
 
-def _signs(given: Examined) -> Iterator[FoundEquations]:
+def _signs(given: Examined) -> Iterator[Hypothesis]:
     """A sign in the equations turned over.
 
     With −Ω in the place of Ω, M' = Ω × M + P γ × r is M' = M × Ω − P γ × r, and γ' = γ × Ω is γ' = Ω × γ.
     """
     top, start = given.top, given.start
-    lifted, reversed_start = (
-        replace(top, weight=-top.weight),
-        State([-w for w in start.omega], start.gamma),
-    )
+    lifted, reversed_start = replace(top, weight=-top.weight), State([-w for w in start.omega], start.gamma)
     other = replace(given, system=_TURNED_BACK)
-    yield "kinematic_sign", {}, given.error(other.supposed(given.times))
+    yield Hypothesis("kinematic_sign", {}, given.error(other.supposed(given.times)), FITTED_DROP)
     for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
         found = replace(given, system=system).supposed(given.times, lifted, reversed_start)
-        yield kind, {}, given.error(None if found is None else found[:, :6] * _OMEGA_BACK)
+        error = given.error(None if found is None else found[:, :6] * _OMEGA_BACK)
+        yield Hypothesis(kind, {}, error, FITTED_DROP)
 
 
-def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
+def _axes_of_space(given: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
     omega, gamma, truth = given.states[:, :3], given.states[:, 3:6], truth[:, :6]
     size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate)
@@ -523,10 +508,11 @@ def _axes_of_space(given: Examined, truth: Array) -> Iterator[FoundEquations]:
         part = numpy.abs(omega[:, axis] - vertical).max() / size
         for what, expected in (("omega", truth[:, 3:]), ("both", up)):
             left = max(length, part, numpy.abs(gamma - expected).max())
-            yield "axes_of_space", {"of": what, "vertical": str(axis + 1)}, float(left)
+            numbers = {"of": what, "vertical": str(axis + 1)}
+            yield Hypothesis("axes_of_space", numbers, float(left), FITTED_DROP)
 
 
-def _any_order(given: Examined, truth: Array) -> FoundEquations:
+def _any_order(given: Examined, truth: Array) -> Hypothesis:
     """Each column as that component, or its negative, that it is nearest to."""
     truth = truth[:, :6]
     sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate), numpy.abs(truth[:, 3:]).max()], 3)
@@ -536,9 +522,9 @@ def _any_order(given: Examined, truth: Array) -> FoundEquations:
     )
     nearest = off.argmin(axis=1)
     if sorted(nearest % 6) != list(range(6)):
-        return "column_order", {}, float("inf")
+        return Hypothesis("column_order", {}, float("inf"))
     names = ", ".join(("−" if place >= 6 else "") + NAMES[place % 6] for place in nearest)
-    return "column_order", {"columns": names}, float(off.min(axis=1).max())
+    return Hypothesis("column_order", {"columns": names}, float(off.min(axis=1).max()), FITTED_DROP)
 
 
 # Times that mean something else: reversed, shifted, in another unit, or off by a row.
@@ -562,49 +548,40 @@ _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
 
-@dataclass(frozen=True, slots=True)
-class TimesHypothesis:
-    """What the times may be.
+def clock(given: Examined, fitted: bool) -> Hypothesis | None:
+    """The simplest of the mistakes of the times that are about as good as the best.
 
-    kind: time_reversed, start_row_missing, rows_off_by_one (early), rows_late, rows_reversed, times_shifted (by
-    ``shift``: the state said to be at t is that of t + shift), or time_unit (the state said to be at t is that of
-    factor·t).
-    fitted: whether the number was fitted, and not one that units differ by.
+    times_shifted by s: the state said to be at t is that of t + s.  time_unit with the factor f: it is that of f·t.
     """
-
-    kind: str
-    shift: float = 0.0
-    factor: float = 1.0
-    fitted: bool = False
-
-
-def clock(given: Examined, fitted: bool) -> tuple[TimesHypothesis, float] | None:
-    """The simplest of the suppositions about the times that are about as good as the best, and its error."""
-    found = [(each, at.error(at.supposed(times))) for each, at, times in _without_numbers(given) if len(times)]
-    if fitted and len(given.rows) >= 3:
-        found += _fitted(given)
-    best = min((error for _, error in found), default=0.0)
-    return next((pair for pair in found if pair[1] <= ALIKE * max(best, FLOOR)), None)
-
-
-def _without_numbers(given: Examined) -> Iterator[tuple[TimesHypothesis, Examined, list[Fraction]]]:
-    """Each supposition, the samples that it is tried on and their times."""
-    every = given.all_times
-    yield TimesHypothesis("time_reversed"), given, [-time for time in given.times]
-    if len(every) > 1:
-        before = [every[row - 1] if row else Fraction(0) for row in given.rows]
-        yield TimesHypothesis("start_row_missing"), given, before
-        yield TimesHypothesis("rows_reversed"), given, [every[-1 - row] for row in given.rows]
-        yield _neighbours(given, "rows_off_by_one", 1, 2 * every[-1] - every[-2])
-        yield _neighbours(given, "rows_late", -1, 2 * every[0] - every[1])
+    found = list(_of_rows(given))
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * given.times[-1])) * given.rate <= FARTHEST:
-            yield TimesHypothesis("time_unit", factor=float(factor)), given, [factor * time for time in given.times]
+            error = given.error(given.supposed([factor * time for time in given.times]))
+            found.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
+    if fitted and len(given.rows) >= 3:
+        found += _fitted(given)
+    best = min(each.left for each in found)
+    return next((each for each in found if each.left <= ALIKE * max(best, FLOOR)), None)
 
 
-def _neighbours(
-    given: Examined, kind: str, off: int, beyond: Fraction
-) -> tuple[TimesHypothesis, Examined, list[Fraction]]:
+def _unit_numbers(factor: float) -> dict[str, str]:
+    steps = _steps_of_interval(factor)
+    return {"factor": f"{factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
+
+
+def _of_rows(given: Examined) -> Iterator[Hypothesis]:
+    """Rows that are those of other times."""
+    every = given.all_times
+    tried = [("time_reversed", given, [-time for time in given.times])]
+    if len(every) > 1:
+        tried.append(("start_row_missing", given, [every[row - 1] if row else Fraction(0) for row in given.rows]))
+        tried.append(("rows_reversed", given, [every[-1 - row] for row in given.rows]))
+        tried.append(("rows_off_by_one", *_neighbours(given, 1, 2 * every[-1] - every[-2])))
+        tried.append(("rows_late", *_neighbours(given, -1, 2 * every[0] - every[1])))
+    yield from (Hypothesis(kind, {}, at.error(at.supposed(times))) for kind, at, times in tried)
+
+
+def _neighbours(given: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
     """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
     left that are about as wrong as all: else it is that at ``beyond``.
     """
@@ -616,10 +593,10 @@ def _neighbours(
         wrong, wrong_of_all = (each.error(each.supposed(each.times)) for each in (fewer, given))
         at = fewer if ALIKE * wrong >= wrong_of_all else given
     times = [given.all_times[row + off] if row + off in inside else beyond for row in at.rows]
-    return TimesHypothesis(kind), at, times
+    return at, times
 
 
-def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
+def _fitted(given: Examined) -> Iterator[Hypothesis]:
     """Shifts and units that bring the first states onto the motion, refined over all samples."""
     times = numpy.array([float(time) for time in given.times])
     if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
@@ -632,8 +609,10 @@ def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
     sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
     # a method's own lag explains the samples of an oscillation as well as any clock
     slower = list(_refined(given, "time_unit", 1.0, times, sizes))
-    lag = min((error for found, error in slower if abs(found.factor - 1) < _NEAR_ONE), default=float("inf"))
-    yield from (each for each in slower if abs(each[0].factor - 1) >= _NEAR_ONE or _is_short(each[0].factor))
+    lag = min((error for factor, error in slower if abs(factor - 1) < _NEAR_ONE), default=float("inf"))
+    for factor, error in slower:
+        if abs(factor - 1) >= _NEAR_ONE or _is_short(factor):
+            yield Hypothesis("time_unit", _unit_numbers(factor), error, FITTED_DROP)
     for kind in ("times_shifted", "time_unit"):
         # a shift is the same for every sample; a unit shows best at the earliest sample away from 0
         tried = []
@@ -642,14 +621,16 @@ def _fitted(given: Examined) -> Iterator[tuple[TimesHypothesis, float]]:
             supposed = numpy.interp(_moved(kind, number, times), grid, numpy.arange(_GRID))
             off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - given.states) / sizes
             tried.append((float(numpy.median(numpy.fmax.reduce(off, axis=1))), number))
-        for _, number in sorted(tried)[: _TRIED // 3]:
-            for found, error in _refined(given, kind, number, times, sizes):
-                near_one = kind == "time_unit" and abs(found.factor - 1) < _NEAR_ONE
-                if _is_short(found.factor) if near_one else ALIKE * error < lag:
-                    yield found, error
+        for _, first in sorted(tried)[: _TRIED // 3]:
+            for number, error in _refined(given, kind, first, times, sizes):
+                near_one = kind == "time_unit" and abs(number - 1) < _NEAR_ONE
+                if _is_short(number) if near_one else ALIKE * error < lag:
+                    shift = {"shift": in_units(number, given.units.time)}
+                    numbers = _unit_numbers(number) if kind == "time_unit" else shift
+                    yield Hypothesis(kind, numbers, error, FITTED_DROP)
 
 
-def steps_of_interval(factor: float) -> int | None:
+def _steps_of_interval(factor: float) -> int | None:
     """n where the factor is (n + 1)/n, as of intervals of n steps that are one too long; −n where it is (n − 1)/n."""
     n = round(1 / (factor - 1)) if abs(factor - 1) > 1 / (2 * _MOST_STEPS) else 0
     return n if 1 < abs(n) <= _MOST_STEPS and abs(factor - 1 - 1 / n) < _EXACTLY else None
@@ -657,7 +638,7 @@ def steps_of_interval(factor: float) -> int | None:
 
 def _is_short(factor: float) -> bool:
     """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
-    if steps_of_interval(factor) is not None:
+    if _steps_of_interval(factor) is not None:
         return True
     near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
     return any(
@@ -678,10 +659,8 @@ def _moved(kind: str, number: float, times: Array) -> Array:
     return times + number if kind == "times_shifted" else times * number
 
 
-def _refined(
-    given: Examined, kind: str, number: float, times: Array, sizes: Array
-) -> Iterator[tuple[TimesHypothesis, float]]:
-    """Gauss-Newton on the one number; the rate of the motion is a difference quotient of the motion itself."""
+def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, float]]:
+    """The number by Gauss-Newton, with its error; the rate of the motion is a difference quotient of the motion."""
     small = 1e-6 / given.rate
     for _ in range(_REFINED):
         at = _moved(kind, number, times)
@@ -696,6 +675,4 @@ def _refined(
         number += float(numpy.nansum(slope * (given.states - here) / sizes)) / square
         if not abs(_moved(kind, number, times)).max() * given.rate <= FARTHEST:
             return
-    error = given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))
-    shift, factor = (number, 1.0) if kind == "times_shifted" else (0.0, number)
-    yield TimesHypothesis(kind, shift, factor, fitted=True), error
+    yield number, given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))

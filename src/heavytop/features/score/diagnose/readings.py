@@ -1,9 +1,9 @@
-"""What the columns of a file with attitudes may mean: one reading of its conventions, and its error beside a motion."""
+"""Meanings of the columns of a file with attitudes: one reading of its conventions, and its error beside a motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor, isfinite, log10
 from types import SimpleNamespace
@@ -51,7 +51,7 @@ class BodyData:
 
     @property
     def steiner(self) -> Array:
-        """What moving the tensor from the centre of mass to the fixed point adds to it."""
+        """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
         c = self.centre
         found: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
         return found
@@ -140,11 +140,6 @@ def turning(body: BodyData, start: Beginning) -> float:
     return _rate(numpy.asarray(moments, dtype=numpy.float64), body.force * body.centre, start.omega) or 1.0
 
 
-def with_tensor(body: BodyData, inertia: Array) -> BodyData:
-    """The body with another tensor."""
-    return replace(body, inertia=inertia)
-
-
 _NUMPY = SimpleNamespace(sin=numpy.sin, cos=numpy.cos)
 _DEGREE = numpy.pi / 180
 _EYE = tuple(map(tuple, numpy.eye(3).tolist()))
@@ -153,7 +148,7 @@ Square = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the columns mean, or the start.
+    """A meaning of the columns, or of the start.
 
     scalar_last, conjugate: of quaternions.  transposed: of matrices.  sequence, extrinsic, negated, degrees: of angles.
     up: the axis that points up.  swapped: Ω said to be in body axes is in space axes, and the other way round.
@@ -187,7 +182,7 @@ class Reading:
 
     @classmethod
     def of(cls, said: Convention) -> Reading:
-        """What a file says of itself."""
+        """The reading that a file declares."""
         return cls(
             scalar_last=said.quaternion_order == "xyzw",
             conjugate=said.quaternion == "space_to_body",
@@ -295,7 +290,7 @@ class Seen:
     """The samples of a file that are looked at.
 
     times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as the file says.
-    point, pivot: of positions.  of: how many samples the file has.
+    point, pivot: of positions.
     """
 
     times: tuple[Fraction, ...]
@@ -305,13 +300,11 @@ class Seen:
     said: Reading
     point: Array
     pivot: Array
-    of: int
-    rows: tuple[int, ...] = field(default=())
 
     def at(self, rows: list[int]) -> Seen:
-        """The same at some of its samples."""
+        """This file at some of its samples."""
         times = tuple(self.times[row] for row in rows)
-        return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()}, rows=tuple(rows))
+        return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()})
 
 
 def errors(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> Array:
@@ -423,4 +416,4 @@ def of_states(
     rows = numpy.array([along, numpy.cross(gamma, along), gamma])
     given = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
     split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
-    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3), len(columns))
+    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3))

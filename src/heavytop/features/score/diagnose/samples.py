@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor
+from typing import NamedTuple
 
 import numpy
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, decimal_text, dot, log10
+from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -60,6 +61,34 @@ LIKELY_DROP = 30.0
 """... one without a free number by which it falls less is likely."""
 FIRST = (6, 2)
 """Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """A mistake that explains the states.
+
+    kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
+    error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
+    of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
+    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
+    likely: whether the error falls by less than a statement asks for.
+    """
+
+    kind: str
+    numbers: dict[str, str] = field(default_factory=dict)
+    error: float | None = None
+    left: float | None = None
+    looked_at: tuple[int, int, str] | None = None
+    likely: bool = False
+
+
+class Hypothesis(NamedTuple):
+    """A mistake that was tried: its kind, the numbers that fit, the error that it leaves, how far this must fall."""
+
+    kind: str
+    numbers: dict[str, str]
+    left: float
+    drop: float = DROP
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +141,7 @@ class Examined:
 
     @property
     def times(self) -> list[Fraction]:
-        """Of the rows that are looked at."""
+        """Times of the rows that are looked at."""
         return [self.all_times[row] for row in self.rows]
 
     @property
@@ -132,12 +161,12 @@ class Examined:
         return found
 
     def starting(self, values: Array) -> Examined:
-        """The same with that start, in the axes of the file."""
+        """This motion with that start, in the axes of the file."""
         parts = [tuple(map(Fraction, part)) for part in values.reshape(-1, 3) @ self.frame.axes]
         return replace(self, start=State(*parts[:2]), frame=replace(self.frame, xi=parts[2] if parts[2:] else None))
 
     def with_body(self, tensor: Array, moment: Array, rotor: Array | None = None) -> Examined:
-        """The same with another body, in the axes of the file.
+        """This motion with another body, in the axes of the file.
 
         Raises InputError for moments of inertia that are not positive.
         """
@@ -166,16 +195,16 @@ class Examined:
         return None if found is None else (found.reshape(len(found), -1, 3) @ self.frame.axes.T).reshape(len(found), -1)
 
     def at(self, rows: Sequence[int]) -> Examined:
-        """The same at other samples."""
+        """This motion at other samples."""
         return replace(self, rows=tuple(rows), states=self.all_states[list(rows)])
 
     def widened(self) -> Examined:
-        """The same with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
+        """This motion with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
         reached = [abs(float(time)) * self.rate <= FARTHEST for time in self.all_times[:MOST_AT_ONCE]]
         return self.at(range(sum(reached))).trusted()
 
     def trusted(self) -> Examined:
-        """The same up to where the motion makes more of roundings than an error that is asked about."""
+        """This motion up to where it makes more of roundings than an error that is asked about."""
         truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
         if truth is None:
             return self
@@ -254,15 +283,21 @@ def examined(
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
     carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
     rate = float(max(spin, fall, carried)) or 1.0
-    early = sum(abs(time) * rate <= _TURNS for time in ends)
-    last = max(early, min(len(ends), _FEW))
-    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | set(range(min(last, _FEW)))
-    rows = sorted(some if worst is None or worst >= last else some | {worst})
+    rows = looked_at(ends, rate)
+    if worst is not None and worst < rows[-1]:
+        rows = sorted({*rows, worst})
     found = Examined(
         top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or FileAxes()
     )
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
+
+
+def looked_at(times: Sequence[float], rate: float) -> list[int]:
+    """At most :data:`MOST_SAMPLES` samples over the first turns of the body, or a few where they lie far apart."""
+    early = sum(abs(time) * rate <= _TURNS for time in times)
+    last = max(early, min(len(times), _FEW))
+    return sorted({round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))} | {*range(min(last, _FEW))})
 
 
 def turning_rate(top: HeavyTop, start: State) -> Fraction:
@@ -345,3 +380,8 @@ def notable(new: Fraction, old: Fraction) -> bool:
     """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
     off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
     return off or new.denominator <= SMALL or new == Fraction(decimal_text(new, SHORT))
+
+
+def in_units(value: float | Fraction, unit: Fraction) -> str:
+    """A number of the data's own units, to six digits."""
+    return plain_decimal(Fraction(value) * unit, 6)

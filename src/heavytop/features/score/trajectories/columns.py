@@ -13,7 +13,7 @@ from typing import Any
 from flint import arb
 
 from heavytop import written_numbers
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.exact.flint.balls import midpoint, working_precision
 from heavytop.features.score.trajectories.logs import (
     canonical,
@@ -630,10 +630,8 @@ def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[F
     marked = [isinstance(each, str) and each.strip().endswith("deg") for each in values]
     if any(marked) and (name != "euler" or not all(marked)):
         raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
-    try:
+    with prefixed(key):
         found = [exact(each.strip().removesuffix("deg") if isinstance(each, str) else each) for each in values]
-    except InputError as error:
-        raise InputError(f"{key}: {error.cause}", error.remedy) from None
     return found, name == "euler" and (any(marked) or said.angles == "degrees")
 
 

@@ -12,7 +12,7 @@ import numpy
 
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, bits_of, component
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.features.score.diagnose.readings import BodyData, GivenStart, Reading, Seen
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
@@ -444,7 +444,7 @@ class Observed:
         said = Reading.of(self.said)
         if self.start.form == "euler" and self.start.degrees != said.degrees and "euler" not in columns:
             said = replace(said, degrees=self.start.degrees)
-        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot, count) if count else None
+        return Seen(tuple(times[:count]), columns, body, start, said, of, pivot) if count else None
 
 
 def _start(raw: RawStart, posed: Posed) -> GivenStart:
@@ -577,10 +577,8 @@ def _in_memory(
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
-    try:
+    with prefixed(where):
         found = [component(value) for value in row]
-    except InputError as error:
-        raise InputError(f"{where}: {error.cause}", error.remedy) from None
     finite = tuple(value for value in found if value is not None)
     return finite if len(finite) == len(found) else None
 

@@ -1,7 +1,6 @@
 """The library of claims as one JSON document, for other catalogues: each claim as it is written, with its verdict.
 
-``python -m heavytop.features.claims.claim_library --out results/claims`` makes it again, ``library.json`` and
-its schema.
+``python tools/claim_library.py --out results/claims`` makes it again, ``library.json`` and its schema.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The library of claims as a page of the site: formulas typeset, verdict, conditions, witness and source of each.
 
-Text in, Markdown out: :func:`page` of a :class:`heavytop.features.claims.claim_library.Library`.  What stands in an
-entry is
+Text in, Markdown out: :func:`page` of a :class:`claim_library.Library`.  What stands in an entry is
 shown as it was written; nothing in it is read as markup.
 """
 
@@ -12,9 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+from claim_library import Equation, Library, Published
 from heavytop.features.claims.algebra.reader import NUMBER, Descent
 from heavytop.features.claims.audit.values import SIZES
-from heavytop.features.claims.claim_library import Equation, Library, Published
 
 # Formulas of claims as MathML, as they are written: no term is moved, nothing is put together.
 #

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import pytest
 import sympy
 
+from claims_page import NoFormulaError, mathml, typeset
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.reader import parse, symbol
 from heavytop.features.claims.library.entry import FOLDER
-from heavytop.features.claims.page import NoFormulaError, mathml, typeset
 
 NAMES = {"Omega1": 0.37, "gamma3": -1.21, "I2": 1.9, "lambda": 0.83, "p_psi": 2.3, "wx0": 0.59, "c": -0.71, "t": 1.13}
 FUNCTIONS = {"sin": math.sin, "cos": math.cos, "exp": math.exp, "arctan": math.atan, "tanh": math.tanh}

@@ -1,0 +1,187 @@
+"""Adapters of engines of rigid bodies: what they are given, what `heavytop new --engine` writes, the real packages."""
+
+import tomllib
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import heavytop as ht
+from heavytop.api.integrators import engines, listing, new_integrator
+from heavytop.cases import case
+from heavytop.errors import InputError, Unsupported
+from heavytop.features.kinds import KINDS
+from heavytop.harness.plan import read
+from heavytop.integrate.peers.command import Command
+from heavytop.integrate.registry import commands_in, load
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import DOUBLE
+from heavytop.top.bodies import CENTRE, Body
+from heavytop.top.inertia_slips import MassProperties
+from support.in_process import heavytop
+
+ADAPTERS = Path(ht.__file__).parent / "features" / "engines" / "adapters"
+PACKAGES = {"mujoco": "mujoco", "pinocchio": "pinocchio", "exudyn": "exudyn"}
+ASKED = Command(name="engine", command=("x",), setting="step", bodies=True, attitude="quaternion")
+STAND_IN = """
+import numpy as np
+from heavytop_engine import serve
+
+class Engine:
+    def __init__(self, body):
+        self.body, self.q, self.w = body, body.quaternion, body.omega
+
+    def slope(self, q, w):
+        turned = lambda v: np.array([q[1] * v[2] - q[2] * v[1], q[2] * v[0] - q[0] * v[2], q[0] * v[1] - q[1] * v[0]])
+        b, up = self.body, 2 * np.array([q[1] * q[3] - q[0] * q[2], q[2] * q[3] + q[0] * q[1], q[0]**2 / 2 + q[3]**2 / 2
+            - q[1]**2 / 2 - q[2]**2 / 2])
+        torque = np.cross(b.about_pivot @ w, w) + b.mass * b.gravity * np.cross(up, b.centre)
+        rate = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
+        return np.concatenate([rate, np.linalg.solve(b.about_pivot, torque)])
+
+    def advance(self, h, n):
+        y = np.concatenate([self.q, self.w])
+        for _ in range(n):
+            k1 = self.slope(y[:4], y[4:])
+            k2 = self.slope(*np.split(y + h / 2 * k1, [4]))
+            k3 = self.slope(*np.split(y + h / 2 * k2, [4]))
+            k4 = self.slope(*np.split(y + h * k3, [4]))
+            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        self.q, self.w = np.split(y, [4])
+
+    def read(self):
+        print("an engine that prints")
+        return self.q, self.w
+
+    def pivot(self):
+        return 3e-7, 0, 4e-7
+
+serve("Stand-in 1", Engine)
+"""
+
+
+def body_lines(top: ht.HeavyTop, start: ht.State) -> dict[str, list[Fraction]]:
+    text = ASKED.request(Problem.of(top, start, DOUBLE), [Fraction(1)], Fraction(1, 100)).text(1).decode()
+    words = [line.split()[1:] for line in text.splitlines() if line.startswith("body ")]
+    return {name: list(map(Fraction, values)) for name, *values in words}
+
+
+@pytest.mark.parametrize("name", ["bruels-cardona-arnold", "lagrange", "generic", "euler", "t-handle", "kowalewski"])
+def test_the_body_of_a_request_has_the_moments_and_the_weight_of_the_top(name: str) -> None:
+    top = case(name).top
+    body = body_lines(top, case(name).start)
+    central = MassProperties(tuple(body["inertia"]), body["mass"][0], tuple(body["centre"])).central
+    found = Body(body["mass"][0], body["gravity"][0], body["centre"], [v for row in central for v in row], CENTRE)
+    scale = max(top.inertia)
+    expected = [[top.inertia[i] if i == j else 0 for j in range(3)] for i in range(3)]
+    off = [abs(a - b) for one, two in zip(found.tensor, expected, strict=True) for a, b in zip(one, two, strict=True)]
+    assert max(off) <= 8 * DOUBLE.eps * scale
+    assert max(abs(a - b) for a, b in zip(found.moment, top.moment, strict=True)) <= 8 * DOUBLE.eps * (abs(top.weight))
+
+
+def test_the_mass_of_a_body_is_its_own_and_a_top_without_one_gets_a_light_body() -> None:
+    assert body_lines(case("bruels-cardona-arnold").top, case("bruels-cardona-arnold").start)["mass"] == [15]
+    top = ht.HeavyTop((1, 1, "1/4"), 10**6, (0, 0, 3))
+    body = Body.realising(top)
+    assert body is not None
+    assert body.mass * 9 <= Fraction(1, 4) / 64
+    assert body.weight == 10**6
+
+
+@pytest.mark.parametrize(
+    "top", [ht.HeavyTop((5, 2, 1), 1, (0, 0, 1)), case("simo-wong").top, ht.HeavyTop((1, 1, 2), 1, (0, 0, 1))]
+)
+def test_moments_that_no_body_has_are_unsupported(top: ht.HeavyTop) -> None:
+    with pytest.raises(Unsupported, match="needs a body"):
+        body_lines(top, ht.State((1, 0, 0), (0, 0, 1)))
+
+
+def test_programs_that_declare_no_bodies_are_sent_none() -> None:
+    plain = Command(name="plain", command=("x",), setting="step")
+    text = plain.request(Problem.of(case("lagrange").top, case("lagrange").start, DOUBLE), [], None).text(1)
+    assert b"body" not in text
+
+
+def test_list_says_which_cases_a_body_has() -> None:
+    listed = {each["name"]: each["realisable"] for part in ("cases", "bodies") for each in listing()[part]}
+    assert (listed["lagrange"], listed["simo-wong"], listed["t-handle"]) == (True, False, True)
+    assert "no rigid body has these moments" in " ".join(heavytop("list").stdout.split())
+
+
+@pytest.mark.parametrize("engine", engines())
+def test_the_folder_of_an_engine_is_a_gate(engine: str, tmp_path: Path) -> None:
+    files = new_integrator(tmp_path / "new", "python", engine)
+    adapter = f"{engine}_top.py"
+    assert {adapter, "heavytop_engine.py", "engine.toml", "gate.toml", "README.md"} == set(files)
+    code = [line for line in (tmp_path / "new" / adapter).read_text().splitlines() if line.strip()]
+    assert len(code) <= 50
+    assert len((tmp_path / "new" / "README.md").read_text().splitlines()) == 10
+    assert "pip install" in (tmp_path / "new" / "README.md").read_text() or engine == "siconos"
+    _, _, tasks = read(str(tmp_path / "new" / "gate.toml"), KINDS)
+    asked = {task.key.subject.name for task in tasks}
+    assert asked == {table["name"] for table in tomllib.loads((ADAPTERS / f"{engine}.toml").read_text())["integrator"]}
+
+
+def test_an_unknown_engine_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no adapter"):
+        new_integrator(tmp_path / "new", "python", "unity")
+
+
+def test_an_adapter_is_measured_as_its_engine_is(tmp_path: Path) -> None:
+    (tmp_path / "engine.py").write_text(STAND_IN)
+    (tmp_path / "heavytop_engine.py").write_text((ADAPTERS / "heavytop_engine.py").read_text())
+    (tmp_path / "engine.toml").write_text(
+        '[[integrator]]\nname = "stand-in"\ncommand = ["{python}", "engine.py"]\nsetting = "step"\norder = 4\n'
+        'directions = ["forward"]\nbodies = true\nattitude = "quaternion"\n'
+    )
+    (tmp_path / "plan.toml").write_text(
+        """
+name = "stand-in"
+integrators = ["engine.toml"]
+[[top]]
+name = "body"
+mass = "2"
+gravity = "9.81"
+centre = ["0.3", "-0.2", "0.4"]
+inertia = ["1.2", "0.9", "0.6"]
+about = "centre of mass"
+omega = ["1", "2", "6"]
+quaternion = ["0.8", "0", "0.6", "0"]
+[[measure]]
+kind = "work_precision"
+cases = ["body"]
+attitude = true
+horizon = "1"
+samples = 4
+ladders = [{ integrator = "stand-in", steps = ["1/50", "1/100"] }]
+[[measure]]
+kind = "drift"
+cases = ["body"]
+attitude = true
+noise = false
+step = "1/100"
+integrator = "stand-in"
+runs = [{ precision = "double", horizon = "1", samples = 4 }]
+"""
+    )
+    done = heavytop("run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1")
+    assert done.returncode == 0, done.stdout + done.stderr
+    coarse, fine, drift = ht.read_report(tmp_path / "out").rows
+    errors = [float(row.metrics["error_max"]) for row in (coarse, fine)]
+    assert 12 < errors[0] / errors[1] < 20
+    assert float(fine.metrics["joint_violation_max"]) == pytest.approx(5e-7, rel=1e-6)
+    for name in ("attitude_error_max", "position_error_max"):
+        assert 0 < float(fine.metrics[name]) < 1e-5
+        assert float(drift.metrics[name]) == pytest.approx(float(fine.metrics[name]), rel=0.1)
+    assert drift.key.subject.step == "1/100"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", PACKAGES)
+def test_the_real_engine_keeps_the_motion(engine: str, tmp_path: Path) -> None:
+    pytest.importorskip(PACKAGES[engine])
+    top = case("lagrange").top
+    for command in commands_in(ADAPTERS / f"{engine}.toml"):
+        run = load(command)(top, case("lagrange").start, [Fraction(1)], step=Fraction(1, 1000))
+        known = ht.reference(top, case("lagrange").start, [1], digits=20).to_numpy()
+        assert abs(run.states[-1] - known[-1]).max() < (0.05 if command.order == 1 else 1e-3)
