@@ -117,3 +117,13 @@ def test_the_command_line_says_the_same(tmp_path: Path) -> None:
     assert set(json.loads(known.stdout)["between"]["errors"]) == {"slerp", "linear", "hermite", "lagrange"}
     assert heavytop("propagate", "--case", "lagrange", "--times", "1", "--within", "1").returncode == 2
     assert heavytop("power", "--until", "1", "--tolerance", "1").returncode == 2
+
+
+def test_pictures_show_each_fault_each_method_and_each_axis() -> None:
+    test = ht.power(*FLIP, 1, "1e-3", "1/4")
+    assert len(ht.plot.power(test).lines) == len(test.faults) + 1
+    samples = [ht.between_samples(*FLIP, 1, spacing) for spacing in ("1/10", "1/20")]
+    assert {line.get_label() for line in ht.plot.between(samples).lines} == {"slerp", "linear", "hermite", "lagrange"}
+    words = [text.get_text() for text in ht.plot.stability(ht.HeavyTop((1, 2, 3), 0, (0, 0, 0))).texts]
+    assert len(words) == 6
+    assert [word for word in words if "unstable" in word] == ["2: unstable 0.577", "−2: unstable 0.577"]
