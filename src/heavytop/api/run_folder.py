@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from heavytop import arguments
 from heavytop.display import printable
 from heavytop.errors import InputError
+from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
 from heavytop.harness import checkpoint
 from heavytop.harness.checkpoint import Checkpoint, identity_of
@@ -160,7 +161,7 @@ def prepare(
     Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
     """
     if with_parquet:
-        parquet.require_pyarrow()
+        require_extra("parquet")
     which = named(integrator)
     loaded, digest, tasks = read(plan, KINDS, seed, which)
     of_plan = None if loaded.row_timeout == "" else loaded.row_timeout
@@ -194,6 +195,12 @@ def _integrators(tasks: Sequence[Task]) -> dict[str, dict[str, str]]:
     return {"integrators": dict(sorted(said.items()))} if said else {}
 
 
+def is_written(name: str) -> bool:
+    """Whether a run puts a file of that name into its folder."""
+    gathered = {file for kind in KINDS.values() for file in kind.gathers}
+    return name in {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered} or bool(checkpoint.OURS.fullmatch(name))
+
+
 def require_fit(directory: Path, resume: bool) -> None:
     """Raises InputError where the folder holds anything that a run did not put there, or all of it without --resume."""
     if not directory.exists():
@@ -204,8 +211,7 @@ def require_fit(directory: Path, resume: bool) -> None:
     begun = checkpoint.FILE in content
     content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
     if resume and begun:
-        gathered = {file for kind in KINDS.values() for file in kind.gathers}
-        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered}  # written, but not yet cleared up after
+        content -= {name for name in content if is_written(name)}  # written, but not yet cleared up after
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
