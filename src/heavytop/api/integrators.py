@@ -9,17 +9,18 @@ from collections.abc import Callable
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features import FEATURES
 from heavytop.files import replace
-from heavytop.harness.integrator_check import NOT_TRIED as NOT_TRIED
-from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
 from heavytop.top.bodies import Body
 from heavytop.version import commit
+
+if TYPE_CHECKING:
+    from heavytop.harness.integrator_check import Checked
 
 
 class Language(NamedTuple):
@@ -82,6 +83,8 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
     Raises:
         InputError: for an unknown integrator, and a file that describes none.
     """
+    from heavytop.harness.integrator_check import check
+
     return check(named(integrator))
 
 
