@@ -60,7 +60,7 @@ def _larger(series: Series, factor: Fraction) -> Series:
 
 
 def main(count: int, plan: Plan) -> int:
-    work_precision._RUNS, work_precision._ENOUGH_SECONDS = range(1, 2), 0.0  # seconds are not compared
+    work_precision._USUAL = work_precision.Repeats(1, 1, 0.0)  # seconds are not compared
     reports = [report(seed, plan) for seed in range(count)]
     pairs, seen, reasons = list(permutations(reports, 2)), Counter(), Counter()
     for two in pairs:
