@@ -24,7 +24,7 @@ OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
-    step: of a method with fixed steps, whose error at that step is more than rounding; else 0.
+    step: fixed, or the mean one of a method with an order and a tolerance; 0 where its error may be rounding.
     seconds: of its fastest run, or where these are too few to be resolved, as many as are.  Other work on the machine
     only ever adds, and adds more to longer runs: medians on a busy machine would flatter whoever is quick.
     """
@@ -59,7 +59,7 @@ class WorkPrecisionLine:
 
     @property
     def order(self) -> float | None:
-        """The order that whole runs show: between the two finest fixed steps whose errors are more than rounding."""
+        """The order that whole runs show: between the two finest steps whose errors are more than rounding."""
         finest = sorted((point for point in self.points if point.step), key=lambda point: point.step)[:2]
         if len({point.step for point in finest}) < 2:
             return None
@@ -195,47 +195,47 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
 
 
 def _step(row: Row, log10: float) -> float:
-    """The fixed step of a row whose error is more than its roundings, in one direction, come to; else 0."""
+    """The step of a row, mean where a tolerance sets it, whose error is more than its roundings, in one direction, come
+    to; else 0, as where samples bound the steps, and of heyoka, whose order is another for each tolerance.
+    """
     rounding = math.log10(_ABOVE_ROUNDING * max(row.steps, 1) * float(parse(row.precision).eps))
-    step = row.key.subject.step
-    return float(exact(step)) if step not in ("", FINEST) and log10 > rounding else 0.0
+    if log10 <= rounding:
+        return 0.0
+    subject = row.key.subject
+    if subject.step not in ("", FINEST):
+        return float(exact(subject.step))
+    adaptive = subject.tolerance and row.order and subject.name not in (OURS, CONSTANTS, LANES)
+    return float(exact(row.horizon)) / row.steps if adaptive and row.steps > 4 * row.samples else 0.0
 
 
 def beside_ours(rows: Sequence[Row]) -> list[Table]:
-    """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
-    a line a point of the curve, of its error, its seconds and, where heyoka is measured, what it takes for that error.
+    """The integrator that is measured beside heyoka alone, or comes from another package: a table a case, two at most,
+    a line a point of the curve with its error, its time and, where heyoka is measured, heyoka's time for that error.
     """
     found = panels(rows)
     names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
     beside = any(line.integrator == OURS for lines in found.values() for line in lines)
     tables = []
     for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
-        cases: dict[str, dict[str, str]] = {}
-        for case, lines in list(found.items())[:_MOST_CASES]:
-            for line in lines:
-                if line.integrator == name:
-                    ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
-                    cells = {_rung(line, point): _cell(point, ours) for point in line.points}
-                    seen = {} if line.order is None else {"order seen": line.order_text}
-                    cases[case] = cases.get(case, {}) | cells | seen
-        points = dict.fromkeys(point for cells in cases.values() for point in cells)
-        lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
-        note = f"{name}: largest error in its time" + (" (heyoka's time for that error)" if beside else "")
-        if lines_of:
-            tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
+        of_name = {case: [line for line in lines if line.integrator == name] for case, lines in found.items()}
+        for case in [case for case, lines in of_name.items() if any(line.points for line in lines)][:_MOST_CASES]:
+            cells = []
+            for line in of_name[case]:
+                ours = [each for each in found[case] if (each.integrator, each.precision) == (OURS, line.precision)]
+                cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
+                cells += [] if line.order is None else [["order seen", line.order_text, "", ""][: 3 + beside]]
+            columns = [f"{name}, {case}", "error", "time", "heyoka's time"][: 3 + beside]
+            tables.append(Table("", columns, cells, shown=In.SHORT))
     return tables
 
 
-def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
-    return point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
-
-
-def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
-    cell = f"{10**point.log10:.1e} in {point.takes(2)}"
-    if not ours or not point.resolved:
-        return cell
-    seconds, _ = _quickest(ours, point.log10)
-    return f"{cell} ({'not reached' if seconds is None else seconds_text(seconds, 2)})"
+def _point(line: WorkPrecisionLine, point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> list[str]:
+    """The setting of a point, its error and its time, and heyoka's time for that error."""
+    setting = point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
+    seconds = _quickest(ours, point.log10)[0]
+    known = "not reached" if seconds is None else seconds_text(seconds, 2)
+    compared = known if ours and point.resolved else "-"
+    return [setting, f"{10**point.log10:.1e}", point.takes(2), compared]
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
