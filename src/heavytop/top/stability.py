@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
+from flint import fmpq, fmpq_mat
+
 from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 
@@ -72,15 +74,10 @@ def _jacobian(system: System, p: Parameters, y: Sequence[Fraction], size: int) -
 
 
 def _characteristic(matrix: Matrix) -> list[Fraction]:
-    """1, c1, ..., cn of λⁿ + c1 λⁿ⁻¹ + ... + cn, by the method of Faddeev and LeVerrier."""
-    size, found = len(matrix), [Fraction(1)]
-    power = [[Fraction(0)] * size for _ in range(size)]
-    for n in range(1, size + 1):
-        inner = [[v + found[-1] * (i == j) for j, v in enumerate(row)] for i, row in enumerate(power)]
-        columns = [*zip(*inner, strict=True)]
-        power = [[_inner(row, column) for column in columns] for row in matrix]
-        found.append(-sum((power[i][i] for i in range(size)), Fraction(0)) / n)
-    return found
+    """1, c1, ..., cn of λⁿ + c1 λⁿ⁻¹ + ... + cn."""
+    entries = [fmpq(value.numerator, value.denominator) for row in matrix for value in row]
+    polynomial = fmpq_mat(len(matrix), len(matrix), entries).charpoly()
+    return [Fraction(int(c.p), int(c.q)) for c in reversed(polynomial.coeffs())]
 
 
 def _inner(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
