@@ -46,7 +46,7 @@ class Stability:
 
 
 def stability(system: System, parameters: Parameters, start: Sequence[Fraction]) -> Stability | None:
-    """Of the motion from an exact start, six numbers; None where it is not steady."""
+    """Stability of the motion from an exact start, six numbers; None where it is not steady."""
     p, y = parameters.mapped(Fraction), [Fraction(value) for value in start]
     rates = system.field(p, y)
     free = system is GYROSTAT or not any(p.moment)
@@ -65,7 +65,7 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
 
 
 def _jacobian(system: System, p: Parameters, y: Sequence[Fraction], size: int) -> Matrix:
-    """Of the first components; exact, as the field is of degree two: half a central difference of steps 1."""
+    """The Jacobian of the first components; exact as the field is of degree two: half a difference of steps 1."""
     columns = []
     for j in range(size):
         up, down = (system.field(p, [v + sign * (k == j) for k, v in enumerate(y)]) for sign in (1, -1))
@@ -161,7 +161,7 @@ def _determinant(matrix: Matrix) -> Fraction:
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:
-    """Of Lagrange's top, or a free body of revolution: where its inclination stays and does not begin to change."""
+    """A precession of Lagrange's top, or of a free body of revolution: where its inclination stays."""
     if system is not HEAVY_TOP:
         return None
     for k in range(3):

@@ -172,7 +172,7 @@ class _Frame:
 
 
 class _Moving(WithBearing):
-    """What the exact and the algebraic motions share."""
+    """The base of the exact and the algebraic motions."""
 
     __slots__ = ()
 
@@ -227,7 +227,7 @@ def _has_root(values: Sequence[Fraction]) -> bool:
 
 
 def _constants(top: HeavyTop) -> _Constants:
-    """Of a top with rational S."""
+    """The constants of a top with rational S."""
     _, _, a, b, _ = _numbers(top)
     return _Constants(a, b, rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
 
@@ -241,7 +241,7 @@ def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fracti
 
 
 def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
-    """What z² and the three components of γ lack, in units of B."""
+    """The defects of z² and the three components of γ, in units of B."""
     square, skew, _, b, turned = _numbers(top)
     (unit, x, z), c, n, gamma = _components(top, start), _constants(top), top.moment, start.gamma
     v2 = x * x / (square * unit)

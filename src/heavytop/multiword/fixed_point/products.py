@@ -64,7 +64,7 @@ class Rows(ABC):
     @staticmethod
     @abstractmethod
     def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
-        """What ``orders`` orders need."""
+        """The size that ``orders`` orders need."""
 
     @staticmethod
     @abstractmethod

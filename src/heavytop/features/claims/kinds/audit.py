@@ -80,7 +80,7 @@ class AuditKind(Kind):
     table = AuditTable
 
     def cost(self, task: Task) -> float:
-        """The same for all."""
+        """Seconds, equal for all rows."""
         return _SECONDS
 
     def measure(self, task: Task, saved: Saved) -> Row:

@@ -344,7 +344,7 @@ def _rate(value: sympy.Expr) -> sympy.Expr:
 
 
 def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
-    """What an equation between angles rests on: that γ of the angles is continuous."""
+    """The formulas that an equation between angles rests on: that γ of the angles is continuous."""
     return Formulas(gamma, frozenset(), (), conditions_of(angles), _POLE)
 
 
