@@ -11,6 +11,6 @@ lock() {
         --no-emit-find-links --no-annotate "$@" pyproject.toml constraints/build.in -o "constraints/$name.txt"
     sed -i '1i # Made by constraints/update.sh' "constraints/$name.txt"
 }
-lock test --extra test --extra peers --extra parquet --extra cluster "$@"
-lock run -c constraints/test.txt
-lock docs --extra docs -c constraints/test.txt "$@"
+lock test --extra all --extra test --extra peers --extra cluster "$@"
+lock run --extra all -c constraints/test.txt
+lock docs --extra all --extra docs -c constraints/test.txt "$@"

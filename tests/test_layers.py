@@ -19,6 +19,7 @@ FEATURES = {f"features.{name}" for name in features.NAMES}
 GROUND = {
     "errors": set(),
     "display": set(),
+    "extras": {"errors"},
     "feature": set(),
     "features": {"feature"},
     "files": {"errors"},

@@ -75,6 +75,10 @@ class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 
 
+class MissingExtra(InputError):
+    """A package of an extra that is not installed; names the extra and the command that installs it."""
+
+
 @contextmanager
 def prefixed(what: str) -> Iterator[None]:
     """Says in the cause of an InputError what was read."""

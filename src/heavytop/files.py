@@ -73,6 +73,14 @@ def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
             os.fsync(file.fileno())
 
 
+def cache_folder(name: str) -> Path:
+    """Where this user keeps what the program would work out again; no folder can be there for one without a home."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    with suppress(RuntimeError):
+        return (Path(home) if home else Path.home() / ".cache") / "heavytop" / name
+    return Path(os.devnull) / "none"
+
+
 @contextmanager
 def atomic_write(path: Path) -> Iterator[BinaryIO]:
     """A file that takes the name ``path`` when all of it is written, and leaves nothing behind where that fails.

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from heavytop import arguments
 from heavytop.display import printable
 from heavytop.errors import InputError
+from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
 from heavytop.harness import checkpoint
 from heavytop.harness.checkpoint import Checkpoint, identity_of
@@ -160,7 +161,7 @@ def prepare(
     Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
     """
     if with_parquet:
-        parquet.require_pyarrow()
+        require_extra("parquet")
     which = named(integrator)
     loaded, digest, tasks = read(plan, KINDS, seed, which)
     of_plan = None if loaded.row_timeout == "" else loaded.row_timeout

@@ -13,6 +13,7 @@ from time import monotonic
 from typing import Any, TypeVar
 
 from heavytop.errors import HeavyTopError, InputError
+from heavytop.extras import require_extra
 from heavytop.harness.checkpoint import Checkpoint, Saved
 from heavytop.harness.limited import RowLimits, in_limited_process, in_order, in_processes
 from heavytop.harness.rows import RESUME, Kinds, MeasuredKind, Task, ended_its_process, measure
@@ -180,14 +181,13 @@ def _measure_as(expected: Versions, kind: MeasuredKind, task: Task, limit: float
 
 @contextmanager
 def _client(scheduler: str) -> Iterator[Any]:
-    try:
-        import dask
+    require_extra("cluster")
+    import dask
 
-        # what goes wrong is said once, by the errors raised here
-        dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
-        from distributed import Client
-    except ImportError:
-        raise InputError("--scheduler needs Dask.", "Install it with: pip install 'heavytop[cluster]'") from None
+    # what goes wrong is said once, by the errors raised here
+    dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
+    from distributed import Client
+
     try:
         client = Client(scheduler, timeout=_ANSWER)
     except (OSError, ValueError) as error:

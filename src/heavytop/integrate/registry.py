@@ -27,6 +27,7 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
 from heavytop.exact.bodies import resolve
+from heavytop.extras import extra_of, missing
 from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, said
@@ -55,7 +56,6 @@ GROUP = "heavytop.peers"
 STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 Peer = Callable[..., Trajectory]
-_REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
 _YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs peers`)."
 _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
@@ -187,6 +187,7 @@ INTEGRATORS = {
             ensemble=f"{_HERE}.multiword.lanes:propagate_multiword_ensemble",
             attitude=True,
             streams=True,
+            needs=("llvmlite",),
         ),
         _peer("scipy:DOP853", "scipy_ivp:dop853", "scipy"),
         _peer("scipy:LSODA", "scipy_ivp:lsoda", "scipy"),
@@ -335,7 +336,7 @@ def peer(which: str | IntegratorSource) -> Peer:
     if entry is None:
         raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")
     if entry.lacks:
-        raise InputError(f"The integrator {name} needs {entry.lacks}, which is not installed.", _REMEDY)
+        raise missing(extra_of(entry.lacks), f"The integrator {name}")
     try:
         with quiet():
             found = load(entry.propagate)
@@ -460,7 +461,7 @@ def available() -> dict[str, str | None]:
 
 
 def _remedy(entry: Integrator) -> str:
-    return _REMEDY if entry.own else f"It comes from {entry.propagate}: repair or remove that package."
+    return "" if entry.own else f"It comes from {entry.propagate}: repair or remove that package."
 
 
 # Which runs are tried at all: those of no more steps than anyone waits for, whatever the units of the data.

@@ -11,8 +11,8 @@ from math import isqrt
 from threading import local
 
 import numpy
-from llvmlite import ir
 
+from heavytop.extras import Stub
 from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
     INT,
@@ -25,6 +25,7 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     doubles,
     function,
+    ir,
     once,
     pointer,
 )
@@ -201,10 +202,21 @@ def variation(slopes: Doubles) -> Doubles:
     slopes: J_0, …, J_(T−1), shape (T, size, size).  The result has shape (T + 1, size, size).
     """
     orders, size, _ = slopes.shape
+    if isinstance(ir, Stub):
+        return _variation_by_numpy(slopes)
     room = _rooms.of(orders, size)
     room.given[:] = slopes.ravel()
     _machine(size).functions["variation"](*room.pointers, orders)
     return room.table[:, :, :size].copy()
+
+
+def _variation_by_numpy(slopes: Doubles) -> Doubles:
+    orders, size, _ = slopes.shape
+    powers = numpy.zeros((orders + 1, size, size))
+    powers[0] = numpy.eye(size)
+    for n in range(orders):
+        powers[n + 1] = numpy.einsum("mij,mjk->ik", slopes[: n + 1], powers[n::-1]) / (n + 1)
+    return powers
 
 
 class _Room:

@@ -51,6 +51,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
+from heavytop.extras import has_extra
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
@@ -290,7 +291,7 @@ class ScaledMotion:
             return [sign * rate for rate in rates(system, lanes, state)]
 
         motion = quadratic(given, size)
-        in_words = not scaled.rest and fixed_point_run.excess(scaled) <= _LARGEST_EXCESS
+        in_words = has_extra("multiword") and not scaled.rest and fixed_point_run.excess(scaled) <= _LARGEST_EXCESS
         if in_words:
             planned = quadratic(by_lanes, size)
             in_words = (planned.pairs, planned.rows) == (motion.pairs, motion.rows)

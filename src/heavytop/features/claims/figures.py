@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy
 
+from heavytop.extras import require_extra
 from heavytop.features.claims.claim_error import Compared, Drawings, PaperCurve, Portrait
 from heavytop.features.claims.library.ershkov import Branch
 from heavytop.report.document.svg import document, new_figure
@@ -34,9 +35,9 @@ def draw_figures(drawings: Drawings, directory: Path, progress: Callable[[], Non
 
     progress: called after each figure.
     """
-    directory.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
     with _quiet_style():
+        directory.mkdir(parents=True, exist_ok=True)
         for name, figure in _figures(drawings):
             files += _save(figure, directory / name)
             progress()
@@ -55,6 +56,7 @@ def _figures(drawings: Drawings) -> Iterator[tuple[str, Any]]:
 
 @contextmanager
 def _quiet_style() -> Iterator[None]:
+    require_extra("plots")
     import matplotlib
 
     settings: Any = {

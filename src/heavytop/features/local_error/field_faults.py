@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy
 
+from heavytop.extras import has_extra, install
 from heavytop.features.local_error.measurement import Call
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import Array, decimal_text, exact, plain_decimal
@@ -185,6 +186,8 @@ def field_fault(problem: Problem, calls: Sequence[Call], order: int) -> Explaine
 
     order: that the integrator declares; 0 where it has none.
     """
+    if not has_extra("claims"):
+        return Explained("field", f"To look for a wrong term of the field: {install('claims')}.")
     with numpy.errstate(all="ignore"):
         steps = _Steps(problem, calls, order)
         error = float(numpy.abs(steps.ends - steps.right).max())

@@ -8,6 +8,7 @@ from typing import Any
 
 from heavytop import arguments
 from heavytop.errors import InputError, quoted
+from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import COLUMNS, FILE
 from heavytop.precision import ordered
 
@@ -49,6 +50,7 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
         import pandas
     except ImportError:
         raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
+    require_extra("parquet")
     import pyarrow
 
     try:

@@ -17,6 +17,7 @@ import numpy
 
 from heavytop.cases import Case
 from heavytop.errors import InputError
+from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import DATA, command
 from heavytop.harness.plan import uniform
 from heavytop.integrate.trajectory import Outcome
@@ -59,6 +60,7 @@ def worse_motions(old: Row, new: Row, files: tuple[Path, Path], limits: LossLimi
 
 def _records(file: Path, row: Row) -> dict[str, Any]:
     """Columns of the motions of one row, by their index."""
+    require_extra("parquet")
     import pyarrow
     from pyarrow.parquet import read_table
 

@@ -130,7 +130,7 @@ class DoubleDouble(Arithmetic):
         return Floating(scaled, self.schedule, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
-        made, _ = double_double_run.machine(system, attitude)
+        made = double_double_run.machine(system, attitude)
         check(system, attitude, lambda scaled: Floating(scaled, _FULL, True), double_double_run.BITS)
         check(system, attitude, lambda scaled: Floating(scaled, _SPLIT, True), _SPLIT_BITS)
         check(system, attitude, lambda scaled: Floating(scaled, _PLAIN, True, low_order=3), _PLAIN_BITS)

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from time import perf_counter
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, ParamSpec, TypeAlias
 
 import numpy
-from llvmlite import binding, ir
 from numpy.typing import NDArray
+
+from heavytop.extras import Stub, require_extra
+from heavytop.multiword.codegen import code_cache
+
+try:
+    from llvmlite import ir as ir  # also for the modules that write code
+except ModuleNotFoundError:  # types and lengths are used without the extra; what would be compiled asks for it
+    ir = Stub()
 
 Doubles = NDArray[numpy.float64]
 Integers = NDArray[numpy.int64]
@@ -21,8 +29,11 @@ Integers = NDArray[numpy.int64]
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 INTEGERS = ctypes.POINTER(ctypes.c_int64)
 
+Signatures: TypeAlias = Mapping[str, tuple[Any, Sequence[Any]]]
+_TYPES = {"": None, "q": ctypes.c_int64, "d": ctypes.c_double, "Q": INTEGERS, "D": DOUBLES}
+_LETTERS = {kind: letter for letter, kind in _TYPES.items()}
+
 P = ParamSpec("P")
-T = TypeVar("T")
 
 _building = Lock()
 _started = False
@@ -32,12 +43,15 @@ _started = False
 class Machine:
     """Compiled functions by name; they keep nothing between calls, so that any thread may call them at any time.
 
-    seconds: what compiling took.  engine: keeps the machine code in memory.
+    seconds: what compiling or reading took.  engine: keeps the machine code in memory.
+    code, signatures: the machine code as a file, and of each function the types of its result and arguments.
     """
 
     functions: dict[str, Any]
     seconds: float
     engine: Any
+    code: bytes
+    signatures: Signatures
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,49 +72,61 @@ class Processor:
     @classmethod
     def here(cls) -> Processor:
         """The one that this runs on."""
+        from llvmlite import binding
+
         return cls(binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
 
 
-def once(make: Callable[P, T]) -> Callable[P, T]:
-    """``make``, called once for the same arguments: other threads that ask for them wait."""
-    making, made, signature = Lock(), dict[tuple[Any, ...], T](), inspect.signature(make)
+def once(make: Callable[P, Machine]) -> Callable[P, Machine]:
+    """``make``, called once for the same arguments, or its machine code from the disk: other threads that ask wait."""
+    making, made, signature = Lock(), dict[tuple[Any, ...], Machine](), inspect.signature(make)
     full = len(signature.parameters)
 
-    def found(*arguments: P.args, **named: P.kwargs) -> T:
+    def found(*arguments: P.args, **named: P.kwargs) -> Machine:
         if len(arguments) == full and arguments in made:
             return made[arguments]
         bound = signature.bind(*arguments, **named)
         bound.apply_defaults()
         with making:
             if bound.args not in made:
-                made[bound.args] = make(*arguments, **named)
+                require_extra("multiword")
+                made[bound.args] = _from_disk(make, bound.args)
             return made[bound.args]
 
     return found
 
 
-def compiled(
-    module: ir.Module, signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]], processor: Processor | None = None
-) -> Machine:
+def _from_disk(make: Callable[..., Machine], arguments: tuple[Any, ...]) -> Machine:
+    """The machine code as an earlier process left it, else made now and left for later ones."""
+    began = perf_counter()
+    key = code_cache.key_of(make, arguments, Processor.here())
+    if (cached := code_cache.read(key)) is not None:
+        code, beside = cached
+        letters = json.loads(beside)
+        kinds = {name: [_TYPES[letter] for letter in row] for name, row in letters.items()}
+        return _linked(code, {name: (result, rest) for name, (result, *rest) in kinds.items()}, began)
+    machine = make(*arguments)
+    letters = {
+        name: [_LETTERS[kind] for kind in (result, *rest)] for name, (result, rest) in machine.signatures.items()
+    }
+    code_cache.write(key, machine.code, json.dumps(letters).encode())
+    return machine
+
+
+def compiled(module: ir.Module, signatures: Signatures, processor: Processor | None = None) -> Machine:
     """The functions of ``module`` as machine code.
 
     signatures: for each function the ctypes of its result and arguments.  processor: None for this one.
 
     A call of a function lets other Python threads run.
     """
-    global _started
+    from llvmlite import binding  # a tenth of a second, and 170 MB of addresses
+
     with _building:
         began = perf_counter()
-        if not _started:
-            binding.initialize_native_target()
-            binding.initialize_native_asmprinter()
-            _started = True
-        which = processor or Processor.here()
+        target = _target(processor)
         parsed = binding.parse_assembly(str(module))
         parsed.verify()
-        target = binding.Target.from_default_triple().create_target_machine(
-            cpu=which.name, features=which.features, opt=3
-        )
         # the code is as it shall be; above 1, loads that several orders share are kept on the stack
         options = binding.create_pipeline_tuning_options(speed_level=0)
         # the code is vectors already; reordering of sums is not allowed anyway
@@ -108,13 +134,37 @@ def compiled(
         options.slp_vectorization = False
         passes = binding.create_pass_builder(target, options)
         passes.getModulePassManager().run(parsed, passes)
-        engine = binding.create_mcjit_compiler(parsed, target)
+        code = target.emit_object(parsed)
+    return _linked(code, signatures, began)
+
+
+def _target(processor: Processor | None) -> Any:
+    """What compiles for a processor."""
+    global _started
+    from llvmlite import binding
+
+    if not _started:
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        _started = True
+    which = processor or Processor.here()
+    # any address: the loader puts code and constants where there is room
+    return binding.Target.from_default_triple().create_target_machine(cpu=which.name, features=which.features, opt=3)
+
+
+def _linked(code: bytes, signatures: Signatures, began: float) -> Machine:
+    """Functions out of machine code."""
+    from llvmlite import binding
+
+    with _building:
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target(None))
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         functions = {
             name: ctypes.CFUNCTYPE(result, *arguments)(engine.get_function_address(name))
             for name, (result, arguments) in signatures.items()
         }
-        return Machine(functions, perf_counter() - began, engine)
+        return Machine(functions, perf_counter() - began, engine, code, signatures)
 
 
 def doubles(count: int) -> Doubles:

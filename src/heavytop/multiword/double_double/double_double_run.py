@@ -122,7 +122,8 @@ class Floating(ResumableRun):
         low_order: int | None = None,
         processor: Processor | None = None,
     ) -> None:
-        self.machine, self.layout = machine(problem.system, len(problem.state) == 9, processor)
+        attitude = len(problem.state) == 9
+        self.machine, self.layout = machine(problem.system, attitude, processor), dd.layout_of(problem.system, attitude)
         self.problem, self.forwards = problem, forwards
         self.steps = 0
         self.words = _state_words(problem.state, self.layout)

@@ -11,7 +11,6 @@ from operator import and_
 from typing import Any
 
 import numpy
-from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
@@ -29,6 +28,7 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     doubles,
     function,
+    ir,
     once,
     pointer,
 )

@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from llvmlite import ir
-
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
     DOUBLES,
@@ -36,6 +34,7 @@ from heavytop.multiword.codegen.machine_code import (
     Stepping,
     compiled,
     function,
+    ir,
 )
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Layout, Recurrence, permutations
 from heavytop.multiword.double_double.arithmetic import (
@@ -332,7 +331,12 @@ _HYSTERESIS = 3.0
 _TOLERATED = 1.0
 
 
-def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
+def layout_of(system: System, attitude: bool) -> Layout:
+    """Where the numbers of a motion stand."""
+    return Layout(2 if attitude else 1, len(permutations(system)))
+
+
+def build(system: System, attitude: bool, processor: Processor | None = None) -> Machine:
     """``advance``, ``sample`` and ``follow`` for this system.
 
     advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
@@ -344,13 +348,13 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
     numbers.
     """
     module = ir.Module("double_double")
-    layout = Layout(2 if attitude else 1, len(permutations(system)))
+    layout = layout_of(system, attitude)
     advance = _Step(module, layout, system)
     advance.write()
     _write_sample(module, layout, system)
     _Follow(module, layout, system).write(advance.made)
     integer, double = ctypes.c_int64, ctypes.c_double
-    machine = compiled(
+    return compiled(
         module,
         {
             "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
@@ -359,7 +363,6 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
         },
         processor,
     )
-    return machine, layout
 
 
 def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy
-from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLES,
@@ -37,6 +36,7 @@ from heavytop.multiword.codegen.machine_code import (
     Operand,
     compiled,
     function,
+    ir,
     once,
 )
 

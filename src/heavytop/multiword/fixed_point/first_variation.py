@@ -32,7 +32,6 @@ from threading import local
 from typing import Any, cast
 
 import numpy
-from llvmlite import ir
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
@@ -48,6 +47,7 @@ from heavytop.multiword.codegen.machine_code import (
     compiled,
     doubles,
     function,
+    ir,
     once,
     pointer,
 )

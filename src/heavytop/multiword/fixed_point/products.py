@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from llvmlite import ir
-
 from heavytop.multiword.codegen.machine_code import (
     INT,
     INT_POINTER,
@@ -19,6 +17,7 @@ from heavytop.multiword.codegen.machine_code import (
     Index,
     Operand,
     function,
+    ir,
 )
 from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Sum
 from heavytop.multiword.fixed_point.arithmetic import (

@@ -14,8 +14,6 @@ from dataclasses import dataclass, field
 from functools import partial, reduce
 from typing import Any
 
-from llvmlite import ir
-
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
     DOUBLES,
@@ -32,6 +30,7 @@ from heavytop.multiword.codegen.machine_code import (
     Stepping,
     compiled,
     function,
+    ir,
 )
 from heavytop.multiword.codegen.recurrence import GATHERED, paired_permutations, permutations
 from heavytop.multiword.fixed_point.arithmetic import (

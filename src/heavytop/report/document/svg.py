@@ -14,6 +14,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.display import printable
+from heavytop.extras import require_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,6 +54,7 @@ class Picture:
 @contextmanager
 def quiet_style() -> Iterator[None]:
     """The look of the page's pictures, without a reading of $ and \\ in names."""
+    require_extra("plots")
     import matplotlib
 
     settings: Any = {
@@ -79,6 +81,7 @@ def quiet_style() -> Iterator[None]:
 
 def new_figure(width: float, height: float) -> Figure:
     """A figure of so many inches, without pyplot."""
+    require_extra("plots")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
 from heavytop.display import plural
+from heavytop.extras import has_extra, install
 from heavytop.files import replace
 from heavytop.harness.plan import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
@@ -132,8 +133,12 @@ def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[
                     asked.setdefault(block.make, set()).update(kinds if block.of_all else {name})
                 elif isinstance(block, Table):
                     _add(tables, block, source)
-    with quiet_style():
-        made = [make(_only(sources, names), first) for make, names in asked.items()]
+    made: list[Section | None] = []
+    if has_extra("plots"):
+        with quiet_style():
+            made = [make(_only(sources, names), first) for make, names in asked.items()]
+    elif asked:
+        made = [Section("charts", "Charts", [f"Charts need the extra plots: {install('plots')}"])]
     found = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
     for section in found:
         section.drop_empty_columns()

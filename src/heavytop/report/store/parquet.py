@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
+from heavytop.extras import require_extra
 from heavytop.files import atomic_write
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Row
@@ -50,15 +50,9 @@ neither metric nor law is one line without them.
 """
 
 
-def require_pyarrow() -> None:
-    """Raises InputError where pyarrow is not installed."""
-    if find_spec("pyarrow") is None:
-        raise InputError("Parquet needs pyarrow.", "Install it with: pip install 'heavytop[parquet]'")
-
-
 def check_name(path: Path) -> None:
     """Raises InputError unless the file may hold Parquet, and pyarrow is installed."""
-    require_pyarrow()
+    require_extra("parquet")
     if path.suffix != ".parquet":
         raise InputError(f"{path} is not named as Parquet.", "Give a file that ends in .parquet.")
 

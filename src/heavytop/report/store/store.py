@@ -223,7 +223,7 @@ def environment() -> dict[str, Any]:
         "simd_width_double": int(heyoka.recommended_simd_size()),
         "extended_bits": int(numpy.finfo(numpy.longdouble).nmant) + 1,
         "formats": {name: reason or "available" for name, reason in available().items()},
-        "code_cache": "none: every integrator was compiled in this run",
+        "code_cache": "heyoka: none; multiword: by checksum, then a step that is known",
     }
 
 

@@ -20,11 +20,12 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
 from heavytop.features.claims.audit.context import ClaimFile
-from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_memory
+from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.files import cache_folder
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 
@@ -280,7 +281,7 @@ def _keep(entry: Entry, found: Judged) -> None:
 
 def _place(entry: Entry) -> Path:
     content = (FOLDER / f"{entry.id}.toml").read_bytes()
-    return _cache_folder() / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
+    return cache_folder("claims") / f"{hashlib.sha256(_program() + content).hexdigest()}.json"
 
 
 @cache
@@ -294,22 +295,17 @@ def _program() -> bytes:
     return digest.digest()
 
 
-def _cache_folder() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    with suppress(RuntimeError):
-        return (Path(home) if home else Path.home() / ".cache") / "heavytop" / "claims"
-    return Path(os.devnull) / "none"
-
-
 # The process in which the claim of a file is audited: :mod:`heavytop.features.claims.audit.guard` starts it.
 
 
 def child() -> None:
-    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
-    path, system_name, seconds = sys.argv[2:]
+    """The audit of ``sys.argv[2:]`` = path, system, seconds of the processor and of the clock: a JSON document of
+    :class:`Answer` on standard output.
+    """
+    path, system_name, seconds, last = sys.argv[2:]
     if hasattr(signal, "alarm"):
-        signal.alarm(int(seconds))
-    limit_memory()
+        signal.alarm(int(last))
+    limit_process(int(seconds))
     try:
         answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
     except HeavyTopError as error:

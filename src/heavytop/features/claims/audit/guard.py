@@ -18,6 +18,9 @@ from heavytop.errors import ExitCode, HeavyTopError, InputError, quoted
 from heavytop.features.claims.audit.judge import Audit
 
 SECONDS = 20
+"""Of the processor: a claim is not refused because others use the machine."""
+_WALL = 6
+"""Times as many by the clock, after which it is stopped whatever it does."""
 _BYTES = 3 << 30
 # the process ends itself that much later, where nobody is left to stop it
 _GRACE = 2
@@ -48,19 +51,23 @@ class Answer(msgspec.Struct, frozen=True):
 def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
     """The audit of the claim in a file, about its own system for the name "".
 
-    Raises InputError where it takes more than ``seconds``, 3 GB or the stack, and
+    Raises InputError where it takes more than ``seconds`` of processor time, 3 GB or the stack, and
     AuditEnded with what happened where the process of the audit ends without an answer.
     """
-    last = str(math.ceil(seconds) + _GRACE)
-    command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, last]
+    slow = InputError(f"{path}: the audit took more than {seconds:g} s and was stopped.", _TOO_LARGE)
+    wall = seconds * _WALL
+    limits = [str(math.ceil(seconds)), str(math.ceil(wall) + _GRACE)]
+    command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, *limits]
     try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, check=False)
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=wall, check=False)
     except subprocess.TimeoutExpired:
-        raise InputError(f"{path}: the audit took more than {seconds:g} s and was stopped.", _TOO_LARGE) from None
+        raise slow from None
     except ValueError as error:
         raise InputError(f"{quoted(path)} cannot be read: {error}.", "Give the path of a claim in TOML.") from None
     except OSError as error:
         raise AuditEnded(f"{path}: the process of the audit cannot be started: {error.strerror}.") from None
+    if done.returncode == -getattr(signal, "SIGXCPU", 0) < 0:
+        raise slow
     try:
         answer = msgspec.json.decode(done.stdout, type=Answer)
     except msgspec.DecodeError:
@@ -92,12 +99,13 @@ def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
     return f"ended without an answer, exit code {done.returncode}" + "".join(f": {line[:200]}" for line in last)
 
 
-def limit_memory() -> None:
-    """Where the platform can: Windows has no such limit."""
+def limit_process(seconds: int) -> None:
+    """Memory and seconds of the processor, where the platform can: Windows has no such limits."""
     try:
         import resource
     except ImportError:
         return
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    most = _BYTES if hard == resource.RLIM_INFINITY else min(_BYTES, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    for kind, limit in ((resource.RLIMIT_AS, _BYTES), (resource.RLIMIT_CPU, seconds)):
+        hard = resource.getrlimit(kind)[1]
+        most = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(kind, (most, hard if kind == resource.RLIMIT_CPU else most))

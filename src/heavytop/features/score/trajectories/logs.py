@@ -14,6 +14,7 @@ from io import BytesIO
 from typing import Any
 
 from heavytop.errors import InputError, quoted
+from heavytop.extras import require_extra
 from heavytop.precision import decimal_text, exact_text
 
 TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -219,6 +220,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
     import numpy
 
     if suffix == ".parquet":
+        require_extra("parquet")
         import pyarrow.parquet
 
         table = pyarrow.parquet.read_table(BytesIO(content))

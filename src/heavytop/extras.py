@@ -1,0 +1,53 @@
+"""The extras of the installation: packages that part of the program needs, and what is said where one is missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from heavytop.errors import MissingExtra
+
+EXTRAS = {
+    "claims": ("sympy",),
+    "multiword": ("llvmlite",),
+    "parquet": ("pyarrow",),
+    "plots": ("matplotlib",),
+    "peers": ("scipy", "CyRK", "numba", "sksundae", "diffrax"),
+    "cluster": ("dask", "distributed"),
+}
+"""The modules of each extra of ``pyproject.toml`` that the program itself imports."""
+
+
+def has_extra(name: str) -> bool:
+    """Whether every module of an extra is installed."""
+    return all(find_spec(module) for module in EXTRAS[name])
+
+
+def install(name: str) -> str:
+    """The command that installs an extra."""
+    return f"pip install 'heavytop[{name}]'"
+
+
+def extra_of(module: str) -> str:
+    """The extra that a module belongs to."""
+    return next(extra for extra, modules in EXTRAS.items() if module in modules)
+
+
+def missing(name: str, what: str = "This") -> MissingExtra:
+    """The error where an extra that something needs is not installed."""
+    return MissingExtra(f"{what} needs the extra {name}: {install(name)}")
+
+
+def require_extra(name: str) -> None:
+    """Raises MissingExtra where a module of the extra is not installed."""
+    if not has_extra(name):
+        raise missing(name)
+
+
+class Stub:
+    """Stands for a module that is not installed: its names may be written down, and nothing comes of them."""
+
+    def __getattr__(self, _: str) -> Stub:
+        return self
+
+    def __call__(self, *_: object) -> Stub:
+        return self
