@@ -28,6 +28,7 @@ from test_from_wheel import packages
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / ".github" / "workflows" / "heavytop.yml"
+ACTION = ROOT / "action.yml"
 STARTER = ROOT / "src" / "heavytop" / "api" / "starters" / "common" / "workflow.yml"
 BOTH = pytest.mark.parametrize("workflow", [EXAMPLE, STARTER], ids=("package", "program"))
 SHELL = re.compile(r"\|\||&&|\||;|\d?>")
@@ -35,9 +36,8 @@ MARKER = "<!-- heavytop accuracy -->"
 RUN = "https://forge.example/us/mine/actions/runs/17"
 HEAVYTOP = """#!/bin/sh
 case $1 in
-run) echo "said by run"; exit "$RUN" ;;
 check-integrator) echo "$CONTRACT" ; exit 0 ;;
-compare) echo "said by compare" ; [ -n "$TABLE" ] && echo "$TABLE" > result/comparison.md ; exit "$COMPARE" ;;
+gate) echo "said by gate" ; [ -n "$TABLE" ] && echo "$TABLE" > result/comparison.md ; exit "$GATE" ;;
 esac
 """
 GH = '''#!{python}
@@ -81,15 +81,32 @@ def read(workflow: Path) -> dict[str, Any]:
 
 
 def steps(workflow: Path) -> list[dict[str, Any]]:
-    return [step for job in read(workflow)["jobs"].values() for step in job["steps"]]
+    found = [step for job in read(workflow)["jobs"].values() for step in job["steps"]]
+    return [each for step in found for each in (of_action() if is_action(step) else [step])]
+
+
+def is_action(step: dict[str, Any]) -> bool:
+    """Whether it is the action at the root of this repository, from its checkout."""
+    return bool(step.get("uses") == "./.heavytop/source")
+
+
+def of_action() -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = read(ACTION)["runs"]["steps"]
+    return found
 
 
 @BOTH
 def test_the_program_understands_the_commands_of_the_workflow(workflow: Path) -> None:
-    words = {f"${name}": str(value) for name, value in read(workflow)["env"].items()}
+    words = {
+        "$PLAN": "gate.toml",
+        "$MEASURE": "--integrator mine.toml",
+        "$INTEGRATOR": "mine.toml",
+        "$bless": "--bless",
+    }
     text = "\n".join(step.get("run", "") for step in steps(workflow)).replace("\\\n", " ")
-    said = [SHELL.split(line)[0] for line in map(str.strip, text.splitlines()) if line.startswith("heavytop ")]
-    assert len(said) == 3
+    lines = (line.strip().removeprefix("timeout 20m ") for line in text.splitlines())
+    said = [SHELL.split(line)[0] for line in lines if line.startswith("heavytop ")]
+    assert [line.split()[1] for line in said] == ["gate", "check-integrator"]
     known = typer.main.get_command(app).commands
     for command in said:
         for name, value in words.items():
@@ -110,9 +127,12 @@ def test_the_workflow_is_one_that_github_reads(workflow: Path) -> None:
     assert all(job["runs-on"] for job in content["jobs"].values())
     assert all(("uses" in step) != ("run" in step) for step in steps(workflow))
     assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in steps(workflow) if "uses" in step)
-    assert "https://" not in workflow.read_text("utf-8")
+    assert "https://" not in workflow.read_text("utf-8") + ACTION.read_text("utf-8")
+    # GitHub asks for the shell of each step of an action, and for inputs that it has
+    assert all(step["shell"] == "bash" for step in of_action() if "run" in step)
+    assert set(content["jobs"]["measure"]["steps"][-1]["with"]) <= set(read(ACTION)["inputs"])
     # a job that was cancelled says what it has: its last steps, and the job that writes the comment
-    say, keep = content["jobs"]["measure"]["steps"][-2:]
+    say, keep = of_action()[-2:]
     assert say["if"] == keep["if"] == "always()"
     assert "always()" in content["jobs"]["comment"]["if"]
     assert keep["uses"].startswith("actions/upload-artifact")
@@ -122,9 +142,8 @@ def test_both_workflows_are_one_but_for_the_project() -> None:
     """Apart from the pinned commit, what is measured, and how the project is installed."""
     two = [read(file) for file in (EXAMPLE, STARTER)]
     for content in two:
-        del content["env"]["INTEGRATOR"], content["env"]["HEAVYTOP_COMMIT"]
-        project = content["jobs"]["measure"]["steps"].pop(3)
-        assert "this project" in project["name"]
+        del content["env"]["FOLDER"], content["env"]["HEAVYTOP_COMMIT"]
+        assert set(content["jobs"]["measure"]["steps"].pop()["with"]) == {"folder", "integrator", "build"}
     assert two[0] == two[1]
     assert (ROOT / "examples" / "mine" / "policy.toml").read_text() == (STARTER.parent / "policy.toml").read_text()
 
@@ -139,7 +158,7 @@ def test_a_starter_brings_a_workflow_pinned_to_this_commit(
         new_integrator(folder, language)
         content = read(folder / ".github" / "workflows" / "heavytop.yml")
         assert content["env"]["HEAVYTOP_COMMIT"] == pinned
-        assert LANGUAGES[language].build in content["jobs"]["measure"]["steps"][3]["run"]
+        assert LANGUAGES[language].build in content["jobs"]["measure"]["steps"][-1]["with"]["build"]
         assert (folder / ".gitignore").exists()
 
 
@@ -157,7 +176,8 @@ class Runner:
             "GITHUB_EVENT_NAME": event,
             "GITHUB_REF_NAME": "main",
             "GITHUB_SHA": "f00",
-            "RUNNER_TEMP": str(folder.parent / "temp"),
+            "GITHUB_OUTPUT": str(folder.parent / "outputs"),
+            "GITHUB_ACTION_PATH": str(folder / ".heavytop" / "source"),
             "COMMENTS": str(folder.parent / "comments.json"),
             "NUMBER": "7",
             **self.content["env"],
@@ -169,16 +189,32 @@ class Runner:
         """Run a job; the exit code of each step that ran.  skip: a pattern of steps that count as done."""
         done: dict[str, int] = {}
         cancelled = False
-        for step in self.content["jobs"][name]["steps"]:
+        for step in self._steps(name):
             when = step.get("if", "success()")
             if (cancelled and when != "always()") or (any(done.values()) and when == "success()"):
                 continue
             if "uses" in step:
                 self._artefact(step)
             elif not skip or not re.match(skip, step["name"]):
-                done[step["name"]] = self._shell(step["run"])
+                done[step["name"]] = self._shell(step["run"], step.get("env", {}))
             cancelled = cancelled or step.get("name") == cancelled_in
         return done
+
+    def _steps(self, name: str) -> list[dict[str, Any]]:
+        """The steps of a job; those of the action with its inputs filled in."""
+        found: list[dict[str, Any]] = []
+        for step in self.content["jobs"][name]["steps"]:
+            found += self._of_action(step["with"]) if is_action(step) else [step]
+        return found
+
+    def _of_action(self, given: dict[str, str]) -> list[dict[str, Any]]:
+        values = {name: about["default"] for name, about in read(ACTION)["inputs"].items()} | given
+        values["folder"] = self.environment["FOLDER"]
+        inputs = re.compile(r"\$\{\{ inputs\.([\w-]+) \}\}")
+        found: list[dict[str, Any]] = json.loads(
+            inputs.sub(lambda m: json.dumps(values[m[1]])[1:-1], json.dumps(of_action()))
+        )
+        return found
 
     def _artefact(self, step: dict[str, Any]) -> None:
         result = self.folder / "result"
@@ -187,10 +223,11 @@ class Runner:
         if "download" in step["uses"] and self.kept.exists():
             shutil.copytree(self.kept, result, dirs_exist_ok=True)
 
-    def _shell(self, script: str) -> int:
+    def _shell(self, script: str, more: dict[str, str]) -> int:
         # what GitHub makes of `shell: bash`
         line = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script]
-        found = subprocess.run(line, cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=300)
+        known = self.environment | {name: value for name, value in more.items() if "${{" not in value}
+        found = subprocess.run(line, cwd=self.folder, env=known, capture_output=True, text=True, timeout=300)
         self.said = found.stdout + found.stderr
         return found.returncode
 
@@ -208,13 +245,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "mine"
 
 
-def on_github(folder: Path, table: str, run: int, compare: int, **more: Any) -> list[int]:
+def on_github(folder: Path, table: str, gate: int, **more: Any) -> list[int]:
     """The exit codes of the steps from the measurement on, and of the comment, with a heavytop that says this."""
     shutil.rmtree(folder / "result", ignore_errors=True)
     shutil.rmtree(folder.parent / "kept", ignore_errors=True)
-    values = {"TABLE": table, "RUN": str(run), "COMPARE": str(compare), "CONTRACT": more.pop("contract", "kept  one")}
+    values = {"TABLE": table, "GATE": str(gate), "CONTRACT": more.pop("contract", "kept  one")}
     runner = Runner(EXAMPLE, folder, more.pop("event", "pull_request"), **values)
-    done = runner.job("measure", skip="Install", **more)
+    done = runner.job("measure", skip="Fetch|Name|Install|Build", **more)
     shutil.rmtree(folder / "result", ignore_errors=True)  # another machine
     return [*done.values(), *runner.job("comment").values()]
 
@@ -227,27 +264,22 @@ def comments(folder: Path) -> list[tuple[int, str]]:
 def test_one_comment_is_written_and_then_kept_up_to_date(folder: Path) -> None:
     others = comments(folder)
     end = f"[The run, with pages and reports]({RUN})\n"
-    assert on_github(folder, "### heavytop: same", 0, 0) == [0, 0, 0, 0, 0]
+    assert on_github(folder, "### heavytop: same", 0) == [0, 0, 0, 0]
     assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: same\n{end}")]
     # something is worse: the step fails, and the same comment says so
-    assert on_github(folder, "### heavytop: worse", 0, 1) == [0, 1, 0, 0, 0]
+    assert on_github(folder, "### heavytop: worse", 1) == [1, 0, 0, 0]
     assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: worse\n{end}")]
     assert (folder.parent / "summary.md").read_text() == f"### heavytop: same\n{end}### heavytop: worse\n{end}"
 
 
 @pytest.mark.slow
 def test_the_comment_is_there_whatever_became_of_the_job(folder: Path) -> None:
-    # a row that failed is for the comparison to say
-    assert on_github(folder, "### heavytop: incomparable", 3, 3) == [0, 3, 0, 0, 0]
     # bad input: what the program said of it
-    assert on_github(folder, "", 2, 0) == [1, 0, 0, 0]
-    assert "nothing was compared\n```text\nsaid by run\n```" in comments(folder)[-1][1]
-    assert on_github(folder, "", 0, 2) == [0, 2, 0, 0, 0]
-    assert "said by compare" in comments(folder)[-1][1]
+    assert on_github(folder, "", 2) == [2, 0, 0, 0]
+    assert "nothing was compared\n```text\nsaid by gate\n```" in comments(folder)[-1][1]
     # cancelled while it measures, or before anything was kept
-    assert on_github(folder, "", 0, 0, cancelled_in="Measure") == [0, 0, 0]
-    assert "nothing was compared\n```text\nsaid by run\n```" in comments(folder)[-1][1]
-    assert "said by compare" not in comments(folder)[-1][1]
+    assert on_github(folder, "", 0, cancelled_in="Measure, and compare with the baseline") == [0, 0, 0]
+    assert "nothing was compared\n```text\nsaid by gate\n```" in comments(folder)[-1][1]
     runner = Runner(EXAMPLE, folder, "pull_request")
     shutil.rmtree(folder / "result", ignore_errors=True)
     shutil.rmtree(folder.parent / "kept")
@@ -255,16 +287,12 @@ def test_the_comment_is_there_whatever_became_of_the_job(folder: Path) -> None:
     assert comments(folder)[-1][1] == f"{MARKER}\nheavytop compared nothing: [the run]({RUN}) ended before that.\n"
     # what is violated stands below the findings, and fences stay closed
     said = "kept      a  fine\nviolated  b  It says ```\n             twice.\nkept      c  fine"
-    assert on_github(folder, "### heavytop: worse", 0, 1, contract=said)[1] == 1
+    assert on_github(folder, "### heavytop: worse", 1, contract=said)[0] == 1
     body = comments(folder)[-1][1]
     assert "### heavytop: worse\n```text\nviolated  b  It says \n             twice.\n```\n" in body
     # a comment takes 65,536 characters, whatever anyone writes
-    assert on_github(folder, "x" * 60_000, 0, 1, contract=("violated " + "y" * 4000 + "\n") * 30)[1] == 1
+    assert on_github(folder, "x" * 60_000, 1, contract=("violated " + "y" * 4000 + "\n") * 30)[0] == 1
     assert len(comments(folder)[-1][1]) < 65_536
-
-
-def test_running_it_by_hand_needs_no_baseline(folder: Path) -> None:
-    assert on_github(folder, "", 0, 2, event="workflow_dispatch")[:4] == [0, 0, 0, 0]
 
 
 def git(folder: Path, *words: str) -> str:
@@ -274,7 +302,7 @@ def git(folder: Path, *words: str) -> str:
 
 def heavytop_repository(folder: Path) -> Path:
     """This project as it stands, to be cloned; of the pins those that hold here, so that nothing is fetched."""
-    files = ("hatch_build.py", "pyproject.toml", "README.md", "LICENSE")
+    files = ("hatch_build.py", "pyproject.toml", "README.md", "LICENSE", "action.yml")
     folder.mkdir()
     for name in files:
         shutil.copy(ROOT / name, folder)
@@ -325,7 +353,6 @@ def test_a_baseline_is_proposed_and_a_mistake_found_in_a_fresh_environment(folde
     pytest.importorskip("hatchling")
     place = folder.parent
     (place / "bin" / "heavytop").unlink()
-    (place / "temp").mkdir()
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", place / "env"], check=True)
     (place / "env" / "lib" / version / "site-packages" / "others.pth").write_text(packages())
@@ -341,7 +368,7 @@ def test_a_baseline_is_proposed_and_a_mistake_found_in_a_fresh_environment(folde
     runner = Runner(EXAMPLE, folder, "workflow_dispatch", **more)
     done = runner.job("measure")
     assert set(done.values()) == {0}, (done, runner.said)
-    assert len(done) == 6
+    assert len(done) == 7
     shutil.rmtree(folder / "result")
     assert runner.job("baseline") == {"Propose the baseline": 0}, runner.said
     assert "nothing was compared" in comments(folder)[-1][1]
@@ -355,8 +382,8 @@ def test_a_baseline_is_proposed_and_a_mistake_found_in_a_fresh_environment(folde
     (folder / "mine.py").write_text(code.replace("weights.TWO * q", "(weights.TWO + 1e-3) * q"))
     shutil.rmtree(folder / "result")
     runner = Runner(EXAMPLE, folder, "pull_request", **more)
-    worse = runner.job("measure", skip="Install heavytop|Go through")
-    assert [name for name, code in worse.items() if code] == ["Compare with the baseline"], runner.said
+    worse = runner.job("measure", skip="Fetch|Install heavytop|Go through")
+    assert [name for name, code in worse.items() if code] == ["Measure, and compare with the baseline"], runner.said
     shutil.rmtree(folder / "result")
     assert runner.job("comment") == {"Write the comment": 0}
     body = comments(folder)[-1][1]

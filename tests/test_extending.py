@@ -36,8 +36,8 @@ def test_a_kind_is_in_the_page_of_plans_with_all_its_keys(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in INTEGRATORS if name != "multiword"])
-def test_an_integrator_is_in_the_page_of_peers(name: str) -> None:
-    assert f"`{name}`" in first_cells("peers.md"), f"docs/peers.md: write a row `{name}` in the first table"
+def test_an_integrator_is_in_the_page_of_gates(name: str) -> None:
+    assert f"`{name}`" in first_cells("gate.md"), f"docs/gate.md: write a row `{name}` in the last table"
 
 
 @pytest.mark.parametrize("file", MOTIONS)

@@ -236,6 +236,7 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
         ["run", "--plan", "smoke", "--row-timeout", "0"],
         lambda: ht.run("smoke", row_timeout="0"),
     ),
+    "gate of no plan": (["gate", "--plan", "nobody", "--bless"], lambda: ht.run("nobody")),
     "selftest without workers": (["selftest", "--workers", "0"], lambda: ht.run("smoke", workers=0)),
     "hunt of nobody": (["hunt", "--integrator", "nobody"], lambda: ht.hunt("nobody")),
     "hunt for no time": (["hunt", "--horizon", "0"], lambda: ht.hunt(horizon="0")),

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
 import tomllib
+from math import log
 from pathlib import Path
 
 import pytest
 
-from heavytop.api.integrators import LANGUAGES, new_integrator
+from heavytop.api.integrators import LANGUAGES, METHODS, new_integrator
 from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
@@ -38,7 +40,7 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
     )
     for name in files:
         text = (folder / name).read_text()
-        assert not re.search(r"\b(COMMAND|LANGUAGE|BUILD|FILE)\b", text), name
+        assert not re.search(r"\b(COMMAND|LANGUAGE|BUILD|FILE|TITLE|KEYS|CONTROL|LADDER|METHOD|WHERE)\b", text), name
         assert max(map(len, text.splitlines())) <= 130, name
     program = (folder / LANGUAGES[language].file).read_text()
     assert program.isascii() or language == "julia"
@@ -81,16 +83,105 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
         close_all()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("method", sorted(METHODS.keys() - {"step"}))
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_other_methods_have_the_order_that_they_say(language: str, method: str, tmp_path: Path) -> None:
+    folder, repository = tmp_path / "repository" / "top", tmp_path / "repository"
+    new_integrator(folder, language, method, repository)
+    (command,) = commands_in(folder / "mine.toml")
+    assert (command.order, command.setting) == ((5, "tolerance") if method == "adaptive" else (4, "step"))
+    assert (repository / ".github/workflows/heavytop.yml").exists()
+    assert not (folder / ".github").exists()
+    if shutil.which(COMPILERS[language]) is None:
+        pytest.skip(f"{COMPILERS[language]} is not installed")
+    if (folder / "Makefile").exists():
+        built = subprocess.run(["make"], cwd=folder, capture_output=True, text=True, check=False)
+        assert (built.returncode, built.stderr) == (0, "")
+    case, times = CASES["generic"], [-0.7, -1, -4]
+    known = propagate(case.top, case.start, times, DOUBLE).to_numpy()
+
+    def error(control: float) -> tuple[float, int]:
+        run = registry.ready(command, (command.setting, control))(case.top, case.start, times, DOUBLE)
+        return abs(run.to_numpy() - known).max(), run.steps
+
+    try:
+        (coarse, few), (fine, many) = map(error, (1e-5, 1e-8) if method == "adaptive" else (1 / 20, 1 / 80))
+        order = log(coarse / fine) / log(many / few)
+        assert fine < 1e-6
+        assert abs(order - command.order) < 0.6
+        if language == "c":
+            assert {each.verdict for each in check(command)} <= {"kept", "note"}
+    finally:
+        close_all()
+
+
+def test_a_workflow_that_exists_is_not_written_over(tmp_path: Path) -> None:
+    assert in_process.heavytop("new", "--into", ".", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "heavytop" / "mine.py").exists()
+    assert "FOLDER: heavytop" in (tmp_path / ".github/workflows/heavytop.yml").read_text()
+    for words in (("other", "--into", "."), ("../out", "--into", "."), ()):
+        assert in_process.heavytop("new", *words, cwd=tmp_path).returncode == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".github", "heavytop"]
+
+
 def test_a_folder_that_holds_anything_and_an_unknown_language_are_refused(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
     (tmp_path / "empty").mkdir()
-    for folder, language in ((tmp_path / "full", "c"), (tmp_path / "full" / "file", "c"), (tmp_path / "new", "cobol")):
+    new = tmp_path / "new"
+    for folder, *words in (
+        (tmp_path / "full", "c"),
+        (tmp_path / "full" / "file", "c"),
+        (new, "cobol"),
+        (new, "c", "rk"),
+    ):
         with pytest.raises(InputError) as caught:
-            new_integrator(folder, language)
+            new_integrator(folder, *words)
         assert caught.value.remedy
     assert not (tmp_path / "new").exists()
     assert new_integrator(tmp_path / "empty", "c")
+
+
+def gate_moves(folder: Path) -> None:
+    """The gate refuses to run without a baseline, begins it, is green, finds a mistake, and moves with old and new."""
+    plan = 'name = "tiny"\nintegrators = ["mine.toml"]\n[[measure]]\nkind = "work_precision"\ncases = ["euler"]\n'
+    ladder = 'horizon = "1"\nsamples = 2\nladders = [{ integrator = "mine", steps = ["1/20", "1/40"] }]\n'
+    (folder / "gate.toml").write_text(plan + ladder)
+
+    def gate(*words: str) -> tuple[int, str]:
+        done = in_process.heavytop("gate", *words, cwd=folder)
+        return done.returncode, done.stdout or done.stderr
+
+    code, said = gate()
+    assert code == 2
+    assert "heavytop gate --bless" in said
+    assert not (folder / ".heavytop").exists()
+    code, said = gate("--bless")
+    assert code == 0
+    assert said.startswith("Begin the baseline of accuracy\n\nPlan tiny: 2 measurements")
+    assert gate()[0] == 0
+    text = (folder / "mine.py").read_text()
+    (folder / "mine.py").write_text(text.replace("p + 2 * q", "p + 2.001 * q"))
+    code, said = gate("--json")
+    assert code == 1
+    assert json.loads(said)["verdict"] == "worse"
+    code, said = gate("--bless")
+    message = (folder / ".heavytop" / "new" / "message.txt").read_text()
+    assert code == 0
+    assert message in said
+    assert message.startswith("Move the baseline of accuracy: worse\n\n")
+    assert re.search(r"^worse: work_precision euler/T=1 mine step=1/40 double: digits right \S+ → \S+", message, re.M)
+    assert sorted(each.name for each in (folder / ".heavytop" / "baseline").iterdir()) == [
+        "report.json",
+        "report.json.sha256",
+    ]
+    assert gate()[0] == 0
+    (folder / "mine.py").write_text(text)
+    (folder / ".heavytop" / "new" / "notes").touch()
+    code, said = gate()
+    assert code == 2
+    assert "already holds" in said
 
 
 @pytest.mark.slow
@@ -102,6 +193,7 @@ def test_from_nothing_to_a_gate_on_the_command_line(tmp_path: Path) -> None:
     assert heavytop("new", "mine", "--language", "python") == 2
     assert heavytop("check-integrator", "mine/mine.toml") == 0
     assert heavytop("check-integrator", "mine/absent.toml") == 2
+    gate_moves(tmp_path / "mine")
     program = tmp_path / "mine" / "mine.py"
     program.write_text(program.read_text().replace("map(repr, y)", 'map("{:.6g}".format, y)'))
     assert heavytop("check-integrator", "mine/mine.toml") == 1

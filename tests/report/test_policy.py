@@ -121,7 +121,10 @@ def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path
 )
 def test_timings_compare_by_their_own_rule(tmp_path: Path, when: str, machine: str, verdict: Verdict | None) -> None:
     given = policy(tmp_path, f"[timings]\ncompare = '{when}'\nratio = 2")
-    old, new = (report(drift("1e-12", seconds={"run": seconds, "compile": 0.01})) for seconds in (1.0, 2.5))
+    old, new = (
+        report(drift("1e-12", seconds={"run": 2 * seconds, "least": seconds, "compile": 0.01}))
+        for seconds in (1.0, 2.5)
+    )
     names = ("system", "machine", "processor", "simd_width_double", "cpu_features")
     old.environment.update(dict.fromkeys(names, "A"))
     new.environment.update(dict.fromkeys(names, machine))

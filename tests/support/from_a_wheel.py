@@ -21,12 +21,12 @@ from support.documents import ROOT, Block, blocks, run_shell
 
 LIMITS = {
     "score motion.csv": 120,
-    "compare before after": 120,
+    "gate --plan rk4/gate.toml": 120,
     "compare baseline candidate": 600,
     "audit claim.toml": 120,
 }
 """A command that names the block, and the seconds that it may take."""
-COMPILED = "compare before after"
+COMPILED = "gate --plan rk4/gate.toml"
 """The block that needs a compiler of C and make."""
 SAYS = {COMPILED: "- Order observed 4 → 0 in single steps on lagrange"}
 """What a block prints."""

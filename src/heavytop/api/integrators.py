@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features import FEATURES
 from heavytop.files import replace
-from heavytop.harness.integrator_check import NOT_TRIED as NOT_TRIED
-from heavytop.harness.integrator_check import Checked, check
 from heavytop.integrate.registry import named
 from heavytop.top.bodies import Body
 from heavytop.version import commit
+
+if TYPE_CHECKING:
+    from heavytop.harness.integrator_check import Checked
 
 
 class Language(NamedTuple):
@@ -39,6 +41,33 @@ LANGUAGES = {
     "fortran": Language("Fortran", "mine.f90", '["./mine"]'),
 }
 
+
+class Method(NamedTuple):
+    """A method of `heavytop new`: what it is called, the keys of its table, and its control and ladder in the plan."""
+
+    title: str
+    keys: str
+    control: str
+    ladder: str
+
+
+_STEPS = 'steps = ["1/10", "1/30", "1/100", "1/300"]'
+METHODS = {
+    "step": Method("the classical Runge-Kutta method", 'setting = "step"\norder = 4', "0.01", _STEPS),
+    "adaptive": Method(
+        "the method of Dormand and Prince",
+        'setting = "tolerance"\norder = 5',
+        "1e-9",
+        'tolerances = ["1e-4", "1e-6", "1e-8", "1e-10"]',
+    ),
+    "multistep": Method(
+        "the method of Adams and Bashforth",
+        'setting = "step"\norder = 4\none_step = false  # it keeps a memory',
+        "0.01",
+        _STEPS,
+    ),
+}
+
 _WORKFLOW = ".github/workflows/heavytop.yml"
 
 
@@ -54,40 +83,64 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
     Raises:
         InputError: for an unknown integrator, and a file that describes none.
     """
+    from heavytop.harness.integrator_check import check
+
     return check(named(integrator))
 
 
-def new_integrator(folder: Path, language: str, engine: str = "") -> list[str]:
-    """Write a program that integrates, with its gate, into a new folder; returns the names of the files.
+def new_integrator(
+    folder: Path, language: str, method: str = "step", into: Path | None = None, engine: str = ""
+) -> list[str]:
+    """Write a program that integrates, with its gate, into a new folder; returns the names of the files in it.
 
-    engine: in the place of a program the adapter of that engine of rigid bodies.
-    Raises InputError for an unknown language or engine, a folder that holds anything and one that cannot be written.
+    method: a fixed step, an adaptive one, or a multistep method.  into: a repository that ``folder`` lies in, which is
+    given the workflow.  engine: in the place of a program the adapter of that engine of rigid bodies.
+    Raises InputError for an unknown language, method or engine, a folder that holds anything, a workflow that exists,
+    and what cannot be written.
     """
-    if language not in LANGUAGES:
-        raise InputError(f"There is no program in {quoted(language)}.", f"Use {', '.join(LANGUAGES)}.")
+    for name, choices, noun in ((language, LANGUAGES, "program in"), (method, METHODS, "method")):
+        if name not in choices:
+            raise InputError(f"There is no {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
     if engine and engine not in (known := engines()):
         raise InputError(f"There is no adapter of {quoted(engine)}.", f"Use {', '.join(known)}.")
+    workflow = (into or folder) / _WORKFLOW
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} already holds other content.", "Give a new folder.")
-        files = _adapter(engine) if engine else _program(LANGUAGES[language], language)
+        if workflow.exists():
+            raise InputError(f"{workflow} exists already.", "Move it away, or give another --into.")
+        place = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
+        files = _adapter(engine, place) if engine else _program(language, method, place)
         for name, text in sorted(files.items()):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            replace(folder / name, text.encode())
+            path = workflow if name == _WORKFLOW else folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace(path, text.encode())
+    except ValueError:
+        raise InputError(f"{folder} is not in {into}.", "Give a folder of that repository.") from None
     except OSError as error:
         raise InputError(f"{folder} cannot be written: {error.strerror}.", "Give a folder that can be.") from None
     return sorted(files)
 
 
-def _program(about: Language, language: str) -> dict[str, str]:
+def _program(language: str, method: str, place: str) -> dict[str, str]:
+    """The files of a program by their names."""
+    about, chosen = LANGUAGES[language], METHODS[method]
     files = _texts("common") | _texts(language)
-    files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
+    parts = {name: files.pop(name) for name in METHODS}
+    files[".gitignore"], files[_WORKFLOW] = files.pop("gitignore"), files.pop("workflow.yml")
+    files[about.file] = re.sub(r"^.*\bMETHOD\b.*\n", lambda _: parts[method], files[about.file], flags=re.MULTILINE)
     words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-    words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
-    for name in ("mine.toml", "README.md", _WORKFLOW):
-        for word, text in words.items():
-            files[name] = files[name].replace(word, text)
-    return files
+    words |= {"TITLE": chosen.title, "KEYS": chosen.keys, "CONTROL": chosen.control, "LADDER": chosen.ladder}
+    return {
+        name: text if name in (".gitignore", "Makefile", "policy.toml") else _filled(text, words, place)
+        for name, text in files.items()
+    }
+
+
+def _filled(text: str, words: dict[str, str], place: str) -> str:
+    """A text with its words in capitals replaced.  place: the folder of the program in the repository."""
+    words = words | {"MADE_FROM": (commit() or "HEAD").removesuffix("-dirty"), "WHERE": place}
+    return re.sub(rf"(?<![A-Za-z])({'|'.join(words)})(?![A-Za-z])", lambda match: words[match[1]], text)
 
 
 # Engines of rigid bodies, as features have adapters of them: NAME.toml, NAME_top.py, and what these share.
@@ -103,7 +156,7 @@ def _adapters() -> list[Traversable]:
     return [path for folder in folders for path in folder.iterdir() if path.is_file()]
 
 
-def _adapter(engine: str) -> dict[str, str]:
+def _adapter(engine: str, place: str) -> dict[str, str]:
     """The files of an engine: the gate measures each of its integrators."""
     own = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
     texts = {path.name: path.read_text("utf-8") for path in _adapters()}
@@ -114,11 +167,9 @@ def _adapter(engine: str) -> dict[str, str]:
     runs = "\n".join(_DRIFT.format(name=each["name"]) for each in tables)
     words = {"ENGINE": engine, "LADDERS": "\n".join(ladders), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
     words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
-    for name in ("gate.toml", "README.md"):
-        files[name] = texts[f"{name}.txt"]
-        for word, text in words.items():
-            files[name] = files[name].replace(word, text)
-    return files
+    words |= {"BUILD": words["INSTALL"].replace("pip", "python -m pip"), "mine.toml": f"engine.toml:{words['FIRST']}"}
+    texts[f"{_WORKFLOW}.txt"] = _texts("common")["workflow.yml"]
+    return files | {name: _filled(texts[f"{name}.txt"], words, place) for name in ("gate.toml", "README.md", _WORKFLOW)}
 
 
 _POINTS = {"step": ["1/50", "1/100", "1/200", "1/400"], "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"]}

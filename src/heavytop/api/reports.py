@@ -180,7 +180,7 @@ def run(
         seed: measure the same motions with other roundings: 0 to 1000.
         parquet: write rows.parquet too.
         row_timeout: seconds that a row of a third-party integrator may take; None for the plan's, or limits by its
-            other rows (`heavytop docs programs`).
+            other rows (`heavytop docs gate`).
 
     Returns:
         A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.

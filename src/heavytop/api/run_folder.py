@@ -195,6 +195,12 @@ def _integrators(tasks: Sequence[Task]) -> dict[str, dict[str, str]]:
     return {"integrators": dict(sorted(said.items()))} if said else {}
 
 
+def is_written(name: str) -> bool:
+    """Whether a run puts a file of that name into its folder."""
+    gathered = {file for kind in KINDS.values() for file in kind.gathers}
+    return name in {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered} or bool(checkpoint.OURS.fullmatch(name))
+
+
 def require_fit(directory: Path, resume: bool) -> None:
     """Raises InputError where the folder holds anything that a run did not put there, or all of it without --resume."""
     if not directory.exists():
@@ -205,8 +211,7 @@ def require_fit(directory: Path, resume: bool) -> None:
     begun = checkpoint.FILE in content
     content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
     if resume and begun:
-        gathered = {file for kind in KINDS.values() for file in kind.gathers}
-        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE, *gathered}  # written, but not yet cleared up after
+        content -= {name for name in content if is_written(name)}  # written, but not yet cleared up after
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import os
 import sys
 
-from heavytop.cli import docs, integrators, motions, output, reports  # noqa: F401  # each adds its commands
+from heavytop.cli import docs, gate, integrators, motions, output, reports  # noqa: F401  # each adds its commands
 from heavytop.cli.app import app
 from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import ExitCode, HeavyTopError
 from heavytop.features import FEATURES
 
 _ORDER = (
-    *("run", "compare", "history", "show", "export"),
+    *("run", "gate", "compare", "history", "show", "export"),
     *("propagate", "reference", "score", "audit", "claims", "figures", "body"),
     *("selftest", "check-integrator", "new", "hunt", "list", "docs"),
 )

@@ -11,7 +11,7 @@ import typer
 
 from heavytop.cli.app import Json, cases, command, print_json, show_on_terminal
 from heavytop.cli.output import Progress
-from heavytop.errors import ExitCode
+from heavytop.errors import ExitCode, InputError
 
 _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
@@ -28,9 +28,9 @@ def check_integrator(
     """
     from dataclasses import asdict
 
-    from heavytop.api.integrators import NOT_TRIED
     from heavytop.api.integrators import check_integrator as check
     from heavytop.cli.output import say_former, waiting
+    from heavytop.harness.integrator_check import NOT_TRIED
     from heavytop.records import current
 
     say_former([integrator])
@@ -54,22 +54,28 @@ def check_integrator(
 
 @command
 def new(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
+    folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="A new folder; with --into, heavytop.")] = None,
     language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
+    method: Annotated[str, typer.Option(help="step, adaptive or multistep.")] = "step",
     engine: Annotated[str, typer.Option(help="An adapter of that engine: mujoco, drake, ...; '?' lists all.")] = "",
+    into: Annotated[Path | None, typer.Option(help="A repository: it gets the workflow, and DIR lies in it.")] = None,
 ) -> int:
     """Begin an integrator and its gate in a new folder.
 
-    It holds a program that integrates the heavy top by RK4, in the language asked for, or the adapter of an engine of
-    rigid bodies.  It works at once: mine.toml describes the program (engine.toml), gate.toml is the plan that measures
-    it.
+    It holds a program that integrates the heavy top, in the language asked for: by RK4 in fixed steps, by the pair of
+    Dormand and Prince to a tolerance, or by Adams-Bashforth 4; or the adapter of an engine of rigid bodies.  It works
+    at once: mine.toml (engine.toml) describes the program, gate.toml is the plan that measures it, and a workflow runs
+    `heavytop gate` on GitHub.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 
-    files = new_integrator(folder, language, engine)
-    print(fill(f"{folder}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
+    if folder is None and into is None:
+        raise InputError("A folder must be named.", "Give DIR, or --into a repository.")
+    made = (into or Path()) / (folder or "heavytop")
+    files = new_integrator(made, language, method, into, engine)
+    print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     first = "cat README.md" if engine else f"{LANGUAGES[language].build}; heavytop check-integrator mine.toml"
-    print(f"Next: cd {folder}; {first}")
+    print(f"Next: cd {made}; {first}; heavytop gate --bless")
     return ExitCode.GOOD
 
 

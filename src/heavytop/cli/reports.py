@@ -26,7 +26,8 @@ from heavytop.errors import ExitCode
 from heavytop.report.render import FORMATS
 
 if TYPE_CHECKING:
-    pass
+    from heavytop.api.reports import Comparison
+    from heavytop.api.run_folder import FinishedRun, PlannedRun
 
 _REPORT_SECONDS = 0.1
 """Expected of reading one."""
@@ -56,6 +57,18 @@ def compare(
     require_apart((html, markdown, junit), baseline, candidate, policy)
     with counted("comparing", 3, "parts", _REPORT_SECONDS) as advance:  # two reports that are read, and their rows
         found = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
+    write_comparison(found, markdown, junit, html)
+    if json:
+        print_json(found.to_json())
+    else:
+        from heavytop.report.render.comparison import comparison
+
+        show_on_terminal(comparison(found, full))
+    return found.exit_code
+
+
+def write_comparison(found: Comparison, markdown: Path | None, junit: Path | None, html: Path | None) -> None:
+    """The files of a comparison that are asked for, all of them or none."""
     files: list[tuple[Path, str]] = []
     if html is not None:
         files.append((html, found.to_html()))
@@ -64,13 +77,6 @@ def compare(
     if junit is not None:
         files.append((junit, found.to_junit()))
     _write(files)
-    if json:
-        print_json(found.to_json())
-    else:
-        from heavytop.report.render.comparison import comparison
-
-        show_on_terminal(comparison(found, full))
-    return found.exit_code
 
 
 @command
@@ -219,8 +225,6 @@ def run(
     gate two minutes, peers five, growth ten, long half an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
-    from heavytop.features.kinds import KINDS
-    from heavytop.harness.checkpoint import FILE as ROWS
     from heavytop.harness.plan import former
     from heavytop.report.store.store import FILE as REPORT
 
@@ -247,20 +251,27 @@ def run(
         print(f"\nReport: {directory / REPORT} (was finished already)")
         return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
     began = perf_counter()
-    try:
-        with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
-            ended = asked.measure(advance, advance.begin)
-    except KeyboardInterrupt as stop:
-        kept = f"finished rows are kept: --out {directory} --resume goes on"
-        said = kept if (directory / ROWS).exists() else "no row was finished"
-        say(f"interrupted; {said}")
-        return ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED
+    ended = measured(asked)
     print(ended.summary)
     page = directory / PAGE
     print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
     print(f"Report: {directory / REPORT}")
     print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
     return ExitCode.GOOD if ended.good else ExitCode.INCOMPLETE
+
+
+def measured(planned: PlannedRun) -> FinishedRun:
+    """The end of a run; one that is interrupted says what is kept, and exits."""
+    from heavytop.features.kinds import KINDS
+    from heavytop.harness.checkpoint import FILE as ROWS
+
+    try:
+        with _stopped_by_signals(), Progress(planned.tasks, KINDS, planned.workers) as advance:
+            return planned.measure(advance, advance.begin)
+    except KeyboardInterrupt as stop:
+        kept = f"finished rows are kept: --out {planned.directory} --resume goes on"
+        say(f"interrupted; {kept if (planned.directory / ROWS).exists() else 'no row was finished'}")
+        raise typer.Exit(ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED) from None
 
 
 class _Terminated(KeyboardInterrupt):

@@ -56,13 +56,13 @@ GROUP = "heavytop.peers"
 STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 Peer = Callable[..., Trajectory]
-_YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs peers`)."
+_YOURS = f"Yours is FILE.py:FUNCTION, FILE.toml, or an entry point {GROUP} (`heavytop docs gate`)."
 _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"
 _PYTHON = re.compile(r"(?s)(.+\.py):([A-Za-z_][\w.]*)")
 _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
-_SHOWN = "`heavytop docs programs` shows every key."
+_SHOWN = "`heavytop docs gate` shows every key."
 _MOST_SECONDS = 10**7
 _EVERY = (*(form.name for form in FORMATS), "real")
 _SYSTEMS = tuple(system.name for system in SYSTEMS)

@@ -108,14 +108,18 @@ def test_list_says_which_cases_a_body_has() -> None:
     assert "no rigid body has these moments" in " ".join(heavytop("list").stdout.split())
 
 
+WORKFLOW = ".github/workflows/heavytop.yml"
+
+
 @pytest.mark.parametrize("engine", engines())
 def test_the_folder_of_an_engine_is_a_gate(engine: str, tmp_path: Path) -> None:
-    files = new_integrator(tmp_path / "new", "python", engine)
+    files = new_integrator(tmp_path / "new", "python", engine=engine)
     adapter = f"{engine}_top.py"
-    assert {adapter, "heavytop_engine.py", "engine.toml", "gate.toml", "README.md"} == set(files)
+    assert {adapter, "heavytop_engine.py", "engine.toml", "gate.toml", "README.md", WORKFLOW} == set(files)
+    assert "integrator: engine.toml:" in (tmp_path / "new" / WORKFLOW).read_text()
     code = [line for line in (tmp_path / "new" / adapter).read_text().splitlines() if line.strip()]
     assert len(code) <= 50
-    assert len((tmp_path / "new" / "README.md").read_text().splitlines()) == 10
+    assert len((tmp_path / "new" / "README.md").read_text().splitlines()) <= 10
     assert "pip install" in (tmp_path / "new" / "README.md").read_text() or engine == "siconos"
     _, _, tasks = read(str(tmp_path / "new" / "gate.toml"), KINDS)
     asked = {task.key.subject.name for task in tasks}
@@ -124,7 +128,7 @@ def test_the_folder_of_an_engine_is_a_gate(engine: str, tmp_path: Path) -> None:
 
 def test_an_unknown_engine_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no adapter"):
-        new_integrator(tmp_path / "new", "python", "unity")
+        new_integrator(tmp_path / "new", "python", engine="unity")
 
 
 def test_an_adapter_is_measured_as_its_engine_is(tmp_path: Path) -> None:

@@ -313,3 +313,16 @@ def test_seconds_that_are_not_resolved_are_printed_as_that_and_compared_with_not
     assert [cells[5] for cells in section.rows] == ["1", "4", "< 0.0001", "0.5"]
     assert "1e-12 in 500 ms" in section.pictures[0].description
     assert '"unresolved":0.0001' in msgspec.json.encode(quick).decode()
+
+
+def test_the_order_of_a_method_with_a_tolerance_is_seen_in_its_mean_steps() -> None:
+    def at(tolerance: str, log10: float, steps: int, samples: int = 10) -> Row:
+        found = row(f"mine tolerance={tolerance}", log10, 1.0)
+        return msgspec.structs.replace(found, steps=steps, samples=samples, order=5)
+
+    (line,) = panels([at("1e-6", -5, 100), at("1e-8", -7, 251), at("eps", -14.9, 5000)])["top/T=9"]
+    assert line.order_text == "5.0 (declared: 5)"
+    # as many steps as samples ask for; rounding; heyoka, whose order is another for each tolerance
+    (bounded,) = panels([at("1e-4", -3, 12), at("1e-6", -5, 100), at("eps", -14.9, 5000)])["top/T=9"]
+    (ours,) = panels([msgspec.structs.replace(each, order=20) for each in OURS])["top/T=9"]
+    assert bounded.order is ours.order is None

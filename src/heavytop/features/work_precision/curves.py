@@ -24,7 +24,7 @@ OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 class WorkPrecisionPoint:
     """One point that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
-    step: of a method with fixed steps, whose error at that step is more than rounding; else 0.
+    step: fixed, or the mean one of a method with an order and a tolerance; 0 where its error may be rounding.
     seconds: of its fastest run, or where these are too few to be resolved, as many as are.  Other work on the machine
     only ever adds, and adds more to longer runs: medians on a busy machine would flatter whoever is quick.
     """
@@ -59,7 +59,7 @@ class WorkPrecisionLine:
 
     @property
     def order(self) -> float | None:
-        """The order that whole runs show: between the two finest fixed steps whose errors are more than rounding."""
+        """The order that whole runs show: between the two finest steps whose errors are more than rounding."""
         finest = sorted((point for point in self.points if point.step), key=lambda point: point.step)[:2]
         if len({point.step for point in finest}) < 2:
             return None
@@ -195,10 +195,17 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
 
 
 def _step(row: Row, log10: float) -> float:
-    """The fixed step of a row whose error is more than its roundings, in one direction, come to; else 0."""
+    """The step of a row, mean where a tolerance sets it, whose error is more than its roundings, in one direction, come
+    to; else 0, as where samples bound the steps, and of heyoka, whose order is another for each tolerance.
+    """
     rounding = math.log10(_ABOVE_ROUNDING * max(row.steps, 1) * float(parse(row.precision).eps))
-    step = row.key.subject.step
-    return float(exact(step)) if step not in ("", FINEST) and log10 > rounding else 0.0
+    if log10 <= rounding:
+        return 0.0
+    subject = row.key.subject
+    if subject.step not in ("", FINEST):
+        return float(exact(subject.step))
+    adaptive = subject.tolerance and row.order and subject.name not in (OURS, CONSTANTS, LANES)
+    return float(exact(row.horizon)) / row.steps if adaptive and row.steps > 4 * row.samples else 0.0
 
 
 def beside_ours(rows: Sequence[Row]) -> list[Table]:

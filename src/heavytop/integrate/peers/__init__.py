@@ -10,5 +10,5 @@ absolute, None for the best that the peer offers; a peer with fixed steps takes 
 that does not reach the last time is a Trajectory whose outcome says so; InputError is for what the peer cannot be asked
 at all.
 
-Other packages add theirs under the entry point ``heavytop.peers`` (see docs/peers.md).
+Other packages add theirs under the entry point ``heavytop.peers`` (see docs/gate.md).
 """

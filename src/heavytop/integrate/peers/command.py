@@ -1,6 +1,6 @@
 """Integrators that are programs: text over standard input and output, a line a thing, one process for many requests.
 
-The protocol is in docs/programs.md.  A :class:`Command` is what a TOML table says of the program, a :class:`Session`
+The protocol is in docs/gate.md.  A :class:`Command` is what a TOML table says of the program, a :class:`Session`
 its running process, and a :class:`CommandIntegrator` the call of :mod:`heavytop.integrate.peers`.  Whatever the program
 does comes out as a Trajectory that keeps the contract or as PeerFailed, and its process group ends with this process.
 """

@@ -508,13 +508,13 @@ class RowComparison:
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
 
     def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
-        """The seconds of the integrator alone: of its fastest run where there are several, since other work only adds.
+        """The seconds of the fastest of several runs, since other work only adds; those of a single run say nothing.
 
         What compiling took, which caches decide, and a reference, counts and what a program says are not judged.
         """
-        name = next((each for each in ("least", "run") if each in old.seconds and each in new.seconds), "")
-        if name and not self.lookup.metric(rules, "seconds run").ignore:
-            spent = [max(row.seconds[name], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
+        both = "least" in old.seconds and "least" in new.seconds
+        if both and not self.lookup.metric(rules, "seconds run").ignore:
+            spent = [max(row.seconds["least"], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
             verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
             before, after = (f"{seconds:.3g} s" for seconds in spent)
             yield Finding(key, "run", verdict, before, after, why, "seconds")

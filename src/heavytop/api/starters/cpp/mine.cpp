@@ -1,4 +1,5 @@
-// The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
+// The heavy top by TITLE: requests on standard input, answers on standard output.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -6,6 +7,7 @@
 #include <map>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 using Numbers = std::vector<double>;
@@ -26,41 +28,31 @@ static State field(const Numbers &I, const Numbers &n, const State &y)
     return f;
 }
 
-// y after one step of size h: replace this by your method
-template <class Field> static State step(Field f, const State &y, double h)
-{
-    auto moved = [&](const State &k, double share) {
-        State z = y;
-        for (std::size_t i = 0; i < y.size(); i++)
-            z[i] += share * h * k[i];
-        return z;
-    };
-    const State k1 = f(y), k2 = f(moved(k1, 0.5)), k3 = f(moved(k2, 0.5)), k4 = f(moved(k3, 1.0));
-    State mean(y.size());
-    for (std::size_t i = 0; i < y.size(); i++)
-        mean[i] = (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]) / 6;
-    return moved(mean, 1.0);
-}
+// METHOD
 
 static void run(std::map<std::string, Numbers> &given)
 {
     const Numbers &I = given["inertia"], &n = given["moment"];
-    const double h = given.count("setting") ? given["setting"][0] : 0.01;
+    const double control = given.count("setting") ? given["setting"][0] : CONTROL;
     State y = given["state"];
-    double t = 0, steps = 0;
+    double t = 0, steps = 0, evaluations = 0;
+    auto f = [&](const State &z) { return evaluations++, field(I, n, z); };
+    Memory memory;
     for (std::size_t i = 1; i < given["times"].size(); i++) {
-        const double end = given["times"][i], count = std::ceil(std::fabs(end - t) / h), length = (end - t) / count;
-        for (double k = 0; k < count; k++)
-            y = step([&](const State &z) { return field(I, n, z); }, y, length);
+        const double end = given["times"][i], taken = advance(f, y, end - t, control, memory);
+        if (taken < 0) {
+            std::printf("failed step too small after time %.17g\n", t);
+            return;
+        }
         t = end;
-        steps += count;
+        steps += taken;
         std::printf("state %.17g", t);
         for (double value : y)
             std::printf(" %.17g", value);
         std::puts("");
         std::fflush(stdout);
     }
-    std::printf("done steps %.0f evaluations %.0f\n", steps, 4 * steps);
+    std::printf("done steps %.0f evaluations %.0f\n", steps, evaluations);
 }
 
 int main()

@@ -1,14 +1,16 @@
-! The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
+! The heavy top by TITLE: requests on standard input, answers on standard output.
 module heavy_top
   implicit none
   integer, parameter :: dp = kind(1.0d0)
   real(dp) :: inertia(3), n(3)   ! principal moments I; n = P r
+  integer :: evaluations = 0
 contains
   ! Omega' and gamma' of M' = M x Omega + P gamma x r, gamma' = gamma x Omega; M = I Omega
   ! xi' = xi x Omega; xi is 0 where the attitude is not asked for
   function field(y) result(f)
     real(dp), intent(in) :: y(9)
     real(dp) :: f(9), w(3), g(3)
+    evaluations = evaluations + 1
     w = y(1:3)
     g = y(4:6)
     f(1) = ((inertia(2) - inertia(3)) * w(2) * w(3) + g(2) * n(3) - g(3) * n(2)) / inertia(1)
@@ -27,16 +29,7 @@ contains
     f(3) = v(1) * w(2) - v(2) * w(1)
   end function
 
-  ! y after one step of size h: replace this by your method
-  function step(y, h) result(z)
-    real(dp), intent(in) :: y(9), h
-    real(dp) :: z(9), k1(9), k2(9), k3(9), k4(9)
-    k1 = field(y)
-    k2 = field(y + h / 2 * k1)
-    k3 = field(y + h / 2 * k2)
-    k4 = field(y + h * k3)
-    z = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-  end function
+  ! METHOD
 end module
 
 program mine
@@ -44,10 +37,10 @@ program mine
   implicit none
   character(len=2000000) :: line
   character(len=40) :: name
-  real(dp) :: y(9), h, t, length
+  real(dp) :: y(9), control, t
   real(dp), allocatable :: times(:)
-  integer :: count, status, i, k, parts, steps, width
-  h = 0.01_dp
+  integer :: count, status, i, taken, steps, width
+  control = CONTROL_dp
   width = 6
   do
     read (*, '(a)', iostat=status) line
@@ -70,7 +63,7 @@ program mine
         y(7:9) = 0
       end if
     case ('setting')
-      read (line, *) name, h
+      read (line, *) name, control
     case ('times')
       read (line, *) name, count
       if (allocated(times)) deallocate (times)
@@ -79,18 +72,21 @@ program mine
     case ('go')
       t = 0
       steps = 0
+      evaluations = 0
+      taken = 0
       do i = 1, count
-        parts = ceiling(abs(times(i) - t) / h)
-        if (parts > 0) length = (times(i) - t) / parts
-        do k = 1, parts
-          y = step(y, length)
-        end do
+        call advance(y, times(i) - t, control, i == 1, taken)
+        if (taken < 0) exit
         t = times(i)
-        steps = steps + parts
+        steps = steps + taken
         print '(a, 10(1x, es24.16e3))', 'state', t, y(1:width)
         flush (6)
       end do
-      print '(a, i0, a, i0)', 'done steps ', steps, ' evaluations ', 4 * steps
+      if (taken < 0) then
+        print '(a, es24.16e3)', 'failed step too small after time ', t
+      else
+        print '(a, i0, a, i0)', 'done steps ', steps, ' evaluations ', evaluations
+      end if
     case ('quit')
       exit
     end select

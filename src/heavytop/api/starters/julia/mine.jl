@@ -1,4 +1,4 @@
-# The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
+# The heavy top by TITLE: requests on standard input, answers on standard output.
 
 # Ω' and γ' of M' = M × Ω + P γ × r, γ' = γ × Ω; M = IΩ, n = P r; ξ' = ξ × Ω of nine numbers, with the attitude
 function field(I, n, y)
@@ -15,30 +15,26 @@ function field(I, n, y)
     return rates
 end
 
-# y after one step of size h: replace this by your method
-function step(f, y, h)
-    k1 = f(y)
-    k2 = f(y + h / 2 * k1)
-    k3 = f(y + h / 2 * k2)
-    k4 = f(y + h * k3)
-    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-end
+# METHOD
 
 # answers a request: a state for each time, then done
 function run(given)
     I, n, y, times = (given[name] for name in ("inertia", "moment", "state", "times"))
-    h = haskey(given, "setting") ? given["setting"][1] : 0.01
-    time, steps = 0.0, 0
+    control = haskey(given, "setting") ? given["setting"][1] : CONTROL
+    evaluations = 0
+    f = z -> (evaluations += 1; field(I, n, z))
+    time, steps, memory = 0.0, 0, Dict{String,Any}()
     for last in times[2:end]
-        count = ceil(Int, abs(last - time) / h)
-        for _ in 1:count
-            y = step(z -> field(I, n, z), y, (last - time) / count)
+        y, taken = advance(f, y, last - time, control, memory)
+        if taken < 0
+            println("failed step too small after time ", time)
+            return
         end
-        time, steps = last, steps + count
+        time, steps = last, steps + taken
         println("state ", time, " ", join(y, " "))
         flush(stdout)
     end
-    println("done steps ", steps, " evaluations ", 4 * steps)
+    println("done steps ", steps, " evaluations ", evaluations)
 end
 
 function main()

@@ -1,5 +1,6 @@
-//! The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
+//! The heavy top by TITLE: requests on standard input, answers on standard output.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::io::{self, BufRead, Write};
 
@@ -22,37 +23,31 @@ fn field(i: &[f64], n: &[f64], y: &State) -> State {
     ]
 }
 
-/// y after one step of size h: replace this by your method.
-fn step(f: impl Fn(&State) -> State, y: &State, h: f64) -> State {
-    let moved = |k: &State, share: f64| -> State { std::array::from_fn(|j| y[j] + share * h * k[j]) };
-    let k1 = f(y);
-    let k2 = f(&moved(&k1, 0.5));
-    let k3 = f(&moved(&k2, 0.5));
-    let k4 = f(&moved(&k3, 1.0));
-    let mean: State = std::array::from_fn(|j| (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]) / 6.0);
-    moved(&mean, 1.0)
-}
+// METHOD
 
 /// Answers a request: a state for each time, then done.
 fn run(given: &HashMap<String, Vec<f64>>, out: &mut impl Write) -> io::Result<()> {
     let (i, n) = (&given["inertia"], &given["moment"]);
-    let h = given.get("setting").map_or(0.01, |value| value[0]);
+    let control = given.get("setting").map_or(CONTROL, |value| value[0]);
+    let evaluations = Cell::new(0);
+    let f = |z: &State| {
+        evaluations.set(evaluations.get() + 1);
+        field(i, n, z)
+    };
     let start = &given["state"];
     let mut y: State = std::array::from_fn(|j| start.get(j).copied().unwrap_or(0.0));
-    let (mut time, mut steps) = (0.0_f64, 0.0);
+    let (mut time, mut steps, mut memory) = (0.0_f64, 0, Memory::default());
     for &end in &given["times"][1..] {
-        let count = ((end - time).abs() / h).ceil();
-        let length = (end - time) / count;
-        for _ in 0..count as u64 {
-            y = step(|z| field(i, n, z), &y, length);
+        match advance(f, &mut y, end - time, control, &mut memory) {
+            Some(taken) => steps += taken,
+            None => return writeln!(out, "failed step too small after time {time:e}"),
         }
         time = end;
-        steps += count;
         let numbers: Vec<String> = y[..start.len()].iter().map(|value| format!("{value:e}")).collect();
         writeln!(out, "state {time:e} {}", numbers.join(" "))?;
         out.flush()?;
     }
-    writeln!(out, "done steps {steps} evaluations {}", 4.0 * steps)
+    writeln!(out, "done steps {steps} evaluations {}", evaluations.get())
 }
 
 fn main() -> io::Result<()> {

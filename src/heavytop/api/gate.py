@@ -1,0 +1,62 @@
+"""The gate: a plan measured into a folder, compared with a committed baseline, which moves when it is blessed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from heavytop.api.reports import Comparison
+from heavytop.api.run_folder import PAGE, is_written
+from heavytop.errors import InputError
+from heavytop.files import replace
+from heavytop.report.compare.findings import line
+from heavytop.report.document.document import row_name
+from heavytop.report.render.comparison import headline
+from heavytop.report.store.store import FILE
+
+MESSAGE = "message.txt"
+
+
+def require_baseline(baseline: Path) -> None:
+    """Raises InputError where the folder holds no report."""
+    if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
+        raise InputError(f"There is no baseline in {baseline}.", "Make it, and commit it: heavytop gate --bless")
+
+
+def clear(folder: Path) -> None:
+    """Remove a former report from its folder, where that holds nothing else."""
+    content = list(folder.iterdir()) if folder.is_dir() else []
+    if all(is_written(path.name) or path.name in (MESSAGE, f"{FILE}.gz") for path in content):
+        for path in content:
+            path.unlink()
+
+
+def policy_of(plan: str, policy: Path | None) -> Path | None:
+    """The policy that is named, else ``policy.toml`` beside the plan where there is one."""
+    beside = Path(plan).parent / "policy.toml"
+    return policy or (beside if Path(plan).suffix == ".toml" and beside.exists() else None)
+
+
+def bless(measured: Path, baseline: Path, summary: str, comparison: Comparison | None) -> str:
+    """Make the report in ``measured`` the baseline, without its page; returns the text of a commit message.
+
+    The text, with the old and the new numbers of each row that changed, is written to ``measured`` too.  summary: of
+    the report.  comparison: with the former baseline; None where that is missing or cannot be read.  Raises InputError
+    where a folder cannot be written.
+    """
+    text = f"Begin the baseline of accuracy\n\n{summary}\n" if comparison is None else _moved(comparison)
+    replace(measured / MESSAGE, text.encode())
+    try:
+        clear(baseline)
+        shutil.copytree(measured, baseline, dirs_exist_ok=True, ignore=shutil.ignore_patterns(MESSAGE, PAGE))
+    except OSError as error:
+        raise InputError(f"{baseline} cannot be written: {error}.", "Give a writable --baseline.") from None
+    return text
+
+
+def _moved(comparison: Comparison) -> str:
+    """The commit message of a baseline that moves: verdict, findings, and a line for each row that changed."""
+    lines = [f"Move the baseline of accuracy: {comparison.verdict}", "", f"{headline(comparison)}."]
+    lines += [f"- {sentence}" for sentence in comparison.sentences]
+    rows = [f"{change.verdict.value}: {row_name(change.identity)}: {line(change)}" for change in comparison.rows]
+    return "\n".join([*lines, *(["", *rows] if rows else [])]) + "\n"
