@@ -27,6 +27,7 @@ COARSE, FINE, FINEST = (
 STEPS = {
     "mujoco:RK4": COARSE,
     "mjx": ["1/25", "1/50", "1/100"],
+    "drake:Radau3": COARSE,
     "pinocchio:R": COARSE,
     "exudyn:RK": COARSE,
     "basilisk": ["1/10", "1/20", "1/50", "1/100"],

@@ -78,7 +78,7 @@ def _checked(top: object, start: object, precision: Precision, of_any_size: bool
 
 
 def slack_of(precision: Precision) -> Fraction:
-    """What rounding of the data may make of 1 or 0: that of double at least, whatever the format of the run."""
+    """The error that rounding of the data may make in 1 or 0: at least that of double, whatever the run's format."""
     return max(precision.eps, DOUBLE.eps) * (1 << SLACK_BITS)
 
 

@@ -21,7 +21,7 @@ def plural(number: int, one: str, many: str = "") -> str:
 
 
 class Tabular:
-    """What shows itself as a table: ``repr`` as text, in a notebook as HTML."""
+    """An object that shows itself as a table: ``repr`` as text, in a notebook as HTML."""
 
     __slots__ = ()
 
@@ -88,7 +88,7 @@ class TitledTable:
         return "\n".join([self.title, *(f"  {line}" for line in body), *self.notes])
 
     def html(self) -> str:
-        """The same as an HTML table, everything escaped."""
+        """The table as HTML, everything escaped."""
 
         def line(cells: Sequence[str], tag: str) -> str:
             return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"

@@ -38,7 +38,7 @@ def quoted(value: object, most: int = 60) -> str:
 
 
 def invalid(error: Exception) -> str:
-    """What is wrong with a value in a table of TOML: where it stands, what it has to be, and what it is."""
+    """The fault of a value in a table of TOML: where it stands, what it has to be, and what it is."""
     text, _, place = str(error).partition(" - at `$")
     place = place.strip("`.") or "the file"
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
@@ -123,7 +123,7 @@ class PeerFailed(HeavyTopError):
 
 
 class Unsupported(InputError):
-    """What an integrator declares that it cannot do: a system, a format, a direction, events.  No failure."""
+    """A request that an integrator declares that it cannot do: a system, a format, a direction, events.  No failure."""
 
 
 class OutOfTime(HeavyTopError):

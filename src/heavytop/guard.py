@@ -18,7 +18,7 @@ for file in $(grep -ls "{MARK}=$1" /proc/[0-9]*/environ); do
   kill -KILL "${{process%/environ}}"
 done
 kill -KILL 0"""
-"""What the shell of a guard does once its input has ended."""
+"""The script of a guard's shell once its input has ended."""
 _ROUNDS = 20
 """How often what a process may just have started is looked for."""
 

@@ -1,4 +1,4 @@
-"""What a kind of measurement is unless it says otherwise."""
+"""The defaults of a kind of measurement."""
 
 from __future__ import annotations
 

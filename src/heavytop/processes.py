@@ -98,7 +98,7 @@ class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types
 
 @contextmanager
 def _environment_of_trackers() -> Iterator[None]:
-    """What is started meanwhile begins with :data:`SAFE_PATH`, and is silent about what a signal left to clean up."""
+    """Lets processes started meanwhile begin with :data:`SAFE_PATH`, silent on what a signal left to clean up."""
     wanted = {SAFE_PATH: os.environ.get(SAFE_PATH, "1"), "PYTHONWARNINGS": "ignore"}
     before = {name: os.environ.get(name) for name in wanted}
     os.environ.update(wanted)

@@ -27,7 +27,7 @@ class DigitsRight(float):
 
 
 class Gated:
-    """What ``heavytop_gate`` found.  score: as :func:`heavytop.score` returns it.
+    """The result of ``heavytop_gate``.  score: as :func:`heavytop.score` returns it.
 
     digits_right: a number, or nan where the run did not reach its last time or there is no reference.
     """
@@ -106,7 +106,7 @@ def gate(
 
 
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
-    """What a failed comparison of digits says: the numbers, then what the score found."""
+    """The message of a failed comparison of digits: the numbers, then what the score found."""
     digits = next((side for side in (left, right) if isinstance(side, DigitsRight)), None)
     if digits is None or op not in _COMPARISONS:
         return None

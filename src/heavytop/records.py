@@ -45,7 +45,7 @@ MetricKind = Literal["error", "duration", "value"]
 
 
 class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """What a number is about: ``drift`` of the ``energy``, its ``max`` over the samples.
+    """The subject of a number: ``drift`` of the ``energy``, its ``max`` over the samples.
 
     component: of a vector, or a first integral.  statistic: over the samples; of an equation its branch and domain are
     the quantity's too.
@@ -65,7 +65,7 @@ class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return "_".join(part for part in (self.name, self.component, self.statistic) if part)
 
     def over(self, statistic: str) -> Quantity:
-        """The same quantity with another statistic; "" for its series."""
+        """This quantity with another statistic; "" for its series."""
         return Quantity(self.name, self.component, statistic, self.branch, self.domain)
 
 
@@ -113,7 +113,7 @@ class Metric(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def _rank(self) -> tuple[bool, Fraction | float, bytes]:
-        """What metrics are ordered by: the number, nan last; among equal ones the fields, as equality is by all."""
+        """The key of their order: the number, nan last; among equal ones the fields, as equality is by all."""
         number = self.number
         unknown = number != number
         return unknown, 0 if unknown else number, msgspec.json.encode(self)
@@ -185,7 +185,7 @@ class Law(msgspec.Struct, frozen=True, gc=False):
 
 
 class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """What is measured.
+    """The object of a measurement.
 
     name: of the claim or the integrator.  branch, form: of a formula.  tolerance, step: asked of an integrator, "" for
     what it does by itself.  high_accuracy: heyoka's.  bias: of a planted fault.  seed: of random starts.
@@ -203,7 +203,7 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def variant(self) -> str:
-        """What sets it apart from a plain one, as rows of ensembles name it."""
+        """The words that set it apart from a plain one, as rows of ensembles name it."""
         parts = {
             "high_accuracy": self.high_accuracy,
             f"tolerance {self.tolerance}": self.tolerance,
@@ -219,14 +219,14 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def asked(self) -> str:
-        """The same in words: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
+        """The control in words: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
         if FINEST in (self.tolerance, self.step):
             return "finest"
         return f"tolerance {self.tolerance}" if self.tolerance else f"step {self.step}" if self.step else ""
 
 
 class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """What makes a row the same row in another report.
+    """The identity of a row, by which it is found in another report.
 
     precision: written always: a default is left out where it is the same object, and not where a worker sent it.
     direction: of time, where rows differ in it.  horizon: the last time, as text.
@@ -266,7 +266,7 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """What a row was compared with.
+    """The reference that a row was compared with.
 
     how: with proven values, with computed ones, with equations, or with none but its own first integrals.
     radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
@@ -323,7 +323,7 @@ NOT_CARRIED = {"attitude": "not carried"}
 
 
 class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """One of the worst motions of a survey: its case, index in the sweep, outcome, error and digits right (none where
+    """A motion among the worst of a survey: its case, index in the sweep, outcome, error and digits right (none where
     the run failed), exact data, and the command that measures it alone.
     """
 
@@ -440,7 +440,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
     @property
     def identity(self) -> Identity:
-        """What makes it the same row in another report, and what it is called there."""
+        """The identity of the row in another report, and what it is called there."""
         return Identity(self.key, self.case, self.integrator)
 
     def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
@@ -464,13 +464,13 @@ class Identity(NamedTuple):
 
     @property
     def elsewhere(self) -> Identity:
-        """The same but for its horizon."""
+        """The key without its horizon."""
         return self._replace(key=msgspec.structs.replace(self.key, horizon=""))
 
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """The same motion at the same times in the same format by heyoka: its digits right."""
+    """heyoka's run of a motion at the same times in the same format: its digits right."""
 
     integrator: str
     precision: str
@@ -479,7 +479,7 @@ class Peer:
 
 
 class Beside(msgspec.Struct, frozen=True, gc=False):
-    """What `score` says beside its row: heyoka's own run, and what explains the error, sentences that nothing reads."""
+    """Findings of `score` beside its row: heyoka's own run, and sentences on the error that nothing reads."""
 
     peer: Peer | None
     remarks: tuple[str, ...]
@@ -502,7 +502,7 @@ class Report(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 INTEGRATORS = {"words": "multiword"}
-"""What an integrator was called, and is."""
+"""Former names of integrators, and those of now."""
 
 
 def current(name: str) -> str:
@@ -545,7 +545,7 @@ def of_plan(plan: dict[str, str]) -> dict[str, str]:
 
 
 def of_identity(identity: dict[str, str]) -> dict[str, str]:
-    """What must be the same for a run to go on, with that name of now."""
+    """The request that must be the same for a run to go on, with that name of now."""
     return {key: current(value) if key == "plan integrator" else value for key, value in identity.items()}
 
 

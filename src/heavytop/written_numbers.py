@@ -45,7 +45,7 @@ def number(value: Any, what: str) -> Fraction | None:
 
 
 def finite(value: Any, what: str) -> Fraction:
-    """The same; raises InputError also for NaN and infinities."""
+    """A finite number; raises InputError also for NaN and infinities."""
     found = number(value, what)
     if found is None:
         raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")

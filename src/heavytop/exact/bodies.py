@@ -321,7 +321,7 @@ class BodyMotion:
 
 
 def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate) -> list[arb]:
-    """What is evaluated, in the axes given, with ``bits`` bits."""
+    """Evaluated vectors, in the axes given, with ``bits`` bits."""
     if not known[0].is_rotated:
         return list(evaluate(known, bits))
     working = bits + 4

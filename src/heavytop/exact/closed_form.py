@@ -1,4 +1,4 @@
-"""What the closed forms share: one formula over power series serves the state, its series and the attitude.
+"""The base of the closed forms: one formula over power series serves the state, its series and the attitude.
 
 A closed form is written once, over power series in ε at t + ε.  Its coefficients of ε^0 are the state; more of them
 are the series whose residual proves the form.
@@ -99,7 +99,7 @@ def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], win
 
 
 def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
-    """The same in derivatives at 0, not divided by factorials: of u and v, and of the product."""
+    """:func:`without_turning` in derivatives at 0, not divided by factorials: of u and v, and of the product."""
     u, v = ([value / factorial(n) for n, value in enumerate(each)] for each in (real, imaginary))
     return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(u, v, winding))]
 
@@ -167,7 +167,7 @@ def about(axis: Sequence[BallLike], cosine: BallLike, sine: BallLike, vector: Se
 
 
 def between(before: Sequence[Sequence[BallLike]], now: Sequence[Sequence[BallLike]]) -> Carry:
-    """What carries vectors with a frame of three unit vectors, from where it was to where it is."""
+    """The map that carries vectors with a frame of three unit vectors, from where it was to where it is."""
 
     def carry(vector: Sequence[BallLike]) -> list[Any]:
         parts = [dot(vector, direction) for direction in before]
@@ -431,7 +431,7 @@ def permuted(vector: Sequence[Any], axes: Axes) -> tuple[Any, Any, Any]:
 
 
 def renamed_top(top: HeavyTop, axes: Axes) -> HeavyTop:
-    """The same top with its axis ``axes[k]`` called k."""
+    """The top with its axis ``axes[k]`` called k."""
     d = orientation(axes)
     rotor = None if top.rotor is None else [d * k for k in permuted(top.rotor, axes)]
     return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes), rotor)

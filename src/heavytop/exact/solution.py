@@ -1,4 +1,4 @@
-"""What every exact motion offers."""
+"""The interface of exact motions, and exact conditions on body and start."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class ExactRelation:
         return self.test(self.values(top, start))
 
     def found(self, top: HeavyTop, start: State) -> str:
-        """What is tested, with its values."""
+        """The tested quantities, with their values."""
         values, names = [shown(value) for value in self.values(top, start)], self.names.split(", ")
         if len(names) < len(values):
             values = [f"({', '.join(values)})"]

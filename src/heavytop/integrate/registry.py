@@ -138,7 +138,7 @@ class Integrator:
 
 
 def foreign(name: str, place: str | Callable[..., Any] = "") -> Integrator:
-    """One of another package, or of a source: nothing is known of what it can do."""
+    """An integrator of another package, or of a source: nothing is known of what it can do."""
     return Integrator(name, place, None, None, "", own=False)
 
 
@@ -155,7 +155,7 @@ def described(which: str | IntegratorSource) -> Integrator:
 
 
 def load(place: str | Callable[..., Any]) -> Any:
-    """What stands at ``module:name``, imported; a function itself."""
+    """The object at ``module:name``, imported; a function itself."""
     return EntryPoint("", place, "").load() if isinstance(place, str) else place
 
 
@@ -315,7 +315,7 @@ def known() -> dict[str, Integrator]:
 
 @lru_cache(maxsize=4)
 def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
-    """Those of the packages on ``sys.path``, looked through once."""
+    """Integrators of the packages on ``sys.path``, looked through once."""
     entries = entry_points(group=GROUP)
     return {each.name: foreign(each.name, each.value) for each in entries if each.name not in FORMER}
 
@@ -413,7 +413,7 @@ def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
 
 
 def control_name(which: str | IntegratorSource) -> str:
-    """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
+    """The control of a peer: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     if isinstance(which, Command):
         return which.control
     if control := described(which).control:
@@ -528,7 +528,7 @@ def require_reach(
 
 
 def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates one motion with that integrator; raises InputError for an unknown name or option.
+    """A callable that propagates one motion with that integrator; raises InputError for an unknown name or option.
 
     Its calls raise OutOfReach as :func:`require_reach` does.
     """
@@ -565,7 +565,7 @@ def _unguarded(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
 def watched(
     which: str | IntegratorSource, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
 ) -> Callable[..., Any]:
-    """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
+    """:func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
     if described(which).streams:
         return propagator(which, {**options, "observer": observer})
     run = propagator(which, options)
@@ -580,7 +580,7 @@ def watched(
 
 
 def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates many motions; raises InputError also for an integrator that runs one at a time.
+    """A callable that propagates many motions; raises InputError also for an integrator that runs one at a time.
 
     Its calls raise OutOfReach as those of :func:`propagator`.
     """
@@ -600,7 +600,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
 
 @lru_cache(maxsize=64)
 def _names(function: Callable[..., Any]) -> frozenset[str] | None:
-    """What it takes by name; None where that is anything."""
+    """The arguments that it takes by name; None where that is anything."""
     parameters = inspect.signature(function).parameters
     if any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values()):
         return None
@@ -676,7 +676,7 @@ class Setup:
 
     @property
     def problem(self) -> Problem:
-        """What an ensemble is made of."""
+        """The problem, as ensembles take it."""
         return Problem.of(self.top, self.start, self.precision, self.system)
 
     def in_body_axes(self, state: Any) -> Any:

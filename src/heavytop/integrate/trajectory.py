@@ -1,4 +1,4 @@
-"""What an integrator returns, whichever it was.  Knows no engine."""
+"""The result of an integrator, whichever it was.  Knows no engine."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def in_double(run: Trajectory, output: Output) -> NDArray[np.float64]:
 
 
 def as_texts(run: Trajectory, output: Output) -> list[Any]:
-    """The same as decimal text in the digits of the format, rounded once; nested lists of the same shape."""
+    """The output at every sample as decimal text in the digits of the format, rounded once; lists of that shape."""
     attitude, digits = attitude_of(run), run.problem.precision.digits
     lines = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
     if output.name == "quaternion" and lines:
@@ -404,7 +404,7 @@ class LazyStates:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """What is not there: ``states`` that are still to be made; of two threads both may make them."""
+            """An attribute that is not there: ``states`` still to be made; of two threads both may make them."""
             if name != "states":
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
             make = self._make
@@ -568,7 +568,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
         return stability(problem.system, problem.system.parameters(top, start), start.flat)
 
     def amplification_text(self) -> str:
-        """What the amplification costs, in a sentence; "" where it costs fewer than three digits."""
+        """The digits that the amplification costs, in a sentence; "" where it costs fewer than three digits."""
         (lost, followed), precision = self.digits_lost, self.problem.precision
         if lost < _FEW_DIGITS:
             return ""

@@ -1,4 +1,4 @@
-"""What a motion in multi-word arithmetic can be asked, whatever its arithmetic."""
+"""The interface of a motion in multi-word arithmetic, whatever its arithmetic."""
 
 from __future__ import annotations
 
@@ -220,7 +220,7 @@ def _variation_by_numpy(slopes: Doubles) -> Doubles:
 
 
 class _Room:
-    """What one thread computes with; V_0 stays."""
+    """The arrays that one thread computes with; V_0 stays."""
 
     def __init__(self, orders: int, size: int) -> None:
         width = _width(size)

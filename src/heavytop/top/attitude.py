@@ -143,7 +143,7 @@ def _elementary(axis: int, cosine: Any, sine: Any) -> tuple[Any, ...]:
 
 
 def require_sequence(sequence: object) -> str:
-    """One of :data:`SEQUENCES`; raises InputError for any other."""
+    """The sequence in capitals, a member of :data:`SEQUENCES`; raises InputError for any other."""
     if not isinstance(sequence, str) or sequence.upper() not in SEQUENCES:
         raise InputError(
             f"Unknown sequence of Euler angles {quoted(sequence)}.",
@@ -499,7 +499,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "position": (3,),
     "omega-space": (3,),
 }
-"""Of each output, the shape of its value at one time."""
+"""The shape of its value at one time."""
 _COLUMNS = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
@@ -517,7 +517,7 @@ def key_of(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """One of :data:`SHAPES`; Euler angles with their sequence, a position with its point and pivot.
+    """A quantity of :data:`SHAPES`; Euler angles with their sequence, a position with its point and pivot.
 
     point: in body axes, None for the centre of mass.  pivot: where the fixed point stands in space.
     """
@@ -534,7 +534,7 @@ class Output:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the value at one time."""
+        """The shape of the value at one time."""
         return SHAPES[self.name]
 
     @property

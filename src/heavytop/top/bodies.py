@@ -343,7 +343,7 @@ class Body:
 
     @property
     def top(self) -> HeavyTop:
-        """The same body in principal axes, with moments at the pivot, weight m g, centre; exact, or to 256 bits."""
+        """The body in principal axes, with moments at the pivot, weight m g, centre; exact, or to 256 bits."""
         return self.top_in(self.principal())
 
     def top_in(self, principal: PrincipalAxes) -> HeavyTop:
@@ -354,7 +354,7 @@ class Body:
         return HeavyTop(principal.moments, self.weight, centre, rotor, self.mass)
 
     def warnings(self) -> list[str]:
-        """What no rigid body can have, though the equations do not mind."""
+        """Data that no rigid body has, though the equations do not mind."""
         return self.top.warnings() or _warnings_about_centre(self)
 
 
@@ -381,7 +381,7 @@ def _number(value: Given, what: str) -> Fraction:
 
 
 def _about(about: object, centre: Vector) -> str:
-    """What the tensor is about; without the word only where both are the same."""
+    """The point that the tensor is about; without the word only where both are the same."""
     if about is None:
         if any(centre):
             raise InputError(

@@ -23,7 +23,7 @@ NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
 
 
 class Parameters(NamedTuple):
-    """What enters the fields, in any ring: principal moments I, n = P r, and the rotor.
+    """The numbers that enter the fields, in any ring: principal moments I, n = P r, and the rotor.
 
     rotor: of `gyrostat` λ, by which the rotor makes the body turn faster about axis 2 (its angular momentum relative to
     the body is −I2 λ); of `heavy_gyrostat` that angular momentum k itself, a tuple of three; 0 of `heavy_top`.
@@ -52,7 +52,7 @@ class Parameters(NamedTuple):
         return (*self.inertia, *self.moment, *self.rotors)
 
     def mapped(self, number: Callable[[Any], Any]) -> Parameters:
-        """The same in another ring: ``number`` of each of them."""
+        """The parameters in another ring: ``number`` of each of them."""
         rotors = tuple(map(number, self.rotors))
         kept = rotors if isinstance(self.rotor, tuple) else rotors[0]
         return Parameters(tuple(map(number, self.inertia)), tuple(map(number, self.moment)), kept)
@@ -142,7 +142,7 @@ class VectorField(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """One of the three systems: its field, and the angular velocity with which the body turns in space.
+    """A system of equations: its field, and the angular velocity with which the body turns in space.
 
     enters: which parameters enter the field, by name.
     """

@@ -103,7 +103,7 @@ class HeavyTop:
         return own[0] + self.rotor[0], own[1] + self.rotor[1], own[2] + self.rotor[2]
 
     def warnings(self) -> list[str]:
-        """What no rigid body can have, though the equations do not mind: a moment larger than the sum of the others."""
+        """Moments that no rigid body has, though the equations do not mind: one larger than the sum of the others."""
         found = []
         for axis, value in enumerate(self.inertia):
             others = sum(self.inertia) - value

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
+from flint import fmpq, fmpq_mat
+
 from heavytop.precision import cross
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 
@@ -44,7 +46,7 @@ class Stability:
 
 
 def stability(system: System, parameters: Parameters, start: Sequence[Fraction]) -> Stability | None:
-    """Of the motion from an exact start, six numbers; None where it is not steady."""
+    """Stability of the motion from an exact start, six numbers; None where it is not steady."""
     p, y = parameters.mapped(Fraction), [Fraction(value) for value in start]
     rates = system.field(p, y)
     free = system is GYROSTAT or not any(p.moment)
@@ -63,7 +65,7 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
 
 
 def _jacobian(system: System, p: Parameters, y: Sequence[Fraction], size: int) -> Matrix:
-    """Of the first components; exact, as the field is of degree two: half a central difference of steps 1."""
+    """The Jacobian of the first components; exact as the field is of degree two: half a difference of steps 1."""
     columns = []
     for j in range(size):
         up, down = (system.field(p, [v + sign * (k == j) for k, v in enumerate(y)]) for sign in (1, -1))
@@ -72,15 +74,10 @@ def _jacobian(system: System, p: Parameters, y: Sequence[Fraction], size: int) -
 
 
 def _characteristic(matrix: Matrix) -> list[Fraction]:
-    """1, c1, ..., cn of λⁿ + c1 λⁿ⁻¹ + ... + cn, by the method of Faddeev and LeVerrier."""
-    size, found = len(matrix), [Fraction(1)]
-    power = [[Fraction(0)] * size for _ in range(size)]
-    for n in range(1, size + 1):
-        inner = [[v + found[-1] * (i == j) for j, v in enumerate(row)] for i, row in enumerate(power)]
-        columns = [*zip(*inner, strict=True)]
-        power = [[_inner(row, column) for column in columns] for row in matrix]
-        found.append(-sum((power[i][i] for i in range(size)), Fraction(0)) / n)
-    return found
+    """1, c1, ..., cn of λⁿ + c1 λⁿ⁻¹ + ... + cn."""
+    entries = [fmpq(value.numerator, value.denominator) for row in matrix for value in row]
+    polynomial = fmpq_mat(len(matrix), len(matrix), entries).charpoly()
+    return [Fraction(int(c.p), int(c.q)) for c in reversed(polynomial.coeffs())]
 
 
 def _inner(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
@@ -164,7 +161,7 @@ def _determinant(matrix: Matrix) -> Fraction:
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:
-    """Of Lagrange's top, or a free body of revolution: where its inclination stays and does not begin to change."""
+    """A precession of Lagrange's top, or of a free body of revolution: where its inclination stays."""
     if system is not HEAVY_TOP:
         return None
     for k in range(3):

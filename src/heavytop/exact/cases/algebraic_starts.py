@@ -11,6 +11,7 @@ farther.  :meth:`AlgebraicMotion.departure` encloses how far the two motions are
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -25,14 +26,38 @@ from heavytop.exact.closed_form import cached_per_precision
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, WithBearing
-from heavytop.precision import decimal_text, round_to, shown
+from heavytop.precision import Vector, decimal_text, round_to, shown
 from heavytop.top.heavy_top import HeavyTop, State
 
 _ROUNDED_BITS = 256
 
 
+class Algebraic(ABC):
+    """A motion whose top or start is known by balls alone."""
+
+    __slots__ = ()
+    inertia: Vector
+
+    @abstractmethod
+    def moment(self, bits: int) -> list[arb]:
+        """P r with at least so many bits."""
+
+    @abstractmethod
+    def start(self, bits: int) -> list[arb]:
+        """The state at t = 0."""
+
+    def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
+        """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
+
+        The inertia is this one's.  Their own motion is that of any top: see the head of this file.
+        """
+        values = [round_to(midpoint(x), bits) for x in self.start(bits + 8)]
+        centre = [round_to(midpoint(x), bits) for x in self.moment(bits + 8)]
+        return HeavyTop(self.inertia, 1, centre), State(values[:3], values[3:]).normalized(bits)
+
+
 @dataclass(frozen=True, slots=True)
-class AlgebraicMotion(WithBearing):
+class AlgebraicMotion(WithBearing, Algebraic):
     """A motion on a curve with P r = (N, 0, 0), N > 0 and |γ| = 1.
 
     place: x at t = 0.  signs: of Ω2 and Ω3 there (of √Q and √R, where x is not Ω1); +1 or −1.
@@ -55,7 +80,7 @@ class AlgebraicMotion(WithBearing):
             )
 
     @property
-    def inertia(self) -> tuple[Fraction, Fraction, Fraction]:
+    def inertia(self) -> Vector:  # type: ignore[override]
         """(A, B, C), exact."""
         return self.curve.inertia
 
@@ -89,16 +114,6 @@ class AlgebraicMotion(WithBearing):
         Chaplygin's at rest.
         """
         return _motion(self).bearing(_azimuth(self), ball(time))
-
-    def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
-        """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
-
-        The inertia is this one's.  Their own motion is that of any top: see the head of this file.
-        """
-        (n, _, _), start = self.moment(bits + 8), self.start(bits + 8)
-        values = [round_to(midpoint(x), bits) for x in start]
-        top = HeavyTop(self.inertia, 1, (round_to(midpoint(n), bits), 0, 0))
-        return top, State(values[:3], values[3:]).normalized(bits)
 
     def departure(self, top: HeavyTop, start: State, time: Fraction, bits: int) -> arb:
         """A ball that holds the largest difference of a component of the motion from that start to this one's.

@@ -228,7 +228,7 @@ def _lattice(case: BobylevSteklov) -> _Lattice | None:
 
 @cached_per_precision
 def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
-    """What does not depend on the time in the attitude."""
+    """The part of the attitude that does not depend on the time."""
     return prepared_axis(case.top, case.start, across(case.start.gamma))
 
 

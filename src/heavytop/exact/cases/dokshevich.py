@@ -27,6 +27,7 @@ from typing import Any
 from flint import acb, arb, arb_series
 
 from heavytop.errors import InputError, prefixed
+from heavytop.exact.cases.algebraic_starts import Algebraic
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision, sign
 from heavytop.exact.flint.balls import (
     BallLike,
@@ -35,7 +36,6 @@ from heavytop.exact.flint.balls import (
     ball,
     current_length,
     exponent,
-    midpoint,
     to_bits,
     whole_evaluation,
 )
@@ -50,13 +50,12 @@ from heavytop.exact.solution import (
     ExactRelation,
     positive,
 )
-from heavytop.precision import Vector, dot, exact, rational_root, round_to, shown, vector
+from heavytop.precision import Vector, dot, exact, rational_root, shown, vector
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _TERMS = 1 << 14
 _REMEDY = "`dokshevich_motion` builds a top with such a motion."
-_ROUNDED_BITS = 256
 _LEAST = 128
 
 
@@ -173,7 +172,7 @@ class _Frame:
 
 
 class _Moving(WithBearing):
-    """What the exact and the algebraic motions share."""
+    """The base of the exact and the algebraic motions."""
 
     __slots__ = ()
 
@@ -228,7 +227,7 @@ def _has_root(values: Sequence[Fraction]) -> bool:
 
 
 def _constants(top: HeavyTop) -> _Constants:
-    """Of a top with rational S."""
+    """The constants of a top with rational S."""
     _, _, a, b, _ = _numbers(top)
     return _Constants(a, b, rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
 
@@ -242,7 +241,7 @@ def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fracti
 
 
 def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
-    """What z² and the three components of γ lack, in units of B."""
+    """The defects of z² and the three components of γ, in units of B."""
     square, skew, _, b, turned = _numbers(top)
     (unit, x, z), c, n, gamma = _components(top, start), _constants(top), top.moment, start.gamma
     v2 = x * x / (square * unit)
@@ -335,7 +334,7 @@ def _require_reach(motion: Any) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class AlgebraicDokshevich(_Moving):
+class AlgebraicDokshevich(_Moving, Algebraic):
     """A motion of Dokshevich of a top with given moments: n and the start are algebraic numbers, B = 1, |γ| = 1.
 
     inertia: I1, I2, I3, I2 between the others.  place: where M·r/|r| stands at t = 0 in its range, from 0 to 1; a
@@ -400,15 +399,6 @@ class AlgebraicDokshevich(_Moving):
     def start(self, bits: int) -> list[arb]:
         """The state at t = 0."""
         return self.state(Fraction(0), bits)
-
-    def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
-        """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
-
-        Their own motion is that of any top, as :mod:`heavytop.exact.cases.algebraic_starts` says.
-        """
-        values = [round_to(midpoint(x), bits) for x in self.start(bits + 8)]
-        centre = [round_to(midpoint(x), bits) for x in self.moment(bits + 8)]
-        return HeavyTop(self.inertia, 1, centre), State(values[:3], values[3:]).normalized(bits)
 
 
 def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> AlgebraicDokshevich:

@@ -502,7 +502,7 @@ class Torus:
         return arb(max(alpha1 * beta2, beta1 * alpha2)) / self.apart
 
     def integral(self, motion: GoryachevMotion, began: Sequence[arb]) -> LineIntegral:
-        """Of dΛ/ds from where s is ``began`` for both variables."""
+        """The integral of dΛ/ds from where s is ``began`` for both variables."""
         halves = [
             [motion.halves(k, phase, 0) for phase in one.phases(size)]
             for k, (one, size) in enumerate(zip(self.uniform, self.sizes, strict=True))
@@ -561,7 +561,7 @@ def _reach(variable: Variable) -> arb:
 
 
 def _symmetry(motion: GoryachevMotion, variable: int, factor: int) -> Symmetry:
-    """Of α or β: √(2d) cos(θ/2) at the lower end of the gap, √(2d) sin(θ/2) at the upper one."""
+    """The symmetry of α or β: √(2d) cos(θ/2) at the lower end of the gap, √(2d) sin(θ/2) at the upper one."""
     low, high = motion.ends[variable]
     at_low, at_high = (low != high and motion.curve[number].counts[factor] > 0 for number in (low, high))
     return Symmetry(odd=at_high, half=at_low != at_high)

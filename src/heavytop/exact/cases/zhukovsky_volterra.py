@@ -205,7 +205,7 @@ class _Exact:
 
 @dataclass(frozen=True, slots=True)
 class _Curve:
-    """The same in balls: D in the first row, D Mi below it; order: of the pole of D at t = 0; body: k and 1/I."""
+    """The curve in balls: D in the first row, D Mi below it; order: of the pole of D at t = 0; body: k and 1/I."""
 
     rows: arb_mat
     order: int

@@ -175,7 +175,7 @@ class PreparedMotion:
         return tuple(factor.real if factor.imag.is_zero() else factor for factor in factors)
 
     def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Factors:
-        """The same on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
+        """The combination on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
         double: Any = lattice.double
         centre: Any = self.centre
         value, root = winding.value, ball(winding.square).sqrt()

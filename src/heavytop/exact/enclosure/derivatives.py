@@ -134,7 +134,7 @@ class Together:
 
 @dataclass(frozen=True, slots=True)
 class Tangent:
-    """What derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
+    """The data that derivatives are computed with, in ulps of 2^-precision, along the motion of ``field``.
 
     certified, columns: Taylor coefficients of the motion, and of its derivatives, in words; None in integers.
     data: those of :data:`DATA` in ``places``, whose columns are computed.
@@ -459,7 +459,7 @@ def _at_rest(bits: int, data: bool) -> EnclosedDerivatives:
 def _one_way(
     known: Validated, direction: int, spans: list[Fraction], bits: int, data: bool
 ) -> dict[Fraction, EnclosedDerivatives]:
-    """Those at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
+    """The derivatives at ``spans`` > 0 from time 0 on, in increasing order, in one direction."""
     motion = known.motion(direction)
     time = direction * spans[-1]
     loss, steps = known.forecast(time, bits)
@@ -524,7 +524,7 @@ def _tangent(
 
 
 def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, Coefficients | None]:
-    """One of the data, and its G over the lanes of the motion; None where they do not compute it."""
+    """A datum, and its G over the lanes of the motion; None where they do not compute it."""
     scaled = motion.scaled
     own, sign = own_parameters(scaled, known.parameters).mapped(mpq), 1 if motion.forwards else -1
     largest = coefficients_of(scaled.system, slope(scaled.system, own, datum, mpq(1)), mpq(0)).largest

@@ -123,7 +123,7 @@ class EnclosureRun:
         return step(self.motion.field, node, *self._arithmetic(node.time))
 
     def lost(self, node: Node) -> float:
-        """Of the bits that it began with, at one of its nodes."""
+        """Bits lost of those that it began with, at a node."""
         return self.precision - self._arithmetic(node.time)[0] + node.errors.bits
 
     def _arithmetic(self, time: Fraction) -> tuple[int, CertifiedSeries | None]:
@@ -321,14 +321,14 @@ class ScaledMotion:
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
-        """Of the model of the cost, where ``lost`` bits are lost evenly on so many steps."""
+        """Seconds by the model of the cost, where ``lost`` bits are lost evenly on so many steps."""
         begun, in_words = planned
         precisions = [self.fewer(begun, lost * i / _PLACES) for i in range(_PLACES)]
         words = [in_words if p == begun else self.grid(p) is not None for p in precisions]
         return steps / _PLACES * sum(map(seconds_a_step, precisions, words))
 
     def seconds_for(self, bits: float, lost: float, steps: float) -> float:
-        """The same, where ``bits`` are to be left."""
+        """Seconds by the model, where ``bits`` are to be left."""
         return self.seconds(self.precision(bits + lost, steps), lost, steps)
 
     def certified(self, precision: int) -> CertifiedSeries:

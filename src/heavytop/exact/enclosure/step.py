@@ -503,7 +503,7 @@ class _Tail(NamedTuple):
 
 
 def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _Tail | None:
-    """Of the polynomial from ``node``; None where it is too long for the theorem."""
+    """The tail of the polynomial from ``node``; None where it is too long for the theorem."""
     h, q, slope = 2.0**-node.halvings, float(field.q) * _UP, float(field.l) * _UP
     growth = h * (2 * q * float(series.sizes.sum()) + slope + q * CAP) * _UP
     if not growth < 4 * _LARGEST_SLOPE:

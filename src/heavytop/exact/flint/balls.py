@@ -167,7 +167,7 @@ def _alone(thread: int) -> Generator[None, None, None]:
 
 
 class _Block:
-    """What the two blocks share.  precision, length: None for the one that stays."""
+    """The base of both blocks.  precision, length: None for the one that stays."""
 
     __slots__ = ("before", "holding", "length", "precision")
     precision: int | None

@@ -107,7 +107,7 @@ class Inversion:
         return arb_mat(columns).transpose()
 
     def _periods(self) -> arb_mat:
-        """What G grows by with a turn of each phase (a unit, where it never returns), a column for each."""
+        """The growth of G with a turn of each phase (a unit, where it never returns), a column for each."""
         columns = [[sign * c for c in v.column] for v, sign in zip(self.variables, self.signs, strict=True)]
         return arb_mat(columns).transpose()
 
@@ -418,7 +418,7 @@ _MOST_WORK = 1 << 27
 
 
 class Symmetry(NamedTuple):
-    """Of a function of one angle: odd, and turned into its negative by 2π."""
+    """The symmetry of a function of one angle: odd, and turned into its negative by 2π."""
 
     odd: bool
     half: bool

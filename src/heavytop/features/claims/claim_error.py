@@ -153,7 +153,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
 
 
 def stable_case(alpha: Real, i1: Real, i3: Real, t: Real, lib: Library) -> Values[Real]:
-    """The same motion in the forms that lose no digits, over any ring; smooth branch."""
+    """The motion in the forms that lose no digits, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
     omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
     phi, theta = hyperbolic_angles(s, lib)
@@ -304,7 +304,7 @@ RATIOS = (2, 6)
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """One of Figs 2-8: ``a`` is A, ``ratio`` is I1/I3 where the paper states it; α = 1 throughout."""
+    """A figure of the paper, 2 to 8: ``a`` is A, ``ratio`` is I1/I3 where the paper states it; α = 1 throughout."""
 
     number: int
     angle: str

@@ -79,7 +79,7 @@ def _save(figure: Any, stem: Path) -> list[Path]:
 
 
 def _paper_figure(paper: PaperCurve) -> Any:
-    """One of Figs 2-8: the printed formula, its parameters, and a warning where they contradict each other."""
+    """A figure of the paper, 2 to 8: the formula printed, its parameters, a warning where they disagree."""
     figure = new_figure(8, 5)
     axes = figure.add_subplot()
     spec = paper.figure

@@ -127,7 +127,7 @@ def audit_text(report: Audit) -> RenderableType:
 
 
 def _entry(report: Audit) -> list[RenderableType]:
-    """What an entry of the library says of itself: how its source was read, the verdict expected, its note."""
+    """The lines of an entry of the library: how its source was read, the verdict expected, its note."""
     entry = report.entry
     if entry is None:
         return []
@@ -177,7 +177,7 @@ def _witnesses(report: Audit) -> list[Text]:
 
 
 def _conditions(report: Audit) -> list[Text]:
-    """What the proofs rest on, each condition once: first what is not discharged, with the rows that it leaves open."""
+    """The conditions of the proofs, each once: first what is not discharged, with the rows that it leaves open."""
     rows: dict[tuple[bool, str, str], list[str]] = {}
     for row in report.rows:
         if row.holds is not False:

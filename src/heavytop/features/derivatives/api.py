@@ -31,7 +31,7 @@ Matrix = Sequence[Sequence[Fraction]]
 
 @dataclass(frozen=True, slots=True, repr=False)
 class DerivativeScore(Tabular):
-    """What the derivatives of a motion are worth.
+    """The score of the derivatives of a motion.
 
     outcome: ``success``, or ``non_finite`` where an entry is NaN or infinite: the times before are scored.
     digits_right: −log10 of the largest |error|/max(1, |true value|) of an entry, over all times, at most the digits

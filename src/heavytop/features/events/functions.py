@@ -44,7 +44,7 @@ _context = fmpq_mpoly_ctx.get(VARIABLES, Ordering.lex)
 
 
 class NotRational(TypeError):
-    """What a callable asked of an indeterminate needs a number."""
+    """A callable asked of an indeterminate for something that needs a number."""
 
 
 class Ratio:
@@ -152,7 +152,7 @@ class Ratio:
         return Fraction(int(part[0].p), int(part[0].q)) / Fraction(int(part[1].p), int(part[1].q))
 
     def reduced(self) -> Ratio:
-        """The same without a common factor."""
+        """The ratio without a common factor."""
         if self.denominator.is_constant():
             return self
         common = self.numerator.gcd(self.denominator)

@@ -101,7 +101,7 @@ class _Piece:
     short: dict[int, Any] = field(default_factory=dict)
 
     def over(self, what: Any, low: Fraction, high: Fraction) -> Any:
-        """What a polynomial takes at low ≤ s ≤ high, as a ball."""
+        """The values of a polynomial at low ≤ s ≤ high, as a ball."""
         middle, half = (low + high) / 2, (high - low) / 2
         if half > _WIDE:
             if id(what) not in self.short:
@@ -152,7 +152,7 @@ def _without_tail(what: Any) -> Any:
 
 
 def _range(what: Any, middle: Fraction, half: Fraction) -> Any:
-    """What a polynomial takes within ``half`` of ``middle``: its coefficients there, added up.
+    """The values of a polynomial within ``half`` of ``middle``: its coefficients there, added up.
 
     The constant one is the value there, as narrow as it is over a part without width.
     """
@@ -421,7 +421,7 @@ def _cells(piece: _Piece, fresh: bool) -> list[_Cell] | Fraction:
 
 
 def _hull(pieces: Sequence[_Piece], choose: Callable[[_Piece], Any], low: Fraction, high: Fraction) -> Any:
-    """What a polynomial of the pieces takes between two scaled times, as one ball."""
+    """The values of a polynomial of the pieces between two scaled times, as one ball."""
     found = None
     for piece in pieces:
         first, last = piece.part(low, high)

@@ -83,7 +83,7 @@ class Jet:
 
 
 def known_parameters(system: System) -> Parameters:
-    """Those of the known step."""
+    """The parameters of the known step."""
     return PARAMETERS._replace(rotor=_ROTOR) if system is HEAVY_GYROSTAT else PARAMETERS
 
 

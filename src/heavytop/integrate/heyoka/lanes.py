@@ -43,7 +43,7 @@ class StoppedError(Exception):
 
 @dataclass(slots=True)
 class Work:
-    """What the threads of an ensemble share.
+    """The work that the threads of an ensemble share.
 
     tool: of the integrator.  targets: native times in order; times: their exact values.  pending: problems that no
     thread has taken yet.  send: hands a sample, of which as many may be on their way as there is room for, or a motion

@@ -325,7 +325,7 @@ def _unit(problem: Problem) -> Fraction:
 
 
 def _in_unit(problem: Problem, unit: Fraction) -> Problem:
-    """The same motion with the time times ``unit``; exact, but for what the format has no number."""
+    """The motion with the time times ``unit``; exact, but for what the format has no number."""
     p, rotors = problem.parameters, tuple(Fraction(value) / unit for value in problem.parameters.rotors)
     moment = tuple(Fraction(value) / unit**2 for value in p.moment)
     slower = Parameters(p.inertia, moment, rotors if isinstance(p.rotor, tuple) else rotors[0])

@@ -70,7 +70,7 @@ class _Motion(LaneRun):
         return self.exactly(exact_state(words)) if found is None else numpy.array(found)
 
     def exactly(self, state: tuple[Fraction, ...]) -> Any:
-        """The same of an exact state."""
+        """An exact state, rounded to the format; None where a number is too large for it."""
         return native_state(self.scaled.back(state), self.problem.precision)
 
 

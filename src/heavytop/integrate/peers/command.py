@@ -103,23 +103,23 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     @property
     def control(self) -> str:
-        """What it is set by: "step", "tolerance", or "" for neither."""
+        """The control that it takes: "step", "tolerance", or "" for neither."""
         return "" if self.setting == "none" else self.setting
 
     @property
     def seconds(self) -> float:
-        """Of one request, at most."""
+        """The time limit of one request."""
         return float(exact(str(self.timeout)))
 
     @property
     def declared(self) -> Declared:
-        """What it can do."""
+        """Its capabilities."""
         singular = tuple(vector(map(str, each), "singular_at") for each in self.singular_at)
         able = self.systems, self.directions, self.precisions, self.attitude
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
     def request(self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None) -> ProgramRequest:
-        """What it is asked for, in the form that it declares; raises Unsupported where it needs a body and none is."""
+        """A request, in the form that it declares; raises Unsupported where it needs a body and none is."""
         top = (problem.given or (problem.top, problem.start))[0]
         body = Body.realising(top) if self.bodies else None
         if self.bodies and body is None:
@@ -127,7 +127,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return ProgramRequest(problem, times, setting, self.hex, self.attitude == "quaternion", body)
 
     def load(self) -> CommandIntegrator:
-        """What integrates with it; nothing is started yet."""
+        """The callable that integrates with it; nothing is started yet."""
         return CommandIntegrator(self)
 
     def argv(self) -> list[str]:
@@ -318,7 +318,7 @@ _last_times = _Times([], (DOUBLE, False), [], [])
 
 
 def _times_written(times: list[Fraction], precision: Precision, hexadecimal: bool) -> _Times:
-    """Those of the request before, where they are the same: many starts of a row are asked for at the same times."""
+    """Times of the request before, where they are the same: many starts of a row are asked for at the same times."""
     global _last_times
     last, form = _last_times, (precision, hexadecimal)
     if last.form != form or last.times != times:
@@ -328,7 +328,7 @@ def _times_written(times: list[Fraction], precision: Precision, hexadecimal: boo
 
 
 class Reply:
-    """What a program answered: states of the format, counts, and what it says went wrong; wall: seconds here."""
+    """The answer of a program: states of the format, counts, and what it says went wrong; wall: seconds here."""
 
     def __init__(self, name: str, request: ProgramRequest) -> None:
         self.name, self.request = name, request
@@ -619,7 +619,7 @@ class Session:
         return bool(found)
 
     def _read(self, descriptor: int) -> bytes | None:
-        """What is there; empty at the end, None where nothing is there yet."""
+        """The bytes that are there; empty at the end, None where nothing is there yet."""
         try:
             return os.read(descriptor, _CHUNK)
         except BlockingIOError:

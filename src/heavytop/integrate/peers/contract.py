@@ -1,4 +1,4 @@
-"""What is asked of a third-party integrator, and the one place that checks it.
+"""The contract of a third-party integrator, and the one place that checks it.
 
 Whatever the code of others does, short of ending the process, comes out as a Trajectory that keeps the contract or as
 PeerFailed, which says in a sentence what it did.
@@ -129,7 +129,7 @@ def _did(error: BaseException) -> str:
 
 
 def said(what: object) -> str:
-    """What others say, as one line of at most 200 characters that can be shown."""
+    """Text of others, as one line of at most 200 characters that can be shown."""
     try:
         text = str(what)
     except Exception:  # a message that cannot be made is none
@@ -140,7 +140,7 @@ def said(what: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What an integrator declares that it can do; None where it declares nothing.
+    """The declared capabilities of an integrator; None where it declares nothing.
 
     systems: names such as "heavy_top".  directions: "forward", "backward".  precisions: names of formats, "real:BITS"
     for any number of bits.  attitude: whether ξ rides along, or "quaternion": it computes with one in the place of γ.

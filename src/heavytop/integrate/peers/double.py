@@ -1,4 +1,4 @@
-"""What libraries for doubles need: the problem as arrays, the field as compiled code, the result as a Trajectory."""
+"""Adapters of libraries for doubles: the problem as arrays, the field as compiled code, the result as a Trajectory."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Request:
         return partial(self.system.with_attitude, self.parameters)
 
     def _with_quaternion(self, y: Sequence[float]) -> tuple[float, ...]:
-        """Of (Ω, q) with |q| = 1: q' = q (0, Ω)/2."""
+        """The field of (Ω, q) with |q| = 1: q' = q (0, Ω)/2."""
         omega, (w, *v) = y[:3], y[3:]
         state = (*omega, *matrix_of_quaternion(y[3:])[2])
         turning = self.system.angular_velocity(self.parameters, state)
@@ -81,7 +81,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """What a library gave back.
+    """The result of a library.
 
     states: as wide as the start, shape (m, 6), (m, 9) or (m, 7), one for each of the first m <= n times.  reached: the
     last time it stood at.  evaluations: of the field.  compile: seconds of the run that went into compiling.
@@ -218,7 +218,7 @@ def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction],
 
 
 def _from_start(name: str, given: Request, solve: Solve) -> Solution:
-    """What ``solve`` gives for the times after 0, which most libraries refuse, behind the start itself."""
+    """The solution of ``solve`` at the times after 0, which most libraries refuse, behind the start itself."""
     at_start = int(given.times[0] == 0)
     # the times are judged by as they were, whatever is done to those that are given
     later = replace(given, times=given.times[at_start:].copy())
@@ -240,7 +240,7 @@ def _judged(
     seconds: dict[str, float],
     flags: dict[str, str],
 ) -> Trajectory:
-    """What was solved, up to the first state that is not finite."""
+    """The trajectory of a solution, up to the first state that is not finite."""
     times = given.times
     states = _states(name, solved.states, len(times), given.width)
     finite = numpy.isfinite(states).all(axis=1)

@@ -56,7 +56,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Processor:
-    """What code is made for.  name: of LLVM, such as ``x86-64-v3``.  features: as LLVM writes them, such as ``+avx2``.
+    """The processor that code is made for.  name: of LLVM, such as ``x86-64-v3``.  features: such as ``+avx2``.
 
     The bits of all results are the same for every processor.
     """
@@ -281,7 +281,7 @@ def _like(shape: ir.Type, element: ir.Type) -> ir.Type:
 
 
 def _typed(kind: ir.Type, value: Number) -> ir.Value:
-    """What LLVM's builder has of an operand; a number as a constant of that type."""
+    """The value of LLVM's builder for an operand; a number as a constant of that type."""
     return value.raw if isinstance(value, Operand) else ir.Constant(kind, +value)  # of True it is 1
 
 
@@ -299,7 +299,7 @@ class Code:
         self.null = self.value(ir.Constant(POINTER, None))
 
     def value(self, raw: ir.Value) -> Operand:
-        """What LLVM's builder made."""
+        """An operand of the type that LLVM's builder made."""
         return Operand(self.builder, raw)
 
     def _intrinsic(self, name: str, result: ir.Type, arguments: Sequence[ir.Value]) -> Operand:
@@ -308,11 +308,11 @@ class Code:
         return self.value(self.builder.call(function, arguments))
 
     def call(self, function: ir.Function, arguments: Sequence[Operand]) -> Operand:
-        """What a function gives."""
+        """The result of a function."""
         return self.value(self.builder.call(function, [argument.raw for argument in arguments]))
 
     def constant(self, value: float | Sequence[float]) -> Operand:
-        """The same double in every lane, or eight."""
+        """A double in every lane, or eight."""
         return self.value(ir.Constant(VECTOR, value if isinstance(value, (int, float)) else list(value)))
 
     def integer(self, value: Index) -> Operand:
@@ -395,7 +395,7 @@ class Code:
         return total, (a - (total - part)) + (b - part)
 
     def quick_two_sum(self, a: Operand, b: Operand) -> Pair:
-        """The same where |a| >= |b| or a = 0 (Dekker)."""
+        """:meth:`two_sum` where |a| >= |b| or a = 0 (Dekker)."""
         total = a + b
         return total, b - (total - a)
 
@@ -428,11 +428,11 @@ class Code:
         self.builder.store(value.raw, self.builder.bitcast(self._place(base, offset), _VECTOR_POINTER), align=64)
 
     def phi(self, kind: ir.Type) -> Operand:
-        """What is one value or another, as :meth:`add_incoming` says for each block before."""
+        """A value or another, as :meth:`add_incoming` says for each block before."""
         return self.value(self.builder.phi(kind))
 
     def add_incoming(self, phis: Sequence[Operand], values: Sequence[Number], before: Any = None) -> None:
-        """What ``phis`` are behind the block ``before``, or behind the one that is being written."""
+        """The values of ``phis`` behind the block ``before``, or behind the one that is being written."""
         for phi, value in zip(phis, values, strict=True):
             phi.raw.add_incoming(_typed(phi.type, value), before or self.builder.block)
 
@@ -454,7 +454,7 @@ class Code:
         body: Callable[[Operand, list[Operand]], Sequence[Operand] | None],
         values: Sequence[Operand],
     ) -> tuple[Operand, list[Operand]]:
-        """The same up to the first i at which ``holds(values)`` does not, and that i."""
+        """:meth:`loop` up to the first i at which ``holds(values)`` does not, and that i."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
         b.branch(head)
@@ -522,7 +522,7 @@ class Stepping(ABC):
         return self.code.load_one(self.clock, place)
 
     def count(self, place: int) -> Operand:
-        """One of the counts."""
+        """A count, by its place."""
         return self.code.load_one(self.counts, place)
 
     def set_count(self, value: Index, place: int) -> None:

@@ -115,7 +115,7 @@ class Coefficients:
         )
 
     def with_linear(self, torque: Fraction, turning: Fraction) -> Coefficients:
-        """The same with every B multiplied: those of γ in the rate of Ω by ``torque``, the others by ``turning``."""
+        """These coefficients with B multiplied: those of γ in the rate of Ω by ``torque``, others by ``turning``."""
         factors = [Fraction(1), *(torque if k < self.torques else turning for k in range(len(self.vectors[0]) - 1))]
         return Coefficients(
             tuple(
@@ -130,7 +130,7 @@ class Coefficients:
 
 @lru_cache(maxsize=256)
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
-    """Those of the field, exactly, for exact parameters."""
+    """The coefficients of the field, exactly, for exact parameters."""
     exactly = p.mapped(mpq)  # quicker than Fractions, and as exact
     given = coefficients_of(system, lambda y: system.field(exactly, y), mpq(1, 2))
     if not attitude:
@@ -141,7 +141,7 @@ def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
 
 
 def coefficients_of(system: System, rates: Callable[[Sequence[Any]], Sequence[Any]], turning: mpq) -> Coefficients:
-    """Those of a field whose terms are some of those of ``system``, with A = ``turning`` in lanes 3 to 5."""
+    """The coefficients of a field whose terms are some of those of ``system``, with A = ``turning`` in lanes 3 to 5."""
 
     def unit(*axes: int) -> list[Any]:
         return [mpq(int(axis in axes)) for axis in range(6)]
@@ -315,7 +315,7 @@ class Recurrence:
         ]
 
     def _gather(self, word: Operand, part: int) -> Operand:
-        """One of the four summands of the products, without its signs; 0 where there is none."""
+        """A summand of the products, of four, without its signs; 0 where there is none."""
         lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
@@ -323,7 +323,7 @@ class Recurrence:
         return value if min(_signs(part)) >= 0 else value * self.code.constant(_signs(part))
 
     def _anywhere(self, word: Operand, part: int) -> Operand:
-        """One of the four summands, and any number where there is none."""
+        """A summand, of four, and any number where there is none."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
     def constant(self, vector: int, row: int) -> Constant:
@@ -442,5 +442,5 @@ class Recurrence:
 
 
 def _signs(part: int) -> list[int]:
-    """Of one of the four summands of the products, lane by lane; 0 where there is none."""
+    """The signs of a summand of the products, lane by lane; 0 where there is none."""
     return [*(sign for _, sign in GATHERED[part]), 0, 0]

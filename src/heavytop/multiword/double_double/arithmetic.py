@@ -149,7 +149,7 @@ def split(value: Fraction) -> tuple[float, float]:
 
 
 def split_ratio(top: int, bottom: int) -> tuple[float, float]:
-    """The same of a quotient, which need not be in lowest terms."""
+    """The two doubles nearest to a quotient, which need not be in lowest terms."""
     high = top / bottom
     above, below = high.as_integer_ratio()
     return high, (top * below - above * bottom) / (bottom * below)

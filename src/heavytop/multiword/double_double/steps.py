@@ -573,7 +573,7 @@ class _Step(Stepping):
         return ~again & (status == OK)
 
     def _follow(self, good: Operand, fits: Operand, units: list[Operand], slope: Operand) -> None:
-        """What split coefficients the step was done with, if it stands, and how often the next was tried."""
+        """The split coefficients that the step was done with, if it stands, and how often the next was tried."""
         code, b = self.code, self.code.builder
         tries = self.count(TRIES)
         with b.if_then(good):

@@ -82,7 +82,7 @@ class Grid:
 
     @property
     def smallest(self) -> float:
-        """What two coefficients in a row are below where the series ends, as the last word is kept."""
+        """The bound of two coefficients in a row where the series ends, as the last word is kept."""
         return self.unit(self.words - 1) * (2.0 if self.whole else 2.0**-12)
 
     @property
@@ -92,7 +92,7 @@ class Grid:
 
     @property
     def apart(self) -> float:
-        """What a number counts for in the next word, over what it counts for in this one."""
+        """The ratio of a number in the next word to the same number in this one."""
         return float(2.0**self.bits) if self.relative else 1.0
 
     def unit(self, k: int) -> float:
@@ -100,7 +100,7 @@ class Grid:
         return 1.0 if self.relative else float(2.0 ** (-self.bits * (k + 1)))
 
     def centre(self, k: int) -> float:
-        """What is added to word k and taken away again where it is rounded to its unit."""
+        """The number that is added to word k and taken away again where it is rounded to its unit."""
         if k == self.words - 1 and not self.whole:
             return 0.0
         return 1.5 * 2.0**52 * self.unit(k)
@@ -331,7 +331,7 @@ def summed(code: Code, grid: Grid, sums: list[Operand]) -> list[Operand]:
 
 
 def carried(code: Code, grid: Grid, words: list[Operand]) -> list[Operand]:
-    """The same number with each word but the first near b bits wide again."""
+    """A number with each word but the first near b bits wide again."""
     carries = []
     for k in range(1, grid.words):
         big = code.constant(grid.coarse(k - 1))

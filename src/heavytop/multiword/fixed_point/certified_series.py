@@ -265,7 +265,7 @@ def _largest(sizes: Doubles, length: int, size: int) -> Doubles:
 
 
 class _Scratch:
-    """What one thread computes with."""
+    """The arrays that one thread computes with."""
 
     def __init__(self, certified: CertifiedSeries) -> None:
         words, vectors = certified.grid.words, certified.vectors
@@ -323,7 +323,7 @@ def components(left: Doubles) -> list[Doubles]:
 
 
 def in_ulps(words: Doubles, grid: Grid) -> Any:
-    """What words add to along the last axis, in ulps: an array of integers."""
+    """The sums of words along the last axis, in ulps: an array of integers."""
     units = [grid.unit(k) for k in range(grid.words)]
     digits = (words / units).astype(numpy.int64).astype(object)
     total = digits[..., 0]

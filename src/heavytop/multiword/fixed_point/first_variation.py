@@ -67,7 +67,7 @@ _UP = 1 + 2.0**-40
 
 
 class _ColumnRows(WordRows):
-    """Those of a column.  places: behind those of a motion, for how many orders the first u + 1 words were 0."""
+    """The sums of a column.  places: behind those of a motion, for how many orders the first u + 1 words were 0."""
 
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
         for k in range(self.grid.words):
@@ -294,7 +294,7 @@ class CertifiedColumns:
 
 
 class _Scratch:
-    """What one thread computes columns in.
+    """The arrays that one thread computes columns in.
 
     results: Σ v_n of each.  sizes: Σ_k |word k of v_n|, shape (columns, orders, 8).  widest: the largest words of R and
     L, and added Σ_n |word k|, of each column.  ends, measures: where these are.

@@ -215,7 +215,7 @@ class Fixed(ResumableRun):
         return Status(int(self.counts[steps.STATUS]))
 
     def _samples(self, pointers: tuple[Any, Any, Any], first: int, last: int) -> None:
-        """Those of the last step from one to before another; pointers: to its rows, their words of x, the result."""
+        """Samples of the last step from one to before another; pointers: to its rows, their words of x, the result."""
         order, (rows, at, found) = int(self.counts[steps.ORDERS]), pointers
         self.machine.functions["samples"](rows, order, at, first, last, found)
 

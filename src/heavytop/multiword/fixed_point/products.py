@@ -63,7 +63,7 @@ class Rows(ABC):
     @staticmethod
     @abstractmethod
     def size(grid: Grid, vectors: int, orders: int) -> ProductSize:
-        """What ``orders`` orders need."""
+        """The size that ``orders`` orders need."""
 
     @staticmethod
     @abstractmethod

@@ -48,7 +48,7 @@ from heavytop.multiword.fixed_point.products import DigitRows, ProductSize, Rows
 from heavytop.top.equations import System
 
 FIRED, UNSETTLED = -1, -2
-"""What ``series`` gives in place of its number of orders: a sum left its range; no convergence."""
+"""The result of ``series`` in place of its number of orders: a sum left its range; no convergence."""
 _WIDEST_DIVIDEND = 53
 """Bits of a word that is divided, behind the first."""
 _NONE = 8
@@ -287,7 +287,7 @@ _PARTS = 5
 
 
 def most_of(grid: Grid) -> float:
-    """What a partial sum may be: with words of more than 46 bits its products with x leave their range earlier."""
+    """The largest partial sum: with words of more than 46 bits its products with x leave their range earlier."""
     return float(2.0 ** min(4, _SUM_BITS - grid.bits))
 
 

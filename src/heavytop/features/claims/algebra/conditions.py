@@ -1,4 +1,4 @@
-"""What must be true for a formula to be defined and real: collected as it is read, before anything is simplified."""
+"""Conditions for a formula to be defined and real: collected as it is read, before anything is simplified."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BITS = 512
 
 
 class ConditionKind(Enum):
-    """What is asked of an expression; the value is how it is written."""
+    """The kind of a condition on an expression; the value is how it is written."""
 
     NONZERO = "{} ≠ 0"
     POSITIVE = "{} > 0"
@@ -86,7 +86,7 @@ class Need:
 
 
 def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Need]:
-    """What ``function`` needs of its arguments to be defined and real: ``/`` of a divisor, ``sqrt``, ``log``, ..."""
+    """Conditions for ``function`` to be defined and real: ``/`` on a divisor, ``sqrt``, ``log``, ..."""
     u = arguments[0]
     if function == "/":
         needs = {Need(ConditionKind.NONZERO, u)}
@@ -140,7 +140,7 @@ def _is_plain(need: Need) -> bool:
 
 
 def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
-    """What sympy expressions need, as they stand: what has been simplified away is not seen."""
+    """The conditions of sympy expressions, as they stand: what has been simplified away is not seen."""
     found: set[Need] = set()
     for part in {node for e in expressions for node in sympy.preorder_traversal(e)}:
         if isinstance(part, sympy.exp):
@@ -305,7 +305,7 @@ def all_over(e: sympy.Expr, zeros: Sequence[sympy.Expr]) -> sympy.Expr:
 
 
 def _rest(e: sympy.Expr, divisors: Sequence[sympy.Expr]) -> sympy.Expr:
-    """What division leaves, if that is shorter."""
+    """The remainder of the division, if that is shorter."""
     if not e.free_symbols or not is_small_polynomial(e):
         return e
     rest = sympy.reduced(e, divisors)[1]

@@ -45,7 +45,7 @@ class SolvedRelation:
 
 @dataclass(frozen=True, slots=True)
 class Assumptions:
-    """What is known of the symbols.
+    """The assumptions on the symbols.
 
     positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
     variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both; strict: it is not 0 there.
@@ -291,7 +291,7 @@ class Field:
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
 
     def _definition(self, e: Defined) -> Quotient:
-        """What it stands for; where that is too large, a free generator: what holds for any value holds for it."""
+        """The meaning of a name; where that is too large, a free generator: what holds for any value holds for it."""
         try:
             return self.enter(e.meaning)
         except Unprovable:
@@ -337,7 +337,7 @@ class Field:
         return fraction.xreplace({_placeholder(index): self.meaning(index) for index in occurring})
 
     def meaning(self, index: int) -> sympy.Expr:
-        """What a generator stands for."""
+        """The meaning of a generator."""
         if index not in self._expressions:
             (square,) = self.tower.generators[index].arguments
             self._expressions[index] = sympy.sqrt(self.expression(square))
@@ -390,7 +390,7 @@ class Regularity:
         self._known: dict[tuple[int, bool], str] = {}
 
     def obstacle(self, value: Quotient, *, analytic: bool = False) -> str:
-        """What stands against it being real and continuous (analytic) all over the domain; "" where nothing does."""
+        """The obstacle to it being real and continuous (analytic) all over the domain; "" where nothing does."""
         _, factors = self._field.tower.signs.factors(value.denominator)
         for factor, _ in factors:
             if not self._is_nonzero(factor):
@@ -398,7 +398,7 @@ class Regularity:
         return self.obstacle_of_generators(used(value.numerator) | used(value.denominator), analytic=analytic)
 
     def obstacle_of_generators(self, indices: set[int], *, analytic: bool) -> str:
-        """The same of generators."""
+        """The obstacle in generators."""
         for index in sorted(indices):
             if (index, analytic) not in self._known:
                 self._known[index, analytic] = self._obstacle_of(index, analytic)

@@ -29,7 +29,7 @@ Known = Callable[[str, Quotient], Quotient | None]
 
 
 class Expressions(Protocol):
-    """What generators ask of their field, which :class:`heavytop.features.claims.algebra.fields.Field` is."""
+    """The interface of a field for its generators, which :class:`heavytop.features.claims.algebra.fields.Field` is."""
 
     tower: Tower
 
@@ -182,7 +182,7 @@ class Transcendental:
         return t.divide(above, below)
 
     def _in_parts(self, argument: Quotient) -> list[Quotient]:
-        """What is constant in time apart from what moves; all terms apart where each is a multiple of a known base."""
+        """Constant terms apart from those that move; all terms apart where each is a multiple of a known base."""
         terms = self._tower.summands(argument)
         still = [term for term in terms if self._field.is_constant(term)]
         if still and len(still) < len(terms):

@@ -253,7 +253,7 @@ class Region:
         return bool(value.numerator) and all(map(self.is_for_no_parameters, self._factors(value.numerator)))
 
     def fails_everywhere(self, need: Need) -> str:
-        """What its expression is at every state of a body, where that does not meet it; else ""."""
+        """Its expression at every state of a body, where that does not meet it; else ""."""
         value = on_conditions(need.expression, self._always)
         if value.free_symbols or replace(need, expression=value).is_met({}) is not False:
             return ""
@@ -357,7 +357,7 @@ class Region:
         return for_no_parameters(e, self.field.assumptions, points)
 
     def assumption_for(self, need: Need) -> str:
-        """What, assumed of the parameters, would discharge it, or leave zeros that are removable; "" for nothing."""
+        """An assumption on parameters that would discharge it, or leave zeros that are removable; "" for nothing."""
         parameters = self._setting.parameters
         open_part = need.expression if need.expression.free_symbols <= parameters else None
         if open_part is None and need.kind is ConditionKind.NONZERO:
@@ -371,7 +371,7 @@ class Region:
         return written(f"{open_part} {'!=' if need.kind is ConditionKind.NONZERO else '>'} 0")
 
     def obstacle(self, values: Sequence[sympy.Expr]) -> str:
-        """What stands against the values being real and continuous all over the region."""
+        """The obstacle to the values being real and continuous all over the region."""
         for value in values:
             try:
                 found = self.regularity.obstacle(self.field.enter(value))

@@ -105,7 +105,7 @@ Part = TypeVar("Part")
 
 
 class Descent:
-    """What recursive descents over the grammar share: the tokens of a text, taken one by one, and a depth.
+    """The base of recursive descents over the grammar: the tokens of a text, taken one by one, and a depth.
 
     token: what a token is, white space before it.  deepest: how deep parentheses and powers may stand in one another.
     """
@@ -148,7 +148,7 @@ class Descent:
         self._depth -= 1
 
     def _arguments(self, one: Callable[[], Part]) -> list[Part]:
-        """What stands in parentheses, between commas."""
+        """The arguments in parentheses, between commas."""
         self._require("(")
         found = [one()]
         while self._take(","):
@@ -342,7 +342,7 @@ def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
 
 
 def inequalities(texts: Iterable[str]) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """What ``assume`` says: the (larger, smaller) of its comparisons, and both sides of each ``formula != formula``.
+    """Assumptions of ``assume``: the (larger, smaller) of its comparisons, both sides of each ``formula != formula``.
 
     Raises InputError for anything else.
     """
@@ -366,7 +366,7 @@ def assume(
     symbols: Iterable[sympy.Symbol],
     apart: Iterable[Bound] = (),
 ) -> Assumed:
-    """What follows from left > right of each bound, from what these need to be real, and from positive moments.
+    """Consequences of left > right of each bound, from what these need to be real, and from positive moments.
 
     apart: the sides of what is assumed to be unequal.
     """
@@ -412,7 +412,7 @@ _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = 
 
 
 def _through_monotone(bound: Bound) -> Iterator[Bound]:
-    """What left > right implies of the arguments of monotone functions: of both sides, or of one beside a fraction.
+    """Consequences of left > right for the arguments of monotone functions: of both sides, or of one beside a fraction.
 
     The inverse of a fraction is rounded outwards to a fraction.
     """

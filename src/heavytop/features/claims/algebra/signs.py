@@ -62,7 +62,7 @@ _PROGRAMS = 30
 
 
 class Signs:
-    """What is known of the signs and ranges of the generators of ``ring``, and what follows for polynomials.
+    """The known signs and ranges of the generators of ``ring``, and what follows for polynomials.
 
     ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
     is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.

@@ -1,4 +1,4 @@
-"""What a claim says, piece by piece, and what it is about."""
+"""The statements of a claim, and their setting."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What the statements of a claim are about.
+    """The setting of the statements of a claim.
 
     variable: the symbol that moves (t, or Ω2 in the general case).
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
@@ -131,7 +131,7 @@ class Setting:
     parameters: frozenset[sympy.Symbol] = frozenset()
 
     def with_solutions(self) -> Setting:
-        """The same, with the solutions in the place of their relations."""
+        """The setting with the solutions in the place of their relations."""
         done = {solution.relation for solution in self.solutions}
         left = tuple(relation for relation in self.relations if relation not in done)
         return replace(self, relations=left, solutions=(), solved=self.solutions)
@@ -144,7 +144,7 @@ class Setting:
         facts: tuple[sympy.Expr, ...] = (),
         weak: tuple[sympy.Expr, ...] = (),
     ) -> Assumptions:
-        """What the algebra may use on a domain where the variable has this sign (strict: and is not 0)."""
+        """The assumptions of the algebra on a domain where the variable has this sign (strict: and is not 0)."""
         return Assumptions(
             self.variable,
             self.positive,
@@ -162,7 +162,7 @@ class Setting:
 
     @property
     def zeros(self) -> tuple[sympy.Expr, ...]:
-        """What is 0 wherever the claim is made."""
+        """Expressions that are 0 wherever the claim is made."""
         return (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
 
     def places(self, statement: Statement) -> Iterator[Place]:

@@ -1,4 +1,4 @@
-"""What the structure of an expression tells, before anything is expanded: its sign, and the first integrals in it."""
+"""Facts from the structure of an expression, before anything is expanded: its sign, and the first integrals in it."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
 
 
 def _sign_of_sum(e: sympy.Expr) -> Sign:
-    """Of parts of one sign; bounded functions count against the constant part."""
+    """The sign of a sum with parts of one sign; bounded functions count against the constant part."""
     constant, signs = Fraction(0), []
     for part in e.args:
         coefficient, rest = part.as_coeff_Mul()
@@ -195,7 +195,7 @@ class Names:
 
     @property
     def meanings(self) -> dict[sympy.Symbol, sympy.Expr]:
-        """Those given so far, with what they stand for."""
+        """The symbols given so far, with their meanings."""
         return {name: e for e, name in self._names.items() if name is not None}
 
     def put_into(self, e: sympy.Expr) -> sympy.Expr:

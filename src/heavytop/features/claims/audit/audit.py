@@ -200,7 +200,7 @@ def require_branch(branch: str) -> None:
 
 
 def only_branch(report: Audit, branch: str) -> Audit:
-    """The same report with the rows of one branch, and its verdict on them; raises InputError where there are none."""
+    """The report with the rows of one branch, and its verdict on them; raises InputError where there are none."""
     require_branch(branch)
     rows = tuple(row for row in report.rows if row.branch == branch)
     if not rows:
@@ -276,7 +276,7 @@ def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda:
 
 
 def _kept(entry: Entry) -> Judged | None:
-    """What the cache holds of exactly this entry and this program."""
+    """The verdict in the cache on exactly this entry and this program."""
     try:
         return msgspec.json.decode(_place(entry).read_bytes(), type=Judged)
     except (OSError, msgspec.DecodeError, msgspec.ValidationError):

@@ -1,4 +1,4 @@
-"""What every kind of claim in a file shares: its names, assumptions and samples, and the top that it is about."""
+"""The context of every kind of claim in a file: its names, assumptions and samples, and the top that it is about."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ def read_tensor(inertia: Sequence[str | list[str]]) -> TensorTexts:
 
 
 def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[sympy.Expr, ...]:
-    """What is > 0 of every body: the moments; of a full tensor its principal minors, the determinant last."""
+    """Expressions > 0 of every body: the moments; of a full tensor its principal minors, the determinant last."""
     if not isinstance(inertia[0], tuple):
         return tuple(inertia)
     return _principal_minors(sympy.Matrix(inertia))
@@ -239,7 +239,7 @@ _OF_PARAMETERS = "Relations are between parameters; conditions on the state stan
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What every kind of claim shares: names, assumptions, samples, and the top they are about.
+    """The context of a claim: names, assumptions, samples, and the top they are about.
 
     rotor: λ of a gyrostat, with what it needs.  carried: k of a heavy gyrostat.
     """
@@ -288,7 +288,7 @@ class Context:
 
 
 def _other_rotor(system: System) -> InputError:
-    """What is said where one of the two has a rotor of three components, and the other has not."""
+    """The error where one of the two has a rotor of three components, and the other has not."""
     if system is HEAVY_GYROSTAT:
         cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
         return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
@@ -363,7 +363,7 @@ def sample_number(text: str, what: str) -> Fraction:
 
 
 def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:
-    """What all of them need."""
+    """The needs of all of them."""
     return frozenset().union(*(formula.needs for formula in formulas))
 
 
@@ -468,7 +468,7 @@ class FileClaim:
 
     @property
     def variables(self) -> tuple[sympy.Symbol, ...]:
-        """What its formulas may hold beside its parameters."""
+        """Symbols that its formulas may hold beside its parameters."""
         return ()
 
     def __post_init__(self) -> None:
@@ -491,12 +491,12 @@ class FileClaim:
         return [name for name in self.content.parameters if name not in words]
 
     def assuming(self, bound: str) -> Self:
-        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        """The claim with one assumption more; raises InputError where a sample breaks it."""
         return type(self)(structs.replace(self.content, assume=[*self.content.assume, bound]))
 
     @property
     def entry(self) -> Entry | None:
-        """What the file says as an entry of the library."""
+        """The entry of the library that the file is."""
         return self.content.entry
 
     @property
@@ -528,7 +528,7 @@ _BEYOND = (Fraction(1, 7), Fraction(3, 2))
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """What the formulas of a motion hold, and its rate.
+    """The variable that the formulas of a motion hold, and its rate.
 
     variable: t or u.  rate: the derivative in time.  values: F' and 1/F', both of which have to be continuous; none
     where t itself is the variable.  needs: for these, and for the bounds of u, to be defined.
@@ -585,7 +585,7 @@ def _points(
     facts: Sequence[sympy.Expr],
     samples: Sequence[Mapping[sympy.Symbol, Fraction]],
 ) -> tuple[Fraction, ...]:
-    """Those of the file, else some between and beyond the bounds at the samples, on the domain or not."""
+    """The points of the file, else some between and beyond the bounds at the samples, on the domain or not."""
     if table.points is not None:
         return tuple(sample_number(point, "quadrature.points") for point in table.points)
     found = list(_POINTS)

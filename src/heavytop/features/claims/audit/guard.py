@@ -40,7 +40,7 @@ class AuditEnded(HeavyTopError):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What the child says: a report, or (cause, remedy) of an error, or that its memory or stack was used up."""
+    """The answer of the child: a report, or (cause, remedy) of an error, or that its memory or stack was used up."""
 
     report: Audit | None = None
     error: tuple[str, str] | None = None

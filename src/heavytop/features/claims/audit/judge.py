@@ -38,7 +38,7 @@ ABOUT = {
     "relation": "an invariant relation",
     "value": "numbers of a motion",
 }
-"""What a claim of each kind says that its formulas are."""
+"""The subject of the formulas of each kind of claim."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
 """Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
@@ -340,5 +340,5 @@ class Assuming(Auditable, Protocol):
         ...
 
     def assuming(self, bound: str) -> Auditable:
-        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        """The claim with one assumption more; raises InputError where a sample breaks it."""
         ...

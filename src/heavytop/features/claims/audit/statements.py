@@ -79,12 +79,12 @@ class ClaimedMotion:
 
     @property
     def formulas(self) -> Formulas:
-        """What the equations in Ω and γ rest on."""
+        """The formulas that the equations in Ω and γ rest on."""
         return Formulas((*self.state, *self.clock), self.needs)
 
     @property
     def angle_formulas(self) -> Formulas:
-        """What the equations in the angles rest on."""
+        """The formulas that the equations in the angles rest on."""
         return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
 
 

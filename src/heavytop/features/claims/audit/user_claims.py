@@ -217,7 +217,7 @@ class _Search:
         self._steps = 0
 
     def states(self, equations: Sequence[sympy.Expr]) -> Iterator[dict[sympy.Symbol, Fraction]]:
-        """What is found, up to a number."""
+        """The states found, up to a number."""
         yield from islice(self._solve([sympy.expand(equation) for equation in equations], {}, 0), _MOST_FOUND)
 
     def _solve(
@@ -357,7 +357,7 @@ class UserIntegral(FileClaim):
 
     @property
     def _zero(self) -> tuple[Formula, ...]:
-        """What is 0 where the claim is made."""
+        """The formulas that are 0 where the claim is made."""
         return (*self.where, self.value) if self.kind == "relation" else self.where
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
@@ -407,7 +407,7 @@ class UserIntegral(FileClaim):
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
-        """What has to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
+        """Expressions to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
         if self.kind != "relation" or value.is_polynomial(*STATE):
             return (value,)
         return conditions_for_zero(value) or (value,)

@@ -200,7 +200,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a ball says of a number.
+    """The judgement of a ball on a number.
 
     holds: None where it is too wide.  right: digits that are proven to be right.  decided: whether a narrower ball
     would say no more.  middle, wide: of the ball.  off: by how much the number is off, as an interval.
@@ -337,7 +337,7 @@ def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVe
 
 
 def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Judgement]:
-    """What the balls say; of a quaternion with the sign that the numbers have, as q and -q are one attitude."""
+    """The judgements of balls; of a quaternion with the sign that the numbers have, as q and -q are one attitude."""
     same = [judge_figure(figure, known[figure.component - 1]) for figure in group]
     if group[0].quantity != "quaternion":
         return same

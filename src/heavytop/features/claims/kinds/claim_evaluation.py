@@ -72,11 +72,11 @@ class ClaimEvaluation(Kind):
     place = 90
 
     def cost(self, task: Task) -> float:
-        """The same for all."""
+        """Seconds, equal for all rows."""
         return _SECONDS
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of one form.  Raises OutOfReach where the formulas cannot be evaluated exactly."""
+        """The row of one form.  Raises OutOfReach where the formulas cannot be evaluated exactly."""
         claim, precision, form = claim_of(task.given), task.precision, task.key.subject.form
         times = [time / claim.solves.rate for time in task.times]
         errors = [errors_of.evaluation_error(claim, time, precision, form) for time in times]

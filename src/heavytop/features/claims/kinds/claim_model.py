@@ -245,11 +245,11 @@ class ClaimModel(Kind):
     place = 32
 
     def cost(self, task: Task) -> float:
-        """The same for all."""
+        """Seconds, equal for all rows."""
         return _SECONDS
 
     def measure(self, task: Task, saved: Saved) -> Row:
-        """Of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
+        """The row of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
         claim, branch = claim_of(task.given), cast(Branch, task.key.subject.branch)
         truth, against = true_motion(claim, task.times)
         errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}

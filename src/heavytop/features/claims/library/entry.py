@@ -50,7 +50,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What an entry says of its claim.
+    """The keys of an entry about its claim.
 
     id: never given to another.  read: what of the source was read.  expects: the verdict that its audit has to have.
     note: what a reader should learn.  corrects: the entries that this one is the right form of.

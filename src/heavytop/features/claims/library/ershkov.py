@@ -55,7 +55,7 @@ class Constants(NamedTuple, Generic[Real]):
 
 
 class Values(NamedTuple, Generic[Real]):
-    """What the partial case claims at one time."""
+    """The claims of the partial case at one time."""
 
     omega: tuple[Real, Real, Real]
     gamma: tuple[Real, Real, Real]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy
 
@@ -72,16 +72,44 @@ SOURCE = "S. V. Ershkov, On the invariant motions of rigid body rotation over th
 Formula = Callable[..., Any]
 
 
-def _of_the_paper(asked: System | None) -> System:
-    found = HEAVY_TOP if asked is None else asked
-    if found not in SYSTEMS:
-        names = " or ".join(each.name for each in SYSTEMS)
-        raise InputError(f"The paper says nothing about {found.name}.", f"Use {names}.")
-    return found
+class _PaperClaim:
+    """A claim of the paper; places: its branches and where each is claimed, the smooth one first."""
+
+    __slots__ = ()
+    places: ClassVar[tuple[tuple[str, Domain], ...]]
+
+    @property
+    def motion(self: Any) -> ClaimedMotion:
+        """The smooth branch, which follows the flow."""
+        motion: ClaimedMotion = self._motion(*self.places[0])
+        return motion
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
+        about = HEAVY_TOP if asked is None else asked
+        if about not in SYSTEMS:
+            names = " or ".join(system.name for system in SYSTEMS)
+            raise InputError(f"The paper says nothing about {about.name}.", f"Use {names}.")
+        return about
+
+    def statements(self: Any, system: System) -> list[Statement]:
+        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
+        motions = [self._motion(branch, domain) for branch, domain in self.places]
+        about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
+        return [*about, *self._steps()]
+
+    def explain(
+        self: Any, _about: System, _rows: Sequence[StatementVerdict]
+    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
+        """Why det(γ, M, P r) = 0 makes the claim one about the gyrostat."""
+        return explain(self.motion, self.parameters, self.setting)
+
+    def _branch_parts(self: Any) -> dict[str, tuple[tuple[str, sympy.Expr], ...]]:
+        return {name: _parts(self._motion(name, where)) for name, where in (("smooth", _ANY), ("printed", _RISING))}
 
 
 @dataclass(frozen=True, slots=True)
-class PartialClaim:
+class PartialClaim(_PaperClaim):
     """(4.1)-(4.6), (6.1)-(6.2), one field a formula."""
 
     u: Formula = ershkov.u
@@ -105,7 +133,7 @@ class PartialClaim:
             positive=(_ALPHA, _I3, _I1, _P),
             greater=((_I1, _I3),),
             samples=tuple(_sample((_I1, _I3, _ALPHA, _P), values) for values in samples),
-            parts={name: _parts(self._motion(name, where)) for name, where in (("smooth", _ANY), ("printed", _RISING))},
+            parts=self._branch_parts(),
             constants=(("k/2", _ALPHA * (_I1 - _I3) / (2 * _I3)),),
         )
 
@@ -115,26 +143,6 @@ class PartialClaim:
         c = _partial_constants()
         b = c.c1 / _P * (_I1 - _I3) / _I1
         return Parameters((_I1, _I1, _I3), (sympy.Integer(0), _P * b, sympy.Integer(0)), _P * b / c.c0)
-
-    @property
-    def motion(self) -> ClaimedMotion:
-        """The smooth branch."""
-        return self._motion("smooth", ALL)
-
-    def about(self, asked: System | None) -> System:
-        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
-        return _of_the_paper(asked)
-
-    def statements(self, system: System) -> list[Statement]:
-        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
-        motions = [self._motion(branch, domain) for branch, domain in _PLACES]
-        about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
-        return [*about, *self._steps()]
-
-    def explain(
-        self, _about: System, _rows: Sequence[StatementVerdict]
-    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        return explain(self.motion, self.parameters, self.setting)
 
     def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:
         c = _partial_constants()
@@ -222,7 +230,7 @@ class PartialClaim:
         c = _partial_constants()
         line = c.alpha * _T * (_I1 + _I3) / (2 * _I3)
         readings = {"smooth": "u of (4.2)", "printed": "u = sqrt(Omega2)"}
-        for branch, domain in _PLACES:
+        for branch, domain in self.places:
             u = self.u(c.a, c.alpha, _T, SYMBOLIC)
             if branch == "printed":
                 u = sympy.sqrt(u * u)
@@ -239,7 +247,7 @@ class PartialClaim:
 
 
 @dataclass(frozen=True, slots=True)
-class GeneralClaim:
+class GeneralClaim(_PaperClaim):
     """(2.1)-(2.4), (3.3), (3.4), one field a formula."""
 
     gamma: Formula = ershkov_general.gamma
@@ -263,7 +271,7 @@ class GeneralClaim:
             positive=(_I3, _I2, _I1, _P, _C0),
             greater=((_I1, _I3),),
             samples=tuple(_sample(symbols, (*values, *pair)) for values in data for pair in signs),
-            parts={name: _parts(self._motion(name, where)) for name, where in (("smooth", _ANY), ("printed", _RISING))},
+            parts=self._branch_parts(),
             constants=(("P*b/C0", _P * _B / _C0),),
             nonzero=(_S1, _S3),
         )
@@ -272,27 +280,6 @@ class GeneralClaim:
     def parameters(self) -> Parameters:
         """I, P r, λ = P b/C0."""
         return Parameters((_I1, _I2, _I3), (sympy.Integer(0), _P * _B, sympy.Integer(0)), _P * _B / _C0)
-
-    @property
-    def motion(self) -> ClaimedMotion:
-        """The branch of the roots that follows the flow."""
-        return self._motion("smooth", _ANY)
-
-    def about(self, asked: System | None) -> System:
-        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
-        return _of_the_paper(asked)
-
-    def statements(self, system: System) -> list[Statement]:
-        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
-        places = (("smooth", _ANY), ("printed", _FALLING), ("printed", _RISING))
-        motions = [self._motion(branch, domain) for branch, domain in places]
-        about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
-        return [*about, *self._steps()]
-
-    def explain(
-        self, _about: System, _rows: Sequence[StatementVerdict]
-    ) -> tuple[list[ExplanationStep], tuple[str, ...]]:
-        return explain(self.motion, self.parameters, self.setting)
 
     def _motion(self, branch: str, domain: Domain) -> ClaimedMotion:
         c = _GENERAL
@@ -357,7 +344,7 @@ def _rate(value: sympy.Expr) -> sympy.Expr:
 
 
 def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
-    """What an equation between angles rests on: that γ of the angles is continuous."""
+    """The formulas that an equation between angles rests on: that γ of the angles is continuous."""
     return Formulas(gamma, frozenset(), (), conditions_of(angles), _POLE)
 
 
@@ -383,7 +370,7 @@ _I1, _I2, _I3, _P, _C0, _ALPHA = sympy.symbols("I1 I2 I3 P C0 alpha", positive=T
 _SIGN1, _SIGN3 = sympy.sign(_S1), sympy.sign(_S3)
 _GENERAL = GeneralConstants((_I1, _I2, _I3), _P, _B, _C0, _C1)
 _POLE = "t ≠ 0 (pole of the angles)"
-_PLACES = (("smooth", ALL), ("printed", BEFORE), ("printed", AFTER))
+PartialClaim.places = (("smooth", ALL), ("printed", BEFORE), ("printed", AFTER))
 _HERE = (Fraction(1, 5), Fraction(1, 3))
 _BOTH_HERE = (*_HERE, Fraction(-1, 5))
 _REAL = (ershkov_general.f1(_GENERAL, _W), ershkov_general.f2(_GENERAL, _W))
@@ -392,3 +379,4 @@ _ANY_ROOT = Domain("all", 0, _BOTH_HERE, "positive roots, every Omega2 with f1, 
 _MINIMUM = "time is counted from a minimum of Omega2"
 _FALLING = Domain("t<=0", 1, _HERE, f"positive roots, Omega2' < 0, Omega2 > 0: {_MINIMUM}", _REAL)
 _RISING = Domain("t>0", 1, _HERE, f"positive roots, Omega2' > 0, Omega2 > 0: {_MINIMUM}", _REAL)
+GeneralClaim.places = (("smooth", _ANY), ("printed", _FALLING), ("printed", _RISING))
