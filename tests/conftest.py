@@ -1,13 +1,20 @@
-"""Unloads the integrators that a test loaded from its own folder."""
+"""Unloads the integrators that a test loaded from its own folder; skips what needs an extra that is not installed."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
+from heavytop.errors import MissingExtra
+from heavytop.extras import EXTRAS, extra_of, has_extra, missing
 from support.in_process import forget_integrators
+
+MISSING = [name for name in EXTRAS if not has_extra(name)]
+"""Extras that are not installed."""
 
 
 @pytest.fixture(autouse=True)
@@ -16,3 +23,54 @@ def integrators_of_a_test_end_with_it() -> Iterator[None]:
     loaded = set(sys.modules)
     yield
     forget_integrators(loaded)
+
+
+def _needed(error: BaseException | None) -> str:
+    """The extra for want of which an error arose, also in a command that a test ran; "" for any other error."""
+    if isinstance(error, ModuleNotFoundError):
+        module = (error.name or "").partition(".")[0]
+        return extra_of(module) if any(module in EXTRAS[name] for name in MISSING) else ""
+    said = re.search(r"needs the extra (\w+):", str(error))
+    return said[1] if said and said[1] in MISSING else ""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Any:
+    return (yield from _skipping())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Any:
+    return (yield from _skipping())
+
+
+def _skipping() -> Any:
+    """Runs what is wrapped; a test that fails for want of an extra is skipped, and says which."""
+    try:
+        return (yield)
+    except Exception as error:
+        if not (name := _needed(error)):
+            raise
+        pytest.skip(str(missing(name, "the test")))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makemodule(module_path: Any, parent: Any) -> Any:
+    module = yield
+    usual = module._getobj
+
+    def imported() -> Any:
+        try:
+            return usual()
+        except (module.CollectError, MissingExtra) as error:
+            if name := next((name for name in MISSING if re.search(_PATTERNS[name], str(error))), ""):
+                pytest.skip(str(missing(name, "the file")), allow_module_level=True)
+            raise
+
+    module._getobj = imported
+    return module
+
+
+_PATTERNS = {
+    name: rf"needs the extra {name}:|No module named '(?:{'|'.join(modules)})['.]" for name, modules in EXTRAS.items()
+}

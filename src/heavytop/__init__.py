@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from heavytop.features.events.api import events, poincare
     from heavytop.features.events.functions import Events, ReferenceEvents, Section
     from heavytop.features.hunt.api import Hunt, hunt
+    from heavytop.features.limits.between import between_samples
+    from heavytop.features.limits.digits_end import digits_end
+    from heavytop.features.limits.power import power
     from heavytop.features.score.api import Score, Summary, drift, score
     from heavytop.features.survey.api import read_survey
     from heavytop.integrate.trajectory import Outcome, Trajectory
@@ -96,8 +99,10 @@ __all__ = [
     "__version__",
     "audit",
     "available",
+    "between_samples",
     "claim_library",
     "compare",
+    "digits_end",
     "drift",
     "ensemble",
     "events",
@@ -106,6 +111,7 @@ __all__ = [
     "hunt",
     "plot",
     "poincare",
+    "power",
     "propagate",
     "read_report",
     "read_survey",

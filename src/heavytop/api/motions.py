@@ -17,6 +17,7 @@ from heavytop.exact.bodies import Finder
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
+from heavytop.integrate.dense import Dense, DenseOutput, dense
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.registry import Setup, described, named, require_reach, seconds_of
@@ -175,12 +176,26 @@ def _prepared(
         found: Trajectory = run(setup.top, setup.start, check_times(times), form, system=setup.system)
         if beside:
             found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
-        return setup.given(found)
+        return setup.given(found).with_dense(_dense(setup, which, found.time_reached, options))
 
     return call
 
 
 _kept = cache_last_call(_prepared)
+
+
+def _dense(
+    setup: Setup, which: str | Any, until: Fraction, options: Mapping[str, Any]
+) -> Callable[[Fraction], Sequence[Any]]:
+    """(Ω, γ) of the run at any time, in the axes given."""
+    limits = options.get("tolerance"), options.get("step_limit")
+
+    def run() -> Dense:
+        problem = Problem.of(setup.top, setup.start, setup.precision, setup.system, options.get("xi"))
+        return dense(which, problem, until, *limits)
+
+    output = DenseOutput(run)
+    return lambda time: setup.in_body_axes(output(time))
 
 
 def motion(

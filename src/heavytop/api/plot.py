@@ -20,7 +20,9 @@ from heavytop.api.plot_data import (
     Crossings,
     Motion,
     PoincareSection,
+    PowerCurves,
     Samples,
+    SpacedErrors,
     axes_of,
     compared,
     every,
@@ -35,8 +37,9 @@ from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
 from heavytop.report.document.svg import COLOURS, decades, new_figure
-from heavytop.top.equations import NAMES, Parameters, component
-from heavytop.top.heavy_top import HeavyTop
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, component
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.stability import stability as steady_motion
 
 if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter, Animation, FuncAnimation
@@ -44,7 +47,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from mpl_toolkits.mplot3d import Axes3D
 
-__all__ = ["animate", "digits", "drift", "error", "herpolhode", "phase", "poincare", "polhode", "sphere"]
+__all__ = [
+    "animate",
+    "between",
+    "digits",
+    "drift",
+    "error",
+    "herpolhode",
+    "phase",
+    "poincare",
+    "polhode",
+    "power",
+    "sphere",
+    "stability",
+]
 
 _GREY = "#888888"
 _LIGHT = "#b8c4d0"
@@ -530,3 +546,77 @@ def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]
         axes.set_xlabel("|t| (time units)")
     decades(axes.yaxis)
     axes.legend(frameon=False, fontsize="small")
+
+
+def stability(top: HeavyTop, axes: Axes3D | None = None, *, speed: float = 1.0) -> Axes3D:
+    """Rotation about each principal axis on the unit sphere of the body: stable or unstable, with the rate.
+
+    Arguments:
+        top: its principal moments; the axis is vertical where the top has a weight.
+        axes: three-dimensional axes, or None.
+        speed: Ω, 1/time unit.
+
+    Returns:
+        The axes; a grey point where the rotation is not steady.
+
+    Raises:
+        InputError: for what is no top.
+    """
+    body, drawn = arguments.is_a(top, HeavyTop, "top"), _solid(axes)
+    system = HEAVY_GYROSTAT if body.rotor else HEAVY_TOP
+    _globe(drawn)
+    for axis in range(3):
+        for sign in (1, -1):
+            place = [sign * (axis == k) for k in range(3)]
+            start = State([exact(speed) * value for value in place], place)
+            steady = steady_motion(system, system.parameters(body, start), start.flat)
+            unstable = steady is not None and steady.verdict == "unstable"
+            colour = _GREY if steady is None else COLOURS[1] if unstable else COLOURS[0]
+            drawn.plot(*([value] for value in place), "o", color=colour)
+            words = "not steady" if steady is None else steady.verdict + (f" {steady.rate:.3g}" if unstable else "")
+            drawn.text(*(1.2 * value for value in place), f"{'−' if sign < 0 else ''}{axis + 1}: {words}", fontsize=7)
+    drawn.set(xlabel="axis 1", ylabel="axis 2", zlabel="axis 3")
+    drawn.set_title("rotations about principal axes", fontsize="medium")
+    return drawn
+
+
+def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
+    """How far each planted fault is from the true motion until each time, beside the tolerance of the test.
+
+    Arguments:
+        test: what :func:`heavytop.power` returns.
+        axes: of matplotlib, or None.
+
+    Returns:
+        The axes, logarithmic upwards.
+    """
+    drawn = _flat(axes)
+    times = np.array([float(time) for time in test.times])
+    for place, fault in enumerate(test.faults):
+        dashes = _DASHES[place // len(COLOURS) % len(_DASHES)]
+        largest = np.maximum.accumulate(np.maximum(fault.errors, 1e-17))
+        drawn.plot(times, largest, dashes, color=COLOURS[place % len(COLOURS)], lw=_WIDTH, label=fault.name)
+    drawn.axhline(test.tolerance, color=_GREY, lw=_WIDTH, ls="--")
+    drawn.set(xlabel=_TIME, ylabel="largest error so far", yscale="log")
+    drawn.legend(fontsize="x-small")
+    return drawn
+
+
+def between(samples: Sequence[SpacedErrors], axes: Axes | None = None) -> Axes:
+    """The error of each interpolation over the time between samples.
+
+    Arguments:
+        samples: what :func:`heavytop.between_samples` returns, of several spacings.
+        axes: of matplotlib, or None.
+
+    Returns:
+        The axes, both logarithmic.
+    """
+    drawn, rows = _flat(axes), sorted(samples, key=lambda row: row.spacing)
+    for colour, name in zip(COLOURS, rows[0].errors if rows else (), strict=False):
+        points = [(float(row.spacing), error) for row in rows if (error := row.errors[name])]
+        if points:
+            drawn.plot(*zip(*points, strict=True), "o-", color=colour, lw=_WIDTH, ms=3, label=name)
+    drawn.set(xlabel="time between samples", ylabel="largest error", xscale="log", yscale="log")
+    drawn.legend(fontsize="x-small")
+    return drawn

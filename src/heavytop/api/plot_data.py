@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Protocol, runtime_checkable
@@ -45,6 +45,35 @@ class PoincareSection(Protocol):
 
     @property
     def events(self) -> Sequence[Crossings]: ...
+
+
+class FaultCurve(Protocol):
+    """The errors of one planted fault."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def errors(self) -> NDArray[np.float64]: ...
+
+
+class PowerCurves(Protocol):
+    """A test with its planted faults: :func:`heavytop.power` returns such."""
+
+    @property
+    def times(self) -> Sequence[Fraction]: ...
+    @property
+    def tolerance(self) -> float: ...
+    @property
+    def faults(self) -> Sequence[FaultCurve]: ...
+
+
+class SpacedErrors(Protocol):
+    """Errors between samples: :func:`heavytop.between_samples` returns such."""
+
+    @property
+    def spacing(self) -> Fraction: ...
+    @property
+    def errors(self) -> Mapping[str, float | None]: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,6 +110,10 @@ Mass = Annotated[str | None, typer.Option(help="In place of --weight: the mass, 
 Gravity = Annotated[str | None, typer.Option(help="With --mass: the acceleration of gravity, such as 9.81, or 0.")]
 About = Annotated[str | None, typer.Option(help="With --mass: what --inertia is about, 'pivot' or 'centre of mass'.")]
 Centre = Annotated[str | None, typer.Option(help="Centre of mass a,b,c.")]
+BodyFile = Annotated[
+    str | None, typer.Option("--file", metavar="FILE", help="Body of a URDF, MJCF, SDF, USD or TOML file, free axes.")
+]
+Link = Annotated[str | None, typer.Option(help="Link or body of --file, where it has several.")]
 CaseName = Annotated[str | None, typer.Option("--case", help="A case of `heavytop list` in place of body and start.")]
 Omega = Annotated[str | None, typer.Option(help="Angular velocity x,y,z at t = 0, in body axes.")]
 OmegaSpace = Annotated[str | None, typer.Option(help="The same in space axes, with an attitude.")]
@@ -159,6 +163,8 @@ class _Options(NamedTuple):
     matrix: Matrix = None
     axis_angle: AxisAngle = None
     rotor: Rotor = None
+    file: BodyFile = None
+    link: Link = None
     case: CaseName = None
     system: SystemName = None
     normalize: Normalize = False
@@ -426,7 +432,7 @@ def _motion(
 
 
 def _value(key: str, text: str | None) -> Any:
-    whole = ("weight", "mass", "gravity", "about", "euler", "axis_angle")
+    whole = ("weight", "mass", "gravity", "about", "euler", "axis_angle", "file", "link")
     return text if text is None or key in whole else numbers(text)
 
 

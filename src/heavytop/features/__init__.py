@@ -23,6 +23,7 @@ NAMES = (
     "events",
     "derivatives",
     "body",
+    "limits",
     "engines",
 )
 """In the order of the summary of a run."""

@@ -45,6 +45,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from scipy.spatial.transform import Rotation
 
     from heavytop.top.stability import Stability
 
@@ -361,6 +362,14 @@ class InSpace:
         """
         return self._in_double(output("quaternion"))
 
+    def rotations(self) -> Rotation:
+        """The attitudes as one ``scipy.spatial.transform.Rotation`` of n rotations, body to space."""
+        try:
+            from scipy.spatial.transform import Rotation
+        except ImportError:
+            raise InputError("Rotations need SciPy.", "Install it with: pip install scipy") from None
+        return Rotation.from_quat(self.quaternions()[:, [1, 2, 3, 0]])
+
     def matrices(self) -> NDArray[np.float64]:
         """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ."""
         return self._in_double(output("matrix"))
@@ -422,6 +431,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
     problem, the principal axes.  principal: then the run as it was computed.
     angle_texts: φ, θ, ψ, followed from t = 0, as decimal text, shape (n, 3), where they were asked for.
+    dense: (Ω, γ) at any exact time up to ``time_reached``, native numbers in the axes of ``states``.
     joint_violation: how far an engine of bodies let the fixed point move, where it says so.
     """
 
@@ -440,6 +450,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     frame: Frame | None = None
     principal: Trajectory | None = None
     angle_texts: Sequence[Sequence[str]] | None = None
+    dense: Callable[[Fraction], Sequence[Any]] | None = None
     joint_violation: float | None = None
 
     def __post_init__(self) -> None:
@@ -493,6 +504,25 @@ class Trajectory(LazyStates, Tabular, InSpace):
 
     def _in_double(self, what: Output) -> NDArray[np.float64]:
         return in_double(self, what)
+
+    def __call__(self, t: Any) -> Any:
+        """(Ω, γ) at a time between samples too, native numbers: shape (6,), or (6, n) of n times, as of an OdeSolution.
+
+        By the polynomials of the integrator's own steps, which are taken again at the first call.
+        Raises InputError for a time outside of the run, Unsupported for an integrator that hands over no polynomials.
+        """
+        import numpy
+
+        if self.dense is None:
+            raise InputError("This run has no dense output.", "Take that of heavytop.propagate.")
+        several = numpy.ndim(t) > 0
+        found = numpy.array([self.dense(exact(time)) for time in (t if several else [t])])
+        return found.reshape(-1, 6).T if several else found[0]
+
+    def with_dense(self, function: Callable[[Fraction], Sequence[Any]]) -> Trajectory:
+        """This run, once ``dense`` is that function."""
+        object.__setattr__(self, "dense", function)
+        return self
 
     def to_numpy(self) -> NDArray[np.float64]:
         """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""

@@ -43,6 +43,7 @@ from heavytop.precision import (
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import NDArray
+    from scipy.spatial.transform import Rotation
 
 Rows = Sequence[Sequence[Scalar]]
 Item = TypeVar("Item")
@@ -287,6 +288,14 @@ class Attitude:
         if not any(found):
             raise InputError("The axis is the zero vector, which has no direction.", "Give the axis of the rotation.")
         return cls("axis_angle", found, (Angle.read(angle),))
+
+    @classmethod
+    def rotation(cls, rotation: Rotation) -> Attitude:
+        """From one ``scipy.spatial.transform.Rotation``, body to space; raises InputError for several."""
+        if not getattr(rotation, "single", False):
+            raise InputError(f"{quoted(rotation)} is not a single Rotation.", "Give one of scipy.spatial.transform.")
+        x, y, z, w = rotation.as_quat().tolist()
+        return cls.quaternion(w, x, y, z, normalize=True)
 
     def __str__(self) -> str:
         """As on the command line."""

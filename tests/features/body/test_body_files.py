@@ -243,3 +243,20 @@ def test_the_command_that_it_prints_runs(tmp_path: Path) -> None:
     path.write_text(urdf(SIX))
     printed = heavytop("body", path).stdout.strip().splitlines()[-1].strip()
     assert heavytop(*shlex.split(printed)[1:]).returncode == 0
+
+
+def test_the_command_line_takes_a_body_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf(SIX))
+    start = ("--omega", "1,2,3", "--quaternion", "1,0,0,0", "--times", "1")
+    run = json.loads(heavytop("propagate", "--file", path, *start, "--json").stdout)
+    state = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+    assert run["states"] == ht.propagate(ht.Body.from_file(path), state, ["1"], attitude=False).texts()
+    known = json.loads(
+        heavytop("reference", "--file", path, "--gravity", "0", *start, "--digits", "20", "--json").stdout
+    )
+    assert known["method"].startswith("validated")
+    for extra, words in ((("--mass", "1"), "file and mass were given"), (("--link", "leg"), "has no link 'leg'")):
+        done = heavytop("propagate", "--file", path, *extra, *start)
+        assert done.returncode == 2
+        assert words in done.stderr

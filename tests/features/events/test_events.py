@@ -14,9 +14,9 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.features.events.dense import Dense, Piece
 from heavytop.features.events.functions import event_function
 from heavytop.features.events.located import locate
+from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.trajectory import Problem
 
 TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
@@ -378,7 +378,7 @@ def test_bad_input_is_named(changes, match) -> None:
 
 
 def test_what_is_out_of_reach_says_so() -> None:
-    with pytest.raises(OutOfReach, match="looked at for events"):
+    with pytest.raises(OutOfReach, match="kept or looked at"):
         ht.events(TOP, START, 10**12)
     with pytest.raises(OutOfReach, match="Computed ones reach further"):
         ht.events(TOP, START, 10**7, digits=20)

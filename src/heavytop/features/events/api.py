@@ -13,7 +13,6 @@ from heavytop.errors import InputError, OutOfReach, prefixed, quoted
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
-from heavytop.features.events.dense import dense
 from heavytop.features.events.functions import (
     PROVEN,
     EventFunction,
@@ -26,6 +25,7 @@ from heavytop.features.events.functions import (
 )
 from heavytop.features.events.located import locate
 from heavytop.features.events.proven import proven_events
+from heavytop.integrate.dense import dense
 from heavytop.integrate.registry import Setup, named
 from heavytop.measure.reference import DIGITS, Ball
 from heavytop.precision import DOUBLE, Precision, as_integer, exact, exact_text, physical

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_poly
 
 from heavytop.errors import InputError, quoted
-from heavytop.features.events.dense import Dense, Piece, refined, sign_after, sign_before, sign_changes
 from heavytop.features.events.functions import (
     POLYNOMIAL,
     SAMPLED,
@@ -27,6 +26,8 @@ from heavytop.features.events.functions import (
     in_body_axes,
     terms_of,
 )
+from heavytop.features.events.sign_changes import refined, sign_after, sign_before, sign_changes
+from heavytop.integrate.dense import Dense, Piece
 from heavytop.integrate.multiword.motions import native_state
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import Precision, Vector, number

@@ -17,8 +17,8 @@ from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
+from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
-from heavytop.features.score.trajectories import logs
 from heavytop.features.score.trajectories.observed import (
     LONGEST_NAME,
     AnyBody,
@@ -295,7 +295,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
     try:
         content = sys.stdin.buffer.read() if piped else read_whole(path)
-        text = logs.of_arrays(content, suffix) if (suffix := path.suffix.lower()) in _ARRAYS else _decoded(content)
+        text = _text_of(path, content)
         if logs.is_ephemeris(text):
             text = logs.of_ephemeris(text)
     except (OSError, UnicodeDecodeError) as error:
@@ -312,7 +312,14 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
 
 
 _ARRAYS = (".npy", ".npz", ".parquet")
-_SUFFIXES = (".json", ".csv", ".tsv", ".dat", ".txt", ".tum", ".aem", *_ARRAYS)
+_SUFFIXES = (".json", ".csv", ".tsv", ".dat", ".txt", ".tum", ".aem", *_ARRAYS, *bags.SUFFIXES)
+
+
+def _text_of(path: Path, content: bytes) -> str:
+    suffix = path.suffix.lower()
+    if suffix in bags.SUFFIXES:
+        return bags.of_bag(path)
+    return logs.of_arrays(content, suffix) if suffix in _ARRAYS else _decoded(content)
 
 
 def _decoded(content: bytes) -> str:

@@ -6,17 +6,17 @@ below what the integrator itself errs, and short enough that a step costs some 0
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import partial
-from itertools import pairwise
+from functools import cached_property, partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
+from flint import fmpq, fmpq_poly, fmpz_poly
 
-from heavytop.errors import OutOfReach, Unsupported
+from heavytop.errors import InputError, OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
 from heavytop.integrate.heyoka.engines import load
 from heavytop.integrate.heyoka.motions import Stepper
@@ -195,7 +195,8 @@ class OfHeyoka(Dense):
 
     def _steps(self) -> Iterator[Piece]:
         problem, bits = self.problem, self.problem.precision.bits
-        tool = compile_heyoka(problem.system, problem.precision, tolerance=self.tolerance)
+        carried = problem.xi is not None
+        tool = compile_heyoka(problem.system, problem.precision, attitude=carried, tolerance=self.tolerance)
         self.flags, self.seconds["compile"] = tool.flags, tool.seconds
         with tool.borrowed() as engine:
             load(engine, problem)
@@ -220,7 +221,7 @@ class OfWords(Dense):
     def _steps(self) -> Iterator[Piece]:
         problem, bits = self.problem, self.problem.precision.bits
         arithmetic, scaled = choose(problem, self.tolerance)
-        self.seconds["compile"] = compile_words(arithmetic, problem.system, False)
+        self.seconds["compile"] = compile_words(arithmetic, problem.system, problem.xi is not None)
         self.flags = arithmetic.flags
         if scaled.rest:
             return
@@ -261,166 +262,42 @@ def dense(
     if made is None:
         name = said(name_of(integrator))
         raise Unsupported(
-            f"The integrator {name} hands over no polynomial of its steps, so it locates no events.",
-            f"Events are located by {' and '.join(_DENSE)}.",
+            f"The integrator {name} hands over no polynomial of its steps, for events or states between samples.",
+            f"Use {' or '.join(_DENSE)}.",
         )
     end = exact(number(until, problem.precision))
     steps = expected_steps(problem, end)
     if steps > MOST_STEPS and not (step_limit is not None and step_limit <= MOST_STEPS):
         raise OutOfReach(
-            f"A run to t = {decimal_text(end, 6)} takes some {steps:.0e} steps, and each is looked at for events.",
+            f"A run to t = {decimal_text(end, 6)} takes some {steps:.0e} steps, and each is kept or looked at.",
             f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or give a step limit.",
         )
     return made(problem, end, tolerance, step_limit)
 
 
-# Changes of sign of a polynomial with integer coefficients, isolated and refined without rounding.
-#
-# Isolation is Vincent's theorem with bisection (Collins and Akritas, 1976): on (0, 1) the number of roots is at most
-# the number v of sign changes among the coefficients of (1 + x)^n g(1/(1 + x)), and equal to it for v = 0 and v = 1.
-# An interval that is shorter than asked for is not divided any more: the signs at its ends tell whether the function
-# changes sign in it, so roots that coincide in the format count as one change, or as none where they are
-# even in number.
-#
-# Refinement is Abbott's quadratic interval refinement (2014): a secant says where among N parts the root lies, and
-# exact signs prove it.
+class DenseOutput:
+    """A finished run as a function of the time; its steps are taken again, and kept, when it is first asked.
 
-
-_ONE_MORE = fmpz_poly([1, 1])
-_DEEPEST = 400
-"""Bisections of an interval at most: roots that lie 2^-400 of a step apart are not distinguished in any format."""
-_MOST_PARTS_BITS = 4096
-
-
-@dataclass(frozen=True, slots=True)
-class SignChange:
-    """A change of sign between ``low`` and ``high``, equal where it is known exactly; rising: from − to +."""
-
-    low: fmpq
-    high: fmpq
-    rising: bool
-
-
-def sign_after(polynomial: fmpz_poly) -> int:
-    """The sign at a small x > 0: −1, 0 for the polynomial 0, or 1."""
-    return next((1 if c > 0 else -1 for c in polynomial.coeffs() if c), 0)
-
-
-def sign_before(polynomial: fmpz_poly, end: fmpq | None = None) -> int:
-    """The sign just before x = ``end``, None for 1."""
-    total = polynomial(fmpq(1) if end is None else end)
-    if total:
-        return 1 if total > 0 else -1
-    moved = (polynomial if end is None else _scaled(polynomial, end))(_ONE_MORE)
-    return next(((1 if c > 0 else -1) * (-1) ** n for n, c in enumerate(moved.coeffs()) if c), 0)
-
-
-def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[SignChange]:
-    """Every change of sign of a polynomial in 0 < x < ``end`` ≤ 1, in order.
-
-    resolution: intervals of length 2^-resolution ``end`` are not divided any more.
+    make: the run up to its last time.
     """
-    if end > 0 and not _bounded_away(polynomial):
-        yield from _isolated(_scaled(polynomial, end), 0, 0, end, min(resolution, _DEEPEST))
 
+    def __init__(self, make: Callable[[], Dense]) -> None:
+        self._make = make
 
-def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
-    """The changes in the part ``place`` of the 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
-    part = _without_root_at_zero(part)
-    variations = _variations(part)
-    if variations == 0:
-        return
-    if variations == 1 or depth >= resolution:
-        before, after = sign_after(part), sign_before(part)
-        if before != after:
-            yield SignChange(span * fmpq(place, 1 << depth), span * fmpq(place + 1, 1 << depth), after > 0)
-        return
-    left = _halved(part)
-    right = left(_ONE_MORE)
-    yield from _isolated(left, 2 * place, depth + 1, span, resolution)
-    if right[0] == 0 and sign_before(left) != (after := sign_after(right)):
-        middle = span * fmpq(2 * place + 1, 2 << depth)
-        yield SignChange(middle, middle, after > 0)
-    yield from _isolated(right, 2 * place + 1, depth + 1, span, resolution)
+    @cached_property
+    def _taken(self) -> tuple[Dense, list[Piece]]:
+        run = self._make()
+        return run, [*run.pieces()]
 
-
-def _bounded_away(polynomial: fmpz_poly) -> bool:
-    """Whether the constant coefficient alone keeps the polynomial from 0 on 0 ≤ x ≤ 1."""
-    sizes = [abs(int(c)) for c in polynomial.coeffs()]
-    return bool(sizes) and sizes[0] > sum(sizes[1:])
-
-
-def _scaled(polynomial: fmpz_poly, end: fmpq) -> fmpz_poly:
-    """A positive multiple of g(end x): that on (0, 1) is g on (0, end)."""
-    if end == 1:
-        return polynomial
-    p, q, found = int(end.p), int(end.q), [int(c) for c in polynomial.coeffs()]
-    power = 1
-    for n in range(len(found)):
-        found[n] *= power
-        power *= p
-    power = 1
-    for n in range(len(found) - 1, -1, -1):
-        found[n] *= power
-        power *= q
-    return fmpz_poly(found)
-
-
-def _without_root_at_zero(polynomial: fmpz_poly) -> fmpz_poly:
-    count = next((n for n, c in enumerate(polynomial.coeffs()) if c), 0)
-    return fmpz_poly(polynomial.coeffs()[count:]) if count else polynomial
-
-
-def _halved(polynomial: fmpz_poly) -> fmpz_poly:
-    """2^n g(x/2)."""
-    coefficients = polynomial.coeffs()
-    last = len(coefficients) - 1
-    return fmpz_poly([c << (last - n) for n, c in enumerate(coefficients)])
-
-
-def _variations(polynomial: fmpz_poly) -> int:
-    """Descartes' bound of the number of roots in (0, 1)."""
-    if not _alternates(polynomial.coeffs()):
-        return 0
-    return _alternates(fmpz_poly(polynomial.coeffs()[::-1])(_ONE_MORE).coeffs())
-
-
-def _alternates(coefficients: Sequence[fmpz]) -> int:
-    signs = [c > 0 for c in coefficients if c]
-    return sum(a != b for a, b in pairwise(signs))
-
-
-def refined(polynomial: fmpz_poly, change: SignChange, bits: int) -> fmpq:
-    """A point within 2^-bits of the change, as a dyadic part of its interval or exactly."""
-    low, high = change.low, change.high
-    before = -1 if change.rising else 1
-    goal, parts_bits = fmpq(1, 1 << bits), 2
-    at_low = polynomial(low)
-    while high - low > goal:
-        width, at_high = high - low, polynomial(high)
-        unit = width / (1 << parts_bits)
-        if parts_bits == 1 or at_low * at_high >= 0:
-            # bisection: also where an end of the interval is a root of its own, which is not the one that is meant
-            middle = low + width / 2
-            value = polynomial(middle)
-            if value == 0:
-                return middle
-            low, high, at_low = (middle, high, value) if (value < 0) == (before < 0) else (low, middle, at_low)
-            parts_bits = 2
-            continue
-        place = (at_low / (at_low - at_high) * (1 << parts_bits) + fmpq(1, 2)).floor()
-        x = low + unit * place
-        value = polynomial(x)
-        if value == 0:
-            return x
-        onward = (value < 0) == (before < 0)
-        other = x + unit if onward else x - unit
-        beyond = polynomial(other)
-        if beyond == 0:
-            return other
-        if low <= other <= high and ((beyond < 0) == (before < 0)) != onward:
-            low, high, at_low = (x, other, value) if onward else (other, x, beyond)
-            parts_bits = min(2 * parts_bits, _MOST_PARTS_BITS)
-        else:
-            parts_bits = max(1, parts_bits // 2)
-    return (low + high) / 2
+    def __call__(self, time: Fraction) -> list[Any]:
+        """(Ω, γ), numbers of the format; raises InputError for a time outside of the run."""
+        run, pieces = self._taken
+        sign, end = (1 if run.until > 0 else -1), run.reached
+        if not 0 <= sign * time <= abs(end):
+            raise InputError(f"t = {decimal_text(time, 6)} is not in the run.", f"Give 0 to {decimal_text(end, 6)}.")
+        problem = run.problem
+        if not time or not pieces:
+            return [*problem.native(problem.start.flat)]
+        piece = pieces[max(0, bisect_left(pieces, sign * time, key=lambda piece: sign * piece.began) - 1)]
+        part = (time - piece.began) / piece.length
+        return [number(value, problem.precision) for value in piece.state(fmpq(part.numerator, part.denominator))]

@@ -1,0 +1,60 @@
+"""`heavytop power`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, cases, command, numbers, print_json
+from heavytop.cli.output import counted
+from heavytop.errors import ExitCode, InputError
+
+_SECONDS = 1.0
+"""Expected of a test with its faults."""
+
+
+@command
+def power(
+    until: Annotated[str, typer.Option(help="Where the test ends.")],
+    tolerance: Annotated[str, typer.Option(help="Of the test: the largest error that passes, relative above 1.")],
+    case: Annotated[str | None, typer.Option(help="A case of `heavytop list`.", autocompletion=cases)] = None,
+    file: Annotated[str | None, typer.Option(help="In its place the file of a robot, with --omega.")] = None,
+    link: Annotated[str | None, typer.Option(help="Link of the file.")] = None,
+    gravity: Annotated[str, typer.Option(help="With --file: the acceleration of gravity.")] = "9.81",
+    omega: Annotated[str | None, typer.Option(help="With --file: angular velocity x,y,z at t = 0.")] = None,
+    quaternion: Annotated[str, typer.Option(help="With --file: attitude w,x,y,z at t = 0.")] = "1,0,0,0",
+    step: Annotated[str | None, typer.Option(help="Between samples; a hundredth of --until without it.")] = None,
+    planted: Annotated[str, typer.Option(help="Names of faults, or all.")] = "all",
+    integrator: Annotated[str, typer.Option(help="Of a right run.")] = "heyoka",
+    control: Annotated[str | None, typer.Option(help="Tolerance or step of the right run.")] = None,
+    json: Json = False,
+) -> int:
+    """Say how long a regression test must be.
+
+    For each planted fault: the time from which a test with this tolerance detects it, and the widest tolerance that
+    does by --until.  Exit 0 where a right run passes and every fault is detected, else 1.
+    """
+    from heavytop.cases import case as case_named
+    from heavytop.features.limits.power import power as power_of
+    from heavytop.top.bodies import motion_of
+
+    if (case is None) == (file is None):
+        raise InputError("Exactly one of --case and --file must be given.", "`heavytop list` shows the cases.")
+    if case is not None:
+        known = case_named(case)
+        top, start, system = known.body or known.top, known.given_start or known.start, known.system.name
+    else:
+        data = {"file": file, "link": link, "gravity": gravity, "omega": omega and numbers(omega)}
+        top, start = motion_of(data | {"quaternion": numbers(quaternion)})
+        system = None
+    with counted("power", 1, "tests", _SECONDS) as advance:
+        found = power_of(
+            top, start, until, tolerance, step, planted, integrator=integrator, control=control, system=system
+        )
+        advance()
+    if json:
+        print_json(found.to_json())
+    else:
+        print(found)
+    return ExitCode.GOOD if found.detects_all else ExitCode.FINDING

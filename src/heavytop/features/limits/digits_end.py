@@ -1,0 +1,196 @@
+"""When digits end: a state that is rounded once and followed exactly, wherever that costs most.
+
+On a grid of times the motion is computed with twice the bits of a format, rounded to the format at each of some of
+them, and followed from there.  The time at which the worst of these has lost its first digit, and that at which it has
+lost all of them, are proven: two known motions, enclosed, lie so far apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop import arguments
+from heavytop.arguments import Number
+from heavytop.display import Tabular, TitledTable
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.catalogue import find
+from heavytop.exact.flint.balls import midpoint, radius, whole_evaluation, working_precision
+from heavytop.integrate.registry import Setup, propagator
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, real
+from heavytop.top.bodies import Body
+from heavytop.top.equations import GYROSTAT, NAMES, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+_TIMES, _EACH = 64, 4
+"""Times looked at, and every how many of them the state is rounded."""
+_SPARE_BITS = 64
+_ALL = 0.5
+"""A relative error from which no digit is right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """time: at which the digits are lost.  rounded_at: when the state was rounded.  digits: that are right at the time.
+
+    proven: whether enclosures of both motions show it; else they do not reach so far.
+    """
+
+    time: Fraction
+    rounded_at: Fraction
+    digits: float
+    proven: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Times as exact text."""
+        times = {"time": exact_text(self.time), "rounded_at": exact_text(self.rounded_at)}
+        return times | {"digits": round(self.digits, 2), "proven": self.proven}
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class DigitsEnd(Tabular):
+    """The digits that a single rounding of the state leaves.
+
+    precision: to which it is rounded.  of_digits: decimal digits of that.  times, digits: what is left until each time.
+    first, last: where the first digit is lost, and where all are; None where that is not before the last time.
+    """
+
+    precision: str
+    of_digits: float
+    times: tuple[Fraction, ...]
+    digits: tuple[float, ...]
+    first: Loss | None
+    last: Loss | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry ``digits_end`` of a document."""
+        ends = {name: each and each.to_json() for name, each in (("first", self.first), ("last", self.last))}
+        return {"precision": self.precision, "of_digits": round(self.of_digits, 2)} | ends
+
+    def sentences(self) -> list[str]:
+        """What it says of the first digit and of the last."""
+        found = []
+        for what, loss in (("the first digit", self.first), ("all digits", self.last)):
+            if loss is None:
+                found.append(f"{what}: not lost before t = {decimal_text(self.times[-1], 6)}")
+                continue
+            how = "proven" if loss.proven else "computed, beyond the reach of a proof"
+            found.append(
+                f"{what}: lost at t = {decimal_text(loss.time, 6)} by whoever rounds the state to {self.precision} "
+                f"at t = {decimal_text(loss.rounded_at, 6)}, with exact arithmetic before and after ({how})"
+            )
+        return found
+
+    def _table(self) -> TitledTable:
+        rows = [
+            (decimal_text(time, 6), f"{digits:.1f}")
+            for time, digits in [*zip(self.times, self.digits, strict=True)][_EACH - 1 :: _EACH]
+        ]
+        title = f"Digits that one rounding to {self.precision} leaves, of {self.of_digits:.1f}"
+        return TitledTable(title, ("t", "digits"), rows, self.sentences())
+
+
+def digits_end(
+    top: HeavyTop | Body,
+    start: State,
+    until: Number,
+    precision: Precision | str = DOUBLE,
+    *,
+    system: System | str | None = None,
+) -> DigitsEnd:
+    """When the first digit of a state in a format, and when every digit, is lost to a single rounding on the way.
+
+    Arguments:
+        top, start, precision, system: as in :func:`heavytop.propagate`.
+        until: an exact time, not 0; 64 times up to it are looked at.
+
+    Returns:
+        A :class:`DigitsEnd`: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
+
+    Raises:
+        InputError: for what is no motion or time, and for the gyrostat of the paper.
+    """
+    form = arguments.precision(precision)
+    body, state = arguments.motion(top, start, form)
+    about, end = arguments.system(system, body), exact(until)
+    if not end:
+        raise InputError("until must not be 0; got 0.", "Give the time up to which digits are followed.")
+    if about is GYROSTAT:
+        raise InputError("digits_end is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+    setup = Setup.of(body, state, form, about)
+    problem = Problem.of(setup.top, setup.start, form, about)
+    times = tuple(end * k / _TIMES for k in range(_TIMES + 1))
+    errors = _errors(problem, times)
+    worst = [
+        max(((row[k], i) for i, row in errors.items() if k in row), default=(0.0, 0)) for k in range(1, _TIMES + 1)
+    ]
+    of_digits = form.bits * math.log10(2)
+    reached = [max(error for error, _ in worst[: k + 1]) for k in range(_TIMES)]
+    ends = []
+    for least in (10 ** (1 - of_digits), _ALL):
+        place = next((k for k in range(_TIMES) if worst[k][0] >= least), None)
+        ends.append(None if place is None else _loss(problem, times, place + 1, worst[place], least))
+    left = tuple(_digits(error, of_digits) for error in reached)
+    return DigitsEnd(form.name, of_digits, times[1:], left, *ends)
+
+
+def _digits(error: float, most: float = math.inf) -> float:
+    return max(0.0, min(most, -math.log10(error))) if error else most
+
+
+def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, float]]:
+    """By the place of the rounding and the place of the time: the largest relative error of a component."""
+    form = real(2 * problem.precision.bits + _SPARE_BITS)
+    run = propagator("multiword", {})
+
+    def states(start: State, instants: Sequence[Fraction]) -> list[list[Fraction]]:
+        found = run(problem.top, start, instants, form, system=problem.system)
+        return [[exact(value) for value in state[:6]] for state in found.states]
+
+    known = [list(problem.start.flat), *states(problem.start, times[1:])]
+    errors = {}
+    for i in range(0, len(known) - 1, _EACH):
+        after = states(_rounded(known[i], problem.precision), [time - times[i] for time in times[i + 1 : len(known)]])
+        errors[i] = {
+            i + 1 + k: max(float(_relative(a, b)) for a, b in zip(state, known[i + 1 + k], strict=True))
+            for k, state in enumerate(after)
+        }
+    return errors
+
+
+def _relative(value: Fraction, true: Fraction) -> Fraction:
+    return abs(value - true) / max(Fraction(1), abs(true))
+
+
+def _rounded(state: Sequence[Fraction], form: Precision) -> State:
+    values = [exact(number(value, form)) for value in state]
+    return State(values[:3], values[3:])
+
+
+def _loss(problem: Problem, times: Sequence[Fraction], place: int, worst: tuple[float, int], least: float) -> Loss:
+    """The loss of one rounding, proven where enclosures reach."""
+    error, rounded = worst
+    time, at = times[place], times[rounded]
+    bits = 2 * problem.precision.bits + _SPARE_BITS
+    try:
+        apart = _apart(problem, at, time, bits)
+    except OutOfReach:
+        apart = 0.0
+    return Loss(time, at, _digits(max(apart, error)), apart >= least * (1 - 2**-20))
+
+
+@whole_evaluation
+def _apart(problem: Problem, at: Fraction, time: Fraction, bits: int) -> float:
+    """A lower bound of the relative error at ``time`` of the motion that was rounded at ``at``; within double."""
+    known = find(problem.top, problem.start, problem.system)
+    state = [midpoint(ball) for ball in known.state(at, bits)] if at else list(problem.start.flat)
+    other = find(problem.top, _rounded(state, problem.precision), problem.system)
+    with working_precision(bits):
+        pairs = zip(known.state(time, bits), other.state(time - at, bits), strict=True)
+        gaps = [_relative(midpoint(b), midpoint(a)) - radius(a) - radius(b) for a, b in pairs]
+    assert len(gaps) == len(NAMES)
+    return float(max(Fraction(0), *gaps))

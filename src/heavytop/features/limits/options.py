@@ -1,0 +1,66 @@
+"""The options of `propagate` and `reference` for digits that end, and for what lies between samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from heavytop.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Ends = Annotated[
+    bool, typer.Option("--digits-end", help="Also when one rounding of the state has cost the first digit, and all.")
+]
+Between = Annotated[
+    str | None, typer.Option(metavar="DT", help="Also the error of interpolation between samples DT apart.")
+]
+Within = Annotated[str | None, typer.Option(metavar="ERROR", help="With --between: the largest DT for this error.")]
+
+
+class LimitOptions(NamedTuple):
+    """See :class:`heavytop.cli.motions.MotionOptions`."""
+
+    digits_end: Ends = False
+    between: Between = None
+    within: Within = None
+
+    def require(self) -> str:
+        """Raises InputError for --within alone."""
+        if self.within is not None and self.between is None:
+            raise InputError("--within was given without --between.", "Give --between DT too.")
+        return "limits" if self.digits_end or self.between is not None else ""
+
+    def measure(self, top: Any, start: Any, until: Any, **settings: Any) -> MotionLimits:
+        """Both, as far as they were asked for."""
+        from heavytop.features.limits.between import between_samples
+        from heavytop.features.limits.digits_end import digits_end
+
+        system = settings.get("system")
+        found: dict[str, Any] = {}
+        if self.digits_end:
+            form = settings.get("precision", "double")
+            found["digits_end"] = digits_end(top, start, until, form, system=system)
+        if self.between is not None:
+            found["between"] = between_samples(top, start, until, self.between, self.within, system=system)
+        return MotionLimits(found)
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """What was measured, by the keys of the document."""
+
+    found: dict[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """Entries of the document of the motion."""
+        return {name: value.to_json() for name, value in self.found.items()}
+
+    def text(self) -> RenderableType:
+        """A table for each."""
+        from rich.text import Text
+
+        return Text("\n" + "\n\n".join(str(value) for value in self.found.values()))

@@ -1,0 +1,289 @@
+"""The power of a test: which planted faults a comparison with the true motion detects, from when on.
+
+A test compares Ω and the attitude of a run at equal steps with the true motion, each component relative above 1, and
+fails where one is off by more than its tolerance.  Every fault is computed in double, by heyoka where its motion is
+that of other data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy
+
+from heavytop import arguments
+from heavytop.arguments import Number
+from heavytop.display import Tabular, TitledTable
+from heavytop.errors import InputError
+from heavytop.integrate.registry import Setup, named, propagator
+from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact, exact_text, real
+from heavytop.top.bodies import PIVOT, Body
+from heavytop.top.equations import GYROSTAT, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.inertia_slips import minus, plus, six_of, steiner
+
+Motion = tuple[HeavyTop | Body, State, System]
+_MOST = 100_000
+_SUBSTEP = 1 / 16
+"""Of a radian, for the classical Runge-Kutta method."""
+_G = Fraction("9.8") / Fraction("9.81")
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFault:
+    """name.  errors: at each time, the largest of a component.  detected_from: the first time with more than the
+    tolerance; None where the test passes.  tolerance: the largest error, below which a tolerance must be.
+    """
+
+    name: str
+    errors: Array
+    detected_from: Fraction | None
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Power(Tabular):
+    """What a test detects.
+
+    times: of its samples.  tolerance: of it.  error: the largest of a right run; passes: whether that is within it.
+    faults: planted, a :class:`PlantedFault` each.  left_out: why a fault is not planted, by its name.
+    """
+
+    times: tuple[Fraction, ...]
+    tolerance: float
+    error: float
+    faults: tuple[PlantedFault, ...]
+    left_out: dict[str, str]
+
+    @property
+    def passes(self) -> bool:
+        """Whether a right run passes the test."""
+        return self.error <= self.tolerance
+
+    @property
+    def detects_all(self) -> bool:
+        """Whether a right run passes the test and no planted fault does."""
+        return self.passes and all(fault.detected_from is not None for fault in self.faults)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `heavytop power`."""
+        faults = [
+            {
+                "name": fault.name,
+                "detected_from": None if fault.detected_from is None else exact_text(fault.detected_from),
+                "tolerance": fault.tolerance,
+            }
+            for fault in self.faults
+        ]
+        right = {"tolerance": self.tolerance, "error": self.error, "passes": self.passes}
+        return {"faults": faults, "right": right, "left_out": self.left_out}
+
+    def _table(self) -> TitledTable:
+        rows = [
+            (
+                fault.name,
+                "not detected" if fault.detected_from is None else decimal_text(fault.detected_from, 6),
+                f"{fault.tolerance:.2g}",
+            )
+            for fault in self.faults
+        ]
+        end = decimal_text(self.times[-1], 6)
+        verdict = "passes" if self.passes else "fails"
+        notes = [f"a right run {verdict}: its largest error is {self.error:.2g}"]
+        notes += [f"{name} is not planted: {why}" for name, why in self.left_out.items()]
+        title = f"A test up to t = {end} with tolerance {self.tolerance:.2g}"
+        return TitledTable(title, ("planted fault", "detected from t", "widest tolerance"), rows, notes)
+
+
+def power(
+    top: HeavyTop | Body,
+    start: State,
+    until: Number,
+    tolerance: Number,
+    step: Number | None = None,
+    planted: str | Sequence[str] = "all",
+    *,
+    integrator: str | Any = "heyoka",
+    control: Number | None = None,
+    system: System | str | None = None,
+) -> Power:
+    """From when on a regression test of a motion detects each planted fault, and the widest tolerance that does.
+
+    Arguments:
+        top, start, system: as in :func:`heavytop.propagate`.
+        until: where the test ends.  tolerance: of the test, relative above 1.
+        step: between samples, a hundredth of ``until`` where None; of the fault ``late`` the step.
+        planted: names of :data:`FAULTS`, or "all".
+        integrator, control: of a right run in double, and its tolerance or step.
+
+    Returns:
+        A :class:`Power`: ``faults`` with ``name``, ``detected_from`` and ``tolerance``; ``error``, ``passes``.
+
+    Raises:
+        InputError: for what is no motion, an unknown fault, more than 100,000 samples, and for other numbers.
+    """
+    body, state = arguments.motion(top, start)
+    motion = body, state, arguments.system(system, body)
+    if motion[2] is GYROSTAT:
+        raise InputError("power is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
+    end, most = exact(until), exact(tolerance)
+    apart = end / 100 if step is None else exact(step)
+    if not (0 < apart <= end and most > 0):
+        raise InputError("until, step and tolerance must be positive, and step at most until.", "Give such as 10, 0.1.")
+    count = int(end // apart)
+    if count > _MOST:
+        raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")
+    times = [apart * k for k in range(1, count + 1)]
+    true, limit = _rows(motion, times), float(most)
+    options = {} if control is None else {"tolerance": exact(control)}
+    error = float(_off(_states(motion, times, DOUBLE, named(integrator), options), _states(motion, times, QUAD)).max())
+    faults, left_out = [], {}
+    for name in _names(planted):
+        rows = FAULTS[name](motion, times)
+        if isinstance(rows, str):
+            left_out[name] = rows
+            continue
+        errors = _off(rows, true).max(axis=1)
+        place = int(numpy.argmax(errors > limit)) if (errors > limit).any() else None
+        faults.append(PlantedFault(name, errors, None if place is None else times[place], float(errors.max())))
+    return Power(tuple(times), limit, error, tuple(faults), left_out)
+
+
+def _names(planted: str | Sequence[str]) -> list[str]:
+    names = planted.split(",") if isinstance(planted, str) else list(planted)
+    if names == ["all"]:
+        return list(FAULTS)
+    for name in names:
+        if name not in FAULTS:
+            raise InputError(f"Unknown fault {name!r}.", f"Use {', '.join(FAULTS)}, or all.")
+    return names
+
+
+def _off(rows: Array, true: Array) -> Array:
+    found: Array = abs(rows - true) / numpy.maximum(1, abs(true))
+    return numpy.where(numpy.isfinite(found), found, numpy.inf)
+
+
+def _states(
+    motion: Motion, times: Sequence[Fraction], form: Precision, which: Any = "multiword", options: Any = None
+) -> Array:
+    """(Ω, γ), shape (n, 6), in the axes given; infinite from where the run ended on."""
+    body, start, system = motion
+    setup = Setup.of(body, start, form, system)
+    run = setup.given(propagator(which, options or {})(setup.top, setup.start, times, form, system=system))
+    found = numpy.full((len(times), 6), numpy.inf)
+    found[: len(run.states)] = run.to_numpy()[:, :6]
+    return found
+
+
+def _rows(motion: Motion, times: Sequence[Fraction], form: Precision = DOUBLE) -> Array:
+    """Ω and R row by row, shape (n, 12), in the axes given."""
+    body, start, system = motion
+    setup = Setup.of(body, start, form, system)
+    run = propagator("heyoka", {"xi": setup.xi})(setup.top, setup.start, times, form, system=system)
+    run = setup.given(replace(run, states=run.states[:, :6], attitude=run.states[:, 6:]))
+    return numpy.hstack([run.to_numpy()[:, :3], run.matrices().reshape(-1, 9)])
+
+
+def _no_gyroscopic_term(motion: Motion, times: Sequence[Fraction]) -> Array:
+    """J Ω' = P γ × r alone, by the classical Runge-Kutta method in double."""
+    body, start, system = motion
+    setup = Setup.of(body, start, DOUBLE, system)
+    top, rows = setup.top, numpy.array([[float(v) for v in setup.start.omega]] + [[0.0] * 3] * 3)
+    gamma, xi = ([float(v) for v in vector] for vector in (setup.start.gamma, setup.xi))
+    rows[1:] = xi, numpy.cross(gamma, xi), gamma
+    inertia, moment = (numpy.array([float(v) for v in vector]) for vector in (top.inertia, top.moment))
+
+    def rates(y: Array) -> Array:
+        return numpy.vstack([numpy.cross(y[3], moment) / inertia, numpy.cross(y[1:], y[0])])
+
+    found, step = [], float(times[0])
+    fastest = float(abs(_rows(motion, times)[:, :3]).max()) + math.sqrt(float(abs(moment).max() / inertia.min()))
+    count = max(1, math.ceil(fastest * step / _SUBSTEP))
+    h = step / count
+    for _ in times:
+        for _ in range(count):
+            a = rates(rows)
+            b = rates(rows + h / 2 * a)
+            c = rates(rows + h / 2 * b)
+            rows = rows + h / 6 * (a + 2 * b + 2 * c + rates(rows + h * c))
+        found.append(rows)
+    given = numpy.array(found)
+    if setup.frame is not None:
+        given = given @ numpy.array([[float(v) for v in row] for row in setup.frame.axes]).T
+    return given.reshape(-1, 12)
+
+
+def _transposed(motion: Motion, times: Sequence[Fraction]) -> Array:
+    rows = _rows(motion, times)
+    matrices = rows[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
+    return numpy.hstack([rows[:, :3], matrices])
+
+
+def _late(motion: Motion, times: Sequence[Fraction]) -> Array:
+    return _rows(motion, [time - times[0] / 2 for time in times])
+
+
+def _single(motion: Motion, times: Sequence[Fraction]) -> Array:
+    return _rows(motion, times, real(24))
+
+
+def _steiner(twice: bool) -> Callable[[Motion, Sequence[Fraction]], Array | str]:
+    def fault(motion: Motion, times: Sequence[Fraction]) -> Array | str:
+        body = motion[0]
+        if not isinstance(body, Body) or not any(body.centre):
+            return "no mass off the pivot is given"
+        change = steiner(body.mass, body.centre)
+        return _of_tensor(motion, times, (plus if twice else minus)(body.tensor, change))
+
+    return fault
+
+
+def _of_tensor(motion: Motion, times: Sequence[Fraction], tensor: Any) -> Array | str:
+    """The motion with another tensor about the pivot."""
+    body, start, system = motion
+    assert isinstance(body, Body)
+    try:
+        other = Body(body.mass, body.gravity, body.centre, six_of(tensor), PIVOT, body.rotor)
+    except InputError:
+        return "no body has the tensor"
+    return _rows((other, start, system), times)
+
+
+def _order(motion: Motion, times: Sequence[Fraction]) -> Array | str:
+    """I12 and I23 exchanged, as in the order 11, 22, 33, 23, 13, 12; of a diagonal tensor the last two moments."""
+    body, start, system = motion
+    if isinstance(body, HeavyTop):
+        a, b, c = body.inertia
+        return _rows((HeavyTop((a, c, b), body.weight, body.centre, body.rotor), start, system), times)
+    a, b, c, d, e, f = six_of(body.tensor)
+    six = (a, b, c, f, e, d) if any((d, e, f)) else (a, c, b, d, e, f)
+    return _of_tensor(motion, times, ((six[0], six[3], six[4]), (six[3], six[1], six[5]), (six[4], six[5], six[2])))
+
+
+def _gravity(motion: Motion, times: Sequence[Fraction]) -> Array | str:
+    body, start, system = motion
+    if not any(body.moment):
+        return "no weight turns the body"
+    if isinstance(body, Body):
+        other: HeavyTop | Body = Body(body.mass, body.gravity * _G, body.centre, six_of(body.tensor), PIVOT, body.rotor)
+    else:
+        other = HeavyTop(body.inertia, body.weight * _G, body.centre, body.rotor)
+    return _rows((other, start, system), times)
+
+
+FAULTS: dict[str, Callable[[Motion, Sequence[Fraction]], Array | str]] = {
+    "no_gyroscopic_term": _no_gyroscopic_term,
+    "transposed": _transposed,
+    "steiner_forgotten": _steiner(False),
+    "steiner_twice": _steiner(True),
+    "late": _late,
+    "float32": _single,
+    "tensor_order": _order,
+    "gravity_9.8": _gravity,
+}
+"""transposed: Rᵀ written for R.  late: by half a step.  gravity_9.8: in place of 9.81."""

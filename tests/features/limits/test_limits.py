@@ -1,0 +1,129 @@
+"""When digits end, what a test detects, and what lies between samples: against brute force and exact cases."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heavytop as ht
+from heavytop.features.limits.power import FAULTS
+from support.in_process import heavytop
+
+TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
+START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
+FLIP = ht.HeavyTop(("919/15000", "967/15000", "83/15000"), 0, (0, 0, 0)), ht.State((10, 0, "1e-10"), (0, 0, 1))
+BODY = ht.Body("2", "9.81", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
+SPINNING = ht.State(omega=(1, 2, 3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+
+
+@pytest.mark.slow
+def test_digits_of_a_flip_end_where_those_of_runs_do() -> None:
+    ends = ht.digits_end(*FLIP, 12)
+    assert ends.first is not None
+    assert ends.last is not None
+    assert ends.first.proven
+    assert ends.last.proven
+    assert 0 < ends.first.rounded_at < ends.first.time < ends.last.time <= 10
+    assert list(ends.digits) == sorted(ends.digits, reverse=True)
+    time = [ends.last.time]
+    known = ht.reference(*FLIP, time, 20).to_numpy()
+    for integrator in ("heyoka", "scipy:DOP853"):
+        assert np.abs(ht.propagate(*FLIP, time, integrator=integrator).to_numpy() - known).max() > 0.1
+
+
+@pytest.mark.slow
+def test_digits_of_a_regular_motion_stay_and_an_equilibrium_loses_none() -> None:
+    lagrange = ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4"))
+    ends = ht.digits_end(lagrange, ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")), 5, "extended")
+    assert ends.first is ends.last is None
+    assert ends.digits[-1] > 18
+    rest = ht.digits_end(ht.HeavyTop((3, 2, 1), 1, (0, 0, 1)), ht.State((0, 0, 0), (0, 0, 1)), 5)
+    assert min(rest.digits) == rest.of_digits
+
+
+def test_interpolation_of_a_steady_rotation_is_known_in_closed_form() -> None:
+    """γ = (cos t, −sin t, 0): linear 1 − cos(Δ/2), Hermite and Lagrange Δ⁴/384 and 3 Δ⁴/128, slerp 0."""
+    turning = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))
+    found = ht.between_samples(*turning, 10, "1/10", "1e-3")
+    assert found.errors["linear"] == pytest.approx(1 - math.cos(0.05), rel=0.01)
+    assert found.errors["hermite"] == pytest.approx(0.1**4 / 384, rel=0.01)
+    assert found.errors["lagrange"] == pytest.approx(3 * 0.1**4 / 128, rel=0.01)
+    assert (found.errors["slerp"] or 0) < 1e-14
+    assert float(found.largest["linear"] or 0) == pytest.approx(2 * math.acos(1 - 1e-3), rel=0.01)
+
+
+def test_the_largest_spacing_keeps_to_the_error_and_the_next_does_not() -> None:
+    largest = ht.between_samples(TOP, START, 4, "1/10", "1e-4").largest
+    for method, spacing in largest.items():
+        assert spacing is not None
+        count = int(4 / spacing)
+        assert (ht.between_samples(TOP, START, 4, Fraction(4, count)).errors[method] or 0) <= 1e-4
+        assert (ht.between_samples(TOP, START, 4, Fraction(4, count - 1)).errors[method] or 1) > 1e-4
+
+
+def test_faults_are_detected_when_brute_force_detects_them() -> None:
+    found = ht.power(BODY, SPINNING, 2, "1e-2", "1/20")
+    times = [Fraction(k, 20) for k in range(1, 41)]
+    right = ht.propagate(BODY, SPINNING, times)
+    light = ht.Body("2", "9.8", ("0.1", "0", "0.3"), (1, 2, "1.5", "0.1", "-0.1", "0.2"), "pivot")
+    wrong = ht.propagate(light, SPINNING, times)
+    values = [np.hstack([run.to_numpy()[:, :3], run.matrices().reshape(-1, 9)]) for run in (right, wrong)]
+    errors = (np.abs(values[1] - values[0]) / np.maximum(1, np.abs(values[0]))).max(axis=1)
+    by_name = {fault.name: fault for fault in found.faults}
+    fault = by_name["gravity_9.8"]
+    assert fault.tolerance == pytest.approx(errors.max(), rel=1e-6)
+    late = next((time for time, error in zip(times, errors, strict=True) if error > 1e-2), None)
+    assert fault.detected_from == late
+    assert found.passes
+    assert found.error < 1e-12
+    assert set(by_name) == set(FAULTS)
+    assert by_name["no_gyroscopic_term"].detected_from == times[0]
+    assert by_name["float32"].detected_from is None
+    assert not found.detects_all
+
+
+def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() -> None:
+    free = ht.power(*FLIP, 1, "1e-3", "1/4")
+    assert set(free.left_out) == {"steiner_forgotten", "steiner_twice", "gravity_9.8"}
+    for call, words in (
+        (lambda: ht.power(TOP, START, 1, "1e-3", planted="typo"), "Unknown fault 'typo'"),
+        (lambda: ht.power(TOP, START, 0, "1e-3"), "must be positive"),
+        (lambda: ht.power(TOP, START, 1, "1e-3", "1e-7"), "more than 100000"),
+        (lambda: ht.between_samples(TOP, START, 1, 2), "at most until"),
+        (lambda: ht.between_samples(TOP, START, 1, "1/10", 0), "between 1e-12 and 1"),
+        (lambda: ht.between_samples(TOP, START, 1, "1e-6"), "are more than"),
+        (lambda: ht.digits_end(TOP, START, 0), "until must not be 0"),
+    ):
+        with pytest.raises(ht.InputError, match=words):
+            call()
+
+
+def test_the_command_line_says_the_same(tmp_path: Path) -> None:
+    done = heavytop("power", "--case", "lagrange", "--until", "1", "--tolerance", "1e-3", "--step", "1/4", "--json")
+    case = ht.power(
+        ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4")),
+        ht.State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")), 1, "1e-3", "1/4",
+    )  # fmt: skip
+    assert json.loads(done.stdout) == json.loads(json.dumps(case.to_json()))
+    assert done.returncode == 1
+    known = heavytop(
+        "propagate", "--case", "lagrange", "--times", "1", "--between", "1/10", "--within", "1e-3", "--json"
+    )
+    assert set(json.loads(known.stdout)["between"]["errors"]) == {"slerp", "linear", "hermite", "lagrange"}
+    assert heavytop("propagate", "--case", "lagrange", "--times", "1", "--within", "1").returncode == 2
+    assert heavytop("power", "--until", "1", "--tolerance", "1").returncode == 2
+
+
+def test_pictures_show_each_fault_each_method_and_each_axis() -> None:
+    test = ht.power(*FLIP, 1, "1e-3", "1/4")
+    assert len(ht.plot.power(test).lines) == len(test.faults) + 1
+    samples = [ht.between_samples(*FLIP, 1, spacing) for spacing in ("1/10", "1/20")]
+    assert {line.get_label() for line in ht.plot.between(samples).lines} == {"slerp", "linear", "hermite", "lagrange"}
+    words = [text.get_text() for text in ht.plot.stability(ht.HeavyTop((1, 2, 3), 0, (0, 0, 0))).texts]
+    assert len(words) == 6
+    assert [word for word in words if "unstable" in word] == ["2: unstable 0.577", "−2: unstable 0.577"]
