@@ -59,7 +59,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
     found = assess(given(spoilt=across))
     lines = printed(found)
     assert re.fullmatch(r"8\.9 of 16 digits right at every sample up to T = 8; heyoka in double: 1\d\.\d\.", lines[0])
-    narrow = printed(found, 79)
+    narrow = printed(found, 70)
     assert re.fullmatch(r"8\.9 of 16 digits right .* heyoka in double: 1\d\.\d\.", " ".join(narrow[:2]))
     assert "The error is mostly across the flow." in lines[:3]
     assert max(map(len, lines)) <= 80

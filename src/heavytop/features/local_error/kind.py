@@ -178,10 +178,12 @@ def _number(row: Row, name: str) -> str:
 
 def _said(row: Row) -> str:
     """The largest error of a step, or of a run of what keeps a memory, and the order beside the declared one."""
-    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", row.metrics.get(_LARGEST)
-    if largest is not None and largest.log10 is not None:
-        size = exact(row.metrics[_LARGEST].value) * Fraction(2) ** (1 - row.bits)
-        text = f"{text}: one step errs by at most {short(decimal_text(size, 2), 2)}"
+    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", _number(row, _LARGEST)
+    if largest:
+        metric = row.metrics[_LARGEST]
+        if metric.log10 is not None:
+            largest = short(decimal_text(exact(metric.value) * Fraction(2) ** (1 - row.bits), 2), 2)
+        text = f"{text}: one step errs by at most {largest}"
     else:
         text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
     order = _order(row)

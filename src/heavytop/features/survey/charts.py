@@ -1,4 +1,4 @@
-"""The section of a page about surveys: distributions, a map of the digits lost, the worst motions with pictures."""
+"""The section of a page about surveys: distributions, a map of the digits right, the worst motions with pictures."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _METHOD = "two runs of multiword in double-double, of different orders"
 class SurveyTable(PlanTable, tag=NAME):
     """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended.
 
-    map: two data by the names of their columns, over which digits lost are drawn; none for the first two that vary.
+    map: two data by the names of their columns, over which digits right are drawn; none for the first two that vary.
     """
 
     cases: list[str]

@@ -1,4 +1,4 @@
-"""Integrators that are programs: text over standard input and output, a line a thing, one process for many requests.
+"""Integrators that are programs: text over standard input and output, one item per line, one process for many requests.
 
 The protocol is in docs/gate.md.  A :class:`Command` is what a TOML table says of the program, a :class:`Session`
 its running process, and a :class:`CommandIntegrator` the call of :mod:`heavytop.integrate.peers`.  Whatever the program

@@ -33,6 +33,8 @@ _LINES = 45
 _DIGITS_A_LINE = 48
 """Digits of a number on a line of a LaTeX table; a multiple of 3, in which they are grouped."""
 _MORE_BITS = 64
+_BESIDE = 64
+"""Characters of a value and its radius beside each other on a terminal of 80 columns; more stand below each other."""
 _KNOWN = ("precision", "integrator", "outcome", "steps")
 """Facts of a computed motion, by the keys that `heavytop score` reads."""
 
@@ -333,6 +335,8 @@ def _attitude_at_start(table: MotionTable) -> list[RenderableType]:
 def _at_each_time(table: MotionTable) -> list[RenderableType]:
     """A table for each time, a line a number; digits that are too many for a line go on below each other."""
     parts: list[RenderableType] = []
+    numbers = ((value, radius or "") for line in table.values for value, radius in line)
+    below = max((len(value) + len(radius) for value, radius in numbers), default=0) > _BESIDE
     for time, line in zip(table.times, table.values, strict=True):
         lines = Table(box=None, show_header=False)
         lines.add_column(no_wrap=True)
@@ -340,7 +344,9 @@ def _at_each_time(table: MotionTable) -> list[RenderableType]:
         lines.add_column(no_wrap=True)
         lines.add_row("t", Text(time, overflow="fold"))
         for column, (value, radius) in zip(table.columns, line, strict=True):
-            lines.add_row(column.label, Text(value, overflow="fold"), "" if radius is None else f"± {radius}")
+            error = "" if radius is None else f"± {radius}"
+            shown = f"{value}\n{error}" if below and error else value
+            lines.add_row(column.label, Text(shown, overflow="fold"), "" if below else error)
         parts += [Text(), lines]
     return parts
 
