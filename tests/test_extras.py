@@ -85,3 +85,21 @@ def test_rooms_of_sympy_say_what_they_need(place: str, monkeypatch: pytest.Monke
 def hide(monkeypatch: pytest.MonkeyPatch, *modules: str) -> None:
     found: Callable[[str], object] = find_spec
     monkeypatch.setattr(extras, "find_spec", lambda name: None if name in modules else found(name))
+
+
+@pytest.mark.slow
+def test_a_command_loads_heyoka_without_sympy() -> None:
+    script = """
+import contextlib, sys
+from heavytop.__main__ import main
+with contextlib.suppress(SystemExit):
+    main()
+loaded = {"heyoka", "sympy", "llvmlite.binding"} & sys.modules.keys()
+import sympy
+assert sympy.Integer(1) == 1
+sys.exit(" ".join(loaded))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, "propagate", *MOTION], capture_output=True, text=True, check=False
+    )
+    assert done.stderr.strip() == "heyoka"

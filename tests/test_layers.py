@@ -24,7 +24,7 @@ GROUND = {
     "features": {"feature"},
     "files": {"errors"},
     "guard": set(),
-    "precision": {"errors"},
+    "precision": {"errors", "extras"},
     "processes": {"guard"},
     "records": {"errors", "precision"},
     "version": set(),

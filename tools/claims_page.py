@@ -164,6 +164,7 @@ def _fenced(inside: str) -> str:
 _HEADS = {"refuted": "Refuted", "holds": "Proven", "undecided": "Undecided"}
 _SAID = {
     "motion": "Claimed: a motion",
+    "component": "Claimed: a component of a motion",
     "integral": "Claimed: constant",
     "relation": "Claimed: stays 0 where it is 0",
     "value": "Claimed: numbers",
@@ -235,6 +236,9 @@ def _claim(published: Published) -> str:
         lines += _motion(claim.get("motion", {}))
     elif kind == "value":
         lines.append(_start(claim.get("start", {})))
+    elif kind == "component":
+        lines.append(_start(claim.get("start", {})))
+        lines += _component(claim["component"], claim.get("quadrature", {}))
     elif integral := claim.get("integral"):
         lines.append(_equal(None, integral["value"], "0" if kind == "relation" else ""))
         where = [typeset(text) for text in integral.get("where", [])]
@@ -271,6 +275,16 @@ def _motion(table: Mapping[str, Sequence[str]]) -> list[str]:
     ):
         lines += [_equal(name(letter), text) for letter, text in zip(letters, table.get(key, ()), strict=False)]
     return lines
+
+
+def _component(table: Mapping[str, Any], quadrature: Mapping[str, Any]) -> list[str]:
+    u = quadrature.get("variable", "u")
+    texts = {u: table["quantity"], f"{u}'^2": table.get("reduced"), f"{u}(t)": table.get("value")}
+    angles = [angle for angle in ("phi", "theta", "psi") if angle in quadrature]
+    texts |= {f"d{u}/dt": f"1/({quadrature['integrand']})"} if "integrand" in quadrature else {}
+    texts |= {f"{angle}'": quadrature[angle] for angle in angles} | {angle: table.get(angle) for angle in angles}
+    given = [f"<p>{escape(left)} = {typeset(text)}</p>" for left, text in texts.items() if text is not None]
+    return given + [f"<p>where {typeset(text)} = 0</p>" for text in table.get("where", [])]
 
 
 def _verdicts(published: Published) -> str:

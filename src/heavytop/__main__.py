@@ -10,8 +10,10 @@ from heavytop.errors import ExitCode
 def main() -> None:
     """Run the command line and leave with its exit code."""
     signal.signal(signal.SIGINT, _interrupted)
+    from heavytop import extras
     from heavytop.cli import run_command_line
 
+    extras.alone = True
     sys.exit(run_command_line())
 
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
+from threading import Lock
+from typing import Any
 
 from heavytop.errors import MissingExtra
 
@@ -41,6 +46,26 @@ def require_extra(name: str) -> None:
     """Raises MissingExtra where a module of the extra is not installed."""
     if not has_extra(name):
         raise missing(name)
+
+
+alone = False
+"""Whether heyoka is loaded without SymPy, which it converts to and from: so in the process of a command."""
+_loading = Lock()
+
+
+@cache
+def import_heyoka() -> Any:
+    """heyoka, when it is used; where it is :data:`alone`, in a third of the time."""
+    with _loading:
+        if not alone or "heyoka" in sys.modules or "sympy" in sys.modules:
+            import heyoka
+
+            return heyoka
+        sys.modules["sympy"] = None  # type: ignore[assignment]  # as one that is not installed
+        try:
+            return import_module("heyoka")
+        finally:
+            del sys.modules["sympy"]
 
 
 class Stub:

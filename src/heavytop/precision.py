@@ -21,6 +21,7 @@ from operator import index, is_
 from typing import TYPE_CHECKING, Any, Protocol, Self, SupportsIndex, TypeAlias, TypeVar, cast
 
 from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.extras import import_heyoka
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -105,7 +106,7 @@ def as_integer(value: Any, what: str) -> int:
 
 def available() -> dict[str, str | None]:
     """For each family of formats: None if this platform has it, else the reason why not."""
-    import heyoka
+    heyoka = import_heyoka()
     import numpy
 
     mantissa = int(numpy.finfo(numpy.longdouble).nmant) + 1
@@ -369,7 +370,7 @@ def _widened(doubles: Array, precision: Precision) -> Any:
     """An array of doubles as numbers of a format with as many bits or more."""
     if precision.family == "extended":
         return doubles.astype("longdouble")
-    import heyoka
+    heyoka = import_heyoka()
 
     return doubles.astype(heyoka.real128) if precision.family == "quad" else heyoka.real(0, precision.bits) + doubles
 
@@ -401,7 +402,7 @@ def _wide(significand: int, exponent: int, precision: Precision) -> Any:
         high, low = divmod(significand, 1 << 32)
         with numpy.errstate(over="ignore", under="ignore"):
             return numpy.ldexp(numpy.longdouble(high) * numpy.longdouble(1 << 32) + numpy.longdouble(low), exponent)
-    import heyoka
+    heyoka = import_heyoka()
 
     text = _integer_and_exponent(significand, exponent)
     return heyoka.real128(text) if precision.family == "quad" else heyoka.real(text, precision.bits)

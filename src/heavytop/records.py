@@ -296,6 +296,12 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         said = ", for the first start; ".join(each.text for each in self.certificates)
         return f"known: {self.method}, radius below {self.radius}; {said}"
 
+    @property
+    def brief(self) -> str:
+        """The method and its proven error alone, where there are both."""
+        proven = self.how == "proven" and self.radius
+        return f"{self.method}, error < {self.radius.lower()} (proven)" if proven else self.text
+
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """The exact data of a motion, as text; omega and gamma are its start, or for an ensemble that by which its random

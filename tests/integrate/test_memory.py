@@ -70,7 +70,7 @@ def test_the_order_of_a_method_with_a_memory_is_that_of_its_runs(name: str) -> N
         assert found.metrics["observed_order_runs"].value == order
         assert ("local_error_ulp_max" in found.metrics) is not declared
         said = _said(found)
-        assert f"its order is {order}, as it says" in said
+        assert f"order {order} confirmed" in said
         assert "not the" not in said
         assert "wrongly" not in said
         assert ("one_step = false" in said) == (not declared and name not in KEPT_APART)

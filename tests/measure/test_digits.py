@@ -124,7 +124,7 @@ def test_every_surface_says_the_same(tmp_path: Path) -> None:
     report = Report(SCHEMA, {"name": "one"}, {}, [score(motion)])
     (drawn,) = plots.digits([("", report)]).rows
     assert said in drawn
-    assert f"{said} of 16 significant digits at T = 4" in html.report_page(report)
+    assert f"{said} of 16 digits right to T = 4" in html.report_page(report)
 
 
 def test_the_summary_of_many_rows_names_the_fewest() -> None:

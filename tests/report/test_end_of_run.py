@@ -40,6 +40,7 @@ def test_the_digits_of_each_motion_and_format_stand_in_a_table() -> None:
     ]
     assert said(*rows) == [
         "Plan p: 3 measurements, all finished.",
+        "heyoka in double: 7.0 of 16 digits right to T = 1e5 (euler).",
         f"{'Digits right, to |t|':39}      double       quad",
         f"{'euler':39}  7.0 to 1e5          -",
         f"{'a' * 38}…           -  9.0 to 20",
@@ -118,16 +119,16 @@ def test_laws_that_do_not_fit_a_column_are_counted() -> None:
 @pytest.mark.parametrize(
     ("order", "words"),
     [
-        ("4", "at most; its order is 4 in single steps, as it says."),
-        ("0", "at most; its order is 0 in single steps."),
-        ("", "at most."),
+        ("4", "1.9e-11; order 4 confirmed in single steps."),
+        ("0", "1.9e-11; order 0 in single steps."),
+        ("", "1.9e-11."),
     ],
 )
 def test_a_step_of_an_integrator_of_others_is_said_with_its_order(order: str, words: str) -> None:
     metrics = {"local_error_ulp_max": error("85947")} | ({"observed_order": error(order)} if order else {})
     theirs = row(measure="local_error", integrator="mine:rk4", metrics=metrics, order=4)
     sentence = " ".join(line.strip() for line in said(row(measure="local_error", metrics=metrics), theirs)[1:])
-    assert sentence == f"euler mine:rk4 in double: a step is off by 85947 eps {words}"
+    assert sentence == f"euler mine:rk4 in double: one step errs by at most {words}"
 
 
 def test_escapes_in_one_format_stand_by_integrator() -> None:

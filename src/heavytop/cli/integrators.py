@@ -28,9 +28,9 @@ def check_integrator(
     """
     from dataclasses import asdict
 
-    from heavytop.api.integrators import NOT_TRIED
     from heavytop.api.integrators import check_integrator as check
     from heavytop.cli.output import say_former, waiting
+    from heavytop.harness.integrator_check import NOT_TRIED
     from heavytop.records import current
 
     say_former([integrator])

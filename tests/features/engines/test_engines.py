@@ -131,6 +131,7 @@ def test_an_unknown_engine_is_refused(tmp_path: Path) -> None:
         new_integrator(tmp_path / "new", "python", engine="unity")
 
 
+@pytest.mark.slow
 def test_an_adapter_is_measured_as_its_engine_is(tmp_path: Path) -> None:
     (tmp_path / "engine.py").write_text(STAND_IN)
     (tmp_path / "heavytop_engine.py").write_text((ADAPTERS / "heavytop_engine.py").read_text())

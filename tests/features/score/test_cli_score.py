@@ -58,11 +58,9 @@ def across(i: int, state: list) -> list:
 def test_the_first_lines_say_how_good_it_is() -> None:
     found = assess(given(spoilt=across))
     lines = printed(found)
-    assert re.fullmatch(
-        r"8\.9 of 16 digits right at every sample up to T = 8; heyoka in double keeps 1\d\.\d\.", lines[0]
-    )
+    assert re.fullmatch(r"8\.9 of 16 digits right at every sample up to T = 8; heyoka in double: 1\d\.\d\.", lines[0])
     narrow = printed(found, 79)
-    assert re.fullmatch(r"8\.9 of 16 digits right .* heyoka in double keeps 1\d\.\d\.", " ".join(narrow[:2]))
+    assert re.fullmatch(r"8\.9 of 16 digits right .* heyoka in double: 1\d\.\d\.", " ".join(narrow[:2]))
     assert "The error is mostly across the flow." in lines[:3]
     assert max(map(len, lines)) <= 80
     assert found.peer is not None
@@ -117,7 +115,7 @@ def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> 
     text = page.read_text("utf-8")
     assert re.search(r"<h2 id=\"verdict-heading\">0\.0 of 16 digits right at every sample up to T = 8", text)
     assert diagnosis["sentence"].split(";")[0] in text
-    assert "Digits lost over time" in text
+    assert "Digits right over time" in text
 
 
 @pytest.mark.slow
@@ -128,7 +126,7 @@ def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     assert page.count("<svg") >= 1
     assert "along the flow (phase)" in page
     no_reference = assess(given(CASES["generic"], [Fraction(3000)]))
-    assert "Digits lost over time" not in report_page(score_report(no_reference, {}), KINDS)
+    assert "Digits right over time" not in report_page(score_report(no_reference, {}), KINDS)
 
 
 def write_motion(folder: Path, spoilt=lambda i, state: state, more: str = "") -> str:

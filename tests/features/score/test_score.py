@@ -251,7 +251,7 @@ def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:
     done = command("score", str(file), "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     said = " ".join(done.stdout.split())
-    assert re.match(r"1[45]\.\d of 16 digits right at every sample up to T = 5; heyoka in double keeps 1", said)
+    assert re.match(r"1[45]\.\d of 16 digits right at every sample up to T = 5; heyoka in double: 1", said)
     same = command("compare", str(tmp_path / "out"), str(tmp_path / "out"))
     assert same.returncode == 0
     spoilt = json.loads(made.stdout)

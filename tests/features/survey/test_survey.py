@@ -252,7 +252,7 @@ def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) 
     ht.run(file, tmp_path / "out", workers=1)
     (row,) = ht.read_report(tmp_path / "out").rows
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Digits lost over omega3 and gamma3" in page
+    assert "Digits right over Ω3 and γ3" in page
     assert isinstance(row.worst, tuple)
     assert all(f">{each.index}<" in page for each in row.worst)
     assert sum(row.spread.histograms["error_max"].counts) == 45  # type: ignore[union-attr]

@@ -96,6 +96,7 @@ def label(row: StatementVerdict) -> str:
 
 _PROVEN = {
     "motion": "Its equations of motion are proven for",
+    "component": "It is proven for",
     "integral": "It is proven to be constant along the motions of",
     "relation": "It is proven to be kept by the motions of",
 }

@@ -122,7 +122,7 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         return None
     section = Section(
         "break-away",
-        "Escape time against bits",
+        "Escape times",
         [
             "A homoclinic motion tends to a saddle, which multiplies every rounding error by e^(rate·|t|). No "
             "integrator stays on it: more digits buy time in proportion. Dashed: the law, ln 2 / rate time units per "

@@ -41,7 +41,7 @@ def worst_lines(hunted: Hunted) -> list[str]:
         part = m.error / max(hunted.law * m.explained(eps), 1e-300)
         said = "; ".join([class_of(*m.motion), *special(m)])
         lines.append(
-            f"{digits_lost(m.error, eps)} digits lost, {m.error / hunted.asked.unit:.2g} eps T^1.5, "
+            f"{_right(m.error, eps)} digits right, {m.error / hunted.asked.unit:.2g} eps T^1.5, "
             f"{part:.2g} of what is explained: {said}."
         )
     return lines
@@ -78,10 +78,10 @@ def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion,
         head = f"{number}. The run ends as {m.outcome}" + (f": {m.said}" if m.said else "")
         proof = f"The true motion exists there, {p.against}."
     else:
-        head = f"{number}. {each['digits_lost']} digits lost: an error of {p.error:.3g}"
+        head = f"{number}. {_right(p.error, eps)} digits right: an error of {p.error:.3g}"
         word = "Proven" if p.proven else "Not proven"
         proof = f"{word}: compared with {p.against.removeprefix('known: ')}."
-    usual = f"Random tops lose {digits_lost(hunted.median, eps)} digits (median)."
+    usual = f"Random tops: {_right(hunted.median, eps)} digits right (median)."
     beside = f"{_beside(hunted.asked.other, p, eps)}"
     what = "; ".join([each["class"], *special(m)])
     return [
@@ -95,14 +95,19 @@ def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion,
     ]
 
 
+def _right(error: float, eps: float) -> str:
+    """Digits right, at most those of the format."""
+    return f"{-math.log10(eps) - digits_lost(error, eps):.1f}"
+
+
 def _beside(other: ChosenIntegrator, p: Proof, eps: float) -> str:
     if p.other is None:
-        return f"What {other.name} loses here is not known."
+        return f"How many digits of {other.name} are right here is not known."
     if math.isinf(p.other):
         return f"{other.name} does not reach the horizon here either."
     times = ratio(p.error, p.other, eps)
     more = "" if times is None else f"; the error is {times:g} times as large"
-    return f"{other.name} loses {digits_lost(p.other, eps)} digits here{more}."
+    return f"{other.name}: {_right(p.other, eps)} digits right here{more}."
 
 
 def _folded(texts: Sequence[str]) -> list[str]:

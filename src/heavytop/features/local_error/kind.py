@@ -27,7 +27,7 @@ from heavytop.kind import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import OBSERVED_ORDER, ORDER_OF_RUNS
-from heavytop.precision import exact, parse, time_text
+from heavytop.precision import decimal_text, exact, parse, time_text
 from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.report.document.document import Table as Cells
@@ -185,9 +185,10 @@ def _number(row: Row, name: str) -> str:
 
 def _said(row: Row) -> str:
     """The largest error of a step, or of a run of what keeps a memory, and the order beside the declared one."""
-    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", _number(row, _LARGEST)
-    if largest:
-        text = f"{text}: a step is off by {largest} eps at most"
+    text, largest = f"{clip(row.case + computed_by(row))} in {row.precision}", row.metrics.get(_LARGEST)
+    if largest is not None and largest.log10 is not None:
+        size = exact(row.metrics[_LARGEST].value) * Fraction(2) ** (1 - row.bits)
+        text = f"{text}: one step errs by at most {short(decimal_text(size, 2), 2)}"
     else:
         text = f"{text}: its run is off by {_number(row, ERROR.text)} at t = {row.key.horizon}"
     order = _order(row)
@@ -203,10 +204,11 @@ def _order(row: Row) -> str:
     order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
     if not order:
         return ""
-    text = f"its order is {order}{'' if known else ' in single steps'}"
+    steps = "" if known else " in single steps"
+    text = f"order {order}{steps}"
     if order == str(row.order):
-        text += ", as it says"
+        text = f"order {order} confirmed{steps}"
     elif row.order and known:
-        text += f", {'not' if int(order) < row.order else 'more than'} the {row.order} that it says"
+        text += f", {'not' if int(order) < row.order else 'more than'} the declared {row.order}"
     hint = f" ({single} in single steps: declare one_step = false where it keeps a memory)"
     return text + (hint if runs and single not in ("", runs) else "")

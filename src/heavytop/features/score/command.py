@@ -30,7 +30,10 @@ _STATE_SECONDS = 1e-3
 
 @command
 def score(
-    trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
+    trajectories: Annotated[
+        list[Path],
+        typer.Argument(metavar="TRAJECTORY...", help="Files of trajectories: .json, .csv; - reads one."),
+    ],
     case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
@@ -47,12 +50,17 @@ def score(
     first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
     Euler angles, positions, Ω in axes of space: `heavytop docs score`.  Takes a few seconds.
 
+    Several files are scored in parallel, a line each; files that differ in their step alone give the order.
+
     Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
     3 where it ended early, or that is not known.
     """
     from heavytop.features.score.api import read_trajectory, scored
     from heavytop.files import replace_all
 
+    if len(trajectories) > 1:
+        return _several(trajectories, case, require, normalize, json, out or html)
+    (trajectory,) = trajectories
     if out is not None:
         out = absolute(out)
         require_new(out)
@@ -79,6 +87,25 @@ def score(
     if needed is not None:
         print(f"\n{requirement(found.row, needed)}")
     return found.exit_code
+
+
+def _several(
+    paths: list[Path], case: str | None, require: str | None, normalize: bool, json: bool, page: Path | None
+) -> int:
+    from dataclasses import asdict
+
+    from heavytop.features.score.several import exit_code, orders, score_files, text
+
+    if page is not None:
+        raise InputError(f"--out and --html are of one trajectory; got {len(paths)}.", "Score them one by one.")
+    if Path("-") in paths:
+        raise InputError("Standard input is one trajectory.", "Give files.")
+    files = score_files(paths, case, require, normalize)
+    if json:
+        print_json({"files": [each.document for each in files], "orders": [asdict(each) for each in orders(files)]})
+    else:
+        print(text(files))
+    return exit_code(files)
 
 
 def _write_report(report: Report, out: Path) -> None:

@@ -15,11 +15,12 @@ from rich.text import Text
 from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES
 from heavytop.features.score.diagnose.samples import FLOOR, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
-from heavytop.measure.attitude_error import JOINT_VIOLATION
+from heavytop.measure.attitude_error import ATTITUDE_ERROR, JOINT_VIOLATION, POSITION_ERROR
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.records import SCHEMA, Beside, Peer, Quantity, Report, Row
 from heavytop.report.document.document import (
+    DASHED,
     TIME,
     Block,
     Card,
@@ -27,18 +28,20 @@ from heavytop.report.document.document import (
     Chart,
     Headline,
     In,
-    Key,
     Note,
     Section,
     Sources,
     Table,
     Value,
     draw,
+    integral_text,
     logarithm,
+    numbered,
+    points,
     scientific,
     short,
 )
-from heavytop.report.document.svg import MARKERS, decades, finish, new_axes, spoken
+from heavytop.report.document.svg import COLOURS, decades, finish, new_axes, spoken
 from heavytop.report.render.text import table, wrapped
 
 # Mistakes of convention in a sentence each: what fits, where it was found, and how many digits are right with it.
@@ -327,7 +330,7 @@ def answer(row: Row, peer: Peer | None) -> list[str]:
     where = "every sample up to" if row.samples > 1 else "its one sample,"
     said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
     if peer is not None:
-        said += f"; {peer.integrator} in {peer.precision} keeps {digits_text(peer.digits_right)}"
+        said += f"; {peer.integrator} in {peer.precision}: {digits_text(peer.digits_right)}"
     lines.append(f"{said}.")
     mostly = direction(row)
     if mostly is not None:
@@ -388,7 +391,7 @@ def sizes(row: Row) -> list[list[Cell]]:
     names |= {Quantity(name): f"error{until}, {label}" for name, label in _OBSERVED.items()}
     names[Quantity(JOINT_VIOLATION)] = "distance of the joint"
     found = [metric.quantity for metric in row.metrics.values() if metric.quantity]
-    names |= {Quantity(DRIFT, q.component): f"drift, {q.component}" for q in found if q.name == DRIFT}
+    names |= {Quantity(DRIFT, q.component): f"drift, {integral_text(q.component)}" for q in found if q.name == DRIFT}
     return [
         [label, *(Value(row.metrics.get(each.over(part).text)) for part in ("max", "rms", "final"))]
         for each, label in names.items()
@@ -400,9 +403,9 @@ def score_text(found: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
     row = found.row
     numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
-    about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
+    about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [Text(line) for line in answer(row, found.peer)]
-    parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
+    parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]
     explained = told(found)
     if explained:
         parts += [Text(), *(line for each in explained for line in _wrapped(each))]
@@ -413,13 +416,18 @@ def _wrapped(text: str) -> list[Text]:
     return [Text(line) for line in wrapped(text, "")]
 
 
-# What a report says of one scored motion: digits right, digits lost over time along and across the flow.
+# What a report says of one scored motion: digits right, at the end and over time.
 
 
 _SIZES = "", "largest", "rms", "final"
 _MOST = 50
 """Sentences beside the answer."""
-_PAGE_PARTS = {"along": "along the flow (phase)", "across": "across the flow"}
+_CURVES = {
+    Quantity(SOLUTION_ERROR, "along"): "along the flow (phase)",
+    Quantity(SOLUTION_ERROR, "across"): "across the flow",
+    Quantity(ATTITUDE_ERROR): "attitude",
+    Quantity(POSITION_ERROR): "position",
+}
 
 
 def score_report(found: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
@@ -432,12 +440,12 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
     """How good a scored motion is, what explains its error, how its digits are lost, and the same in numbers."""
     first, *others = answer(row, beside.peer)
     yield Headline(first)
-    compared = f"Compared with {row.against}."
+    compared = f"Reference: {row.reference.brief}."
     yield from (Note(said, shown=In.FULL | In.PAGE) for said in (*others, *([] if beside.remarks else [compared])))
     if beside.remarks:
         remarks = [Note(said) for said in beside.remarks[:_MOST]]
-        yield Card("What explains it", remarks, note=compared, shown=In.FULL | In.PAGE)
-    yield Chart(digits_lost)
+        yield Card("Remarks", remarks, note=compared, shown=In.FULL | In.PAGE)
+    yield Chart(digits_over_time)
     units = (
         "Errors of Ω and along and across the flow in 1/time unit, of γ in units of |γ| = 1; drift of each first "
         "integral in its own units."
@@ -445,62 +453,47 @@ def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
     yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 
 
-def digits_lost(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits that the format has and the state has not, over |t|; None for several motions, without a reference, and
+def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Digits right over |t|, of each error that has a series; None for several motions, without a reference, and
     without a sample away from 0.
     """
     rows = [row for _, report in sources for row in report.rows]
-    if len(rows) != 1:
+    held = {label: rows[0].series[q.text] for q, label in _CURVES.items() if rows and q.text in rows[0].series}
+    if len(rows) != 1 or not any(points(series)[0] for series in held.values()):
         return None
     (row,) = rows
-    section = Section(
-        "lost",
-        "Digits lost over time",
-        [
-            f"Digits lost: log10 of the error in units of ε = 2^(1 − bits) of {row.precision}, of its part along the "
-            "flow (phase) and of its part across it. The axis ends where the format has lost all significant digits."
-        ],
-        columns=["t", *_PAGE_PARTS],
-    )
-    axes = new_axes(TIME, "digits lost", 3.2)
-    epsilon = (1 - row.bits) * math.log10(2)
-    alternative = []
-    for place, (part, label) in enumerate(_PAGE_PARTS.items()):
-        curve = _lost(row, part, epsilon)
-        if curve:
-            x, y = [point[0] for point in curve], [point[1] for point in curve]
-            draw(axes, section.key(Key(label, place, MARKERS[place])), x, y)
-            alternative.append(f"{label}: {y[-1]:.1f} digits lost at |t| = {scientific(x[-1])}.")
-    if not alternative:
-        return None
     most = row.bits * math.log10(2)
-    axes.set_ylim(0, max(most, *(line.get_ydata().max() for line in axes.lines)) * 1.02)
-    axes.axhline(most, color="#555555", lw=0.9, ls=(0, (4, 3)))
+
+    def right(size: float) -> float:
+        return min(most, max(0.0, -size))
+
+    section = Section(
+        "over-time",
+        "Digits right over time",
+        [
+            "Digits right: −log10 of the error along the flow (phase), across it, of the attitude in radians, of the "
+            f"position. Dashed: all {most:.0f} digits of {row.precision}."
+        ],
+        columns=["t", *held],
+    )
+    axes = new_axes(TIME, "digits right", 3.2)
+    alternative = []
+    for place, (label, series) in enumerate(held.items()):
+        x, sizes_ = points(series)
+        if x:
+            y = [right(size) for size in sizes_]
+            draw(axes, section.key(numbered(label, place)), x, y)
+            alternative.append(f"{label}: {y[-1]:.1f} digits right at |t| = {scientific(x[-1])}.")
+    axes.set_ylim(0, most * 1.04)
+    axes.axhline(most, color=COLOURS[-1], lw=0.9, ls=DASHED)
     decades(axes.xaxis)
-    section.rows = _table(row, epsilon)
-    section.notes.append(f"Dashed: all {most:.0f} digits of {row.precision} are lost.")
-    section.pictures.append(finish(axes, "Digits lost over time", spoken(alternative), "lost"))
-    return section
 
-
-def _lost(row: Row, part: str, epsilon: float) -> list[tuple[float, float]]:
-    """log10 |t| and digits lost at each sample of the series that has both."""
-    series = row.series.get(Quantity(SOLUTION_ERROR, part).text)
-    if series is None:
-        return []
-    pairs = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=True)]
-    return [(x, max(y - epsilon, 0.0)) for x, y in pairs if x is not None and y is not None]
-
-
-def _table(row: Row, epsilon: float) -> list[list[str]]:
-    """The digits lost at each time."""
-    series = [row.series[Quantity(SOLUTION_ERROR, part).text] for part in _PAGE_PARTS]
-
-    def lost(value: str) -> str:
+    def cell(value: str) -> str:
         size = logarithm(value)
-        return "0.0" if value == "0" else value if size is None else f"{max(size - epsilon, 0.0):.1f}"
+        return f"{most:.1f}" if value == "0" else value if size is None else f"{right(size):.1f}"
 
-    return [
-        [short(time), *map(lost, values)]
-        for time, *values in zip(series[0].times, *(each.values for each in series), strict=True)
-    ]
+    at = [dict(zip(series.times, series.values, strict=True)) for series in held.values()]
+    times = dict.fromkeys(time for values in at for time in values)
+    section.rows = [[short(time), *(cell(values.get(time, "")) for values in at)] for time in times]
+    section.pictures.append(finish(axes, section.title, spoken(alternative), section.id))
+    return section

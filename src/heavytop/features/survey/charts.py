@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -28,6 +29,7 @@ _NAMES = {
     "drift_further": "drift of further integrals",
 }
 _MOST_MAPS = 4
+_SHADES = 16
 _IN_A_ROW = 5
 _POINTS, _LONGEST = 240, 20
 _AXES = (numpy.array([1.0, -1.0, 0.0]) / 2**0.5, numpy.array([-1.0, -1.0, 2.0]) / 6**0.5)
@@ -44,7 +46,7 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
         "Surveys of many motions",
         [
             "A distribution is the part of the motions in each quarter of a decade. In the map a cell is the darker "
-            "the more digits are lost in it (the median). Each of the worst motions is drawn as the path of the "
+            "the fewer digits are right in it (the median). Each of the worst motions is drawn as the path of the "
             f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {_LONGEST}; dashed behind.",
         ],
         columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
@@ -58,7 +60,7 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
     for number, (source, row) in enumerate(rows[:_MOST_MAPS]):
         label = _label(source, row)
         if (cells := _spread(row).map) is not None:
-            section.pictures.append(_map(cells, label, f"survey-map-{number}"))
+            section.pictures.append(_map(cells, label, row.bits * math.log10(2), f"survey-map-{number}"))
         if isinstance(row.worst, tuple) and row.worst:
             section.pictures.append(_paths(row, row.worst, label, f"survey-worst-{number}"))
     left_out(section, len(rows) - _MOST_MAPS, "map")
@@ -97,23 +99,34 @@ def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys,
     return finish(axes, f"Distribution: {_NAMES[name]}", spoken(alternative), f"survey-{name.replace('_', '-')}")
 
 
-def _map(cells: CellMap, label: str, name: str) -> Picture:
+def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
+    """Digits right over two data; above it the colours of the fewest to the most."""
     from matplotlib.patches import Rectangle
 
-    axes = new_axes(cells.x, cells.y, 3.4)
+    x, y = (name.replace("omega", "Ω").replace("gamma", "γ") for name in (cells.x, cells.y))
+    axes = new_axes(x, y, 3.4)
     known = [value for row in cells.digits_lost for value in row if value is not None]
     low, high = min(known), max(known)
+
+    def paint(x: float, y: float, width: float, height: float, lost: float, **options: Any) -> None:
+        dark = 0.08 + 0.92 * (lost - low) / (high - low or 1.0)
+        patch = Rectangle((x, y), width, height, linewidth=0, facecolor=COLOURS[0], **options)
+        patch.set_alpha(round(dark, 2))
+        axes.add_patch(patch)
+
     for row, bottom, top in zip(cells.digits_lost, cells.y_edges, cells.y_edges[1:], strict=False):
         for value, left, right in zip(row, cells.x_edges, cells.x_edges[1:], strict=False):
             if value is not None:
-                dark = 0.08 + 0.92 * (value - low) / (high - low or 1.0)
-                cell = Rectangle((left, bottom), right - left, top - bottom, linewidth=0, facecolor=COLOURS[0])
-                cell.set_alpha(round(dark, 2))
-                axes.add_patch(cell)
+                paint(left, bottom, right - left, top - bottom, value)
     axes.set_xlim(cells.x_edges[0], cells.x_edges[-1])
     axes.set_ylim(cells.y_edges[0], cells.y_edges[-1])
-    said = f"From {low:.2f} digits lost, the lightest, to {high:.2f}, the darkest."
-    return finish(axes, f"Digits lost over {cells.x} and {cells.y}: {label}", said, name, said)
+    for step in range(_SHADES):
+        lost = high + (low - high) * step / (_SHADES - 1)
+        paint(0.3 + 0.4 * step / _SHADES, 1.005, 0.4 / _SHADES, 0.03, lost, transform=axes.transAxes, clip_on=False)
+    for place, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
+        axes.text(place, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
+    said = f"From {digits - high:.1f} digits right, the darkest, to {digits - low:.1f}, the lightest."
+    return finish(axes, f"Digits right over {x} and {y}: {label}", said, name, said)
 
 
 def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from heavytop.features.work_precision.curves import Lead, WorkPrecisionLine, leads, panels, seconds_text
+from heavytop.integrate.registry import INTEGRATORS
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.measure.scorer import ERRORS
 from heavytop.records import UNRESOLVED_SECONDS, Row, Series
 from heavytop.report.document.document import (
     DASHED,
     TIME,
-    Answers,
     Key,
     Keys,
     Section,
     Sources,
+    Table,
     clip,
     draw,
     left_out,
+    numbered,
     points,
     scientific,
     short,
@@ -63,7 +66,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
             "general code, and the others, are given them when they run.",
         ],
-        answers=Answers("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
+        answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
         if found
         else None,
         columns=[
@@ -83,11 +86,31 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
     )
     cases = list(dict.fromkeys(row.case for _, row in rows))
     left_out(section, len(cases) - MOST_CASES, "case")
-    keys = Keys()
+    drawn = {source: panels(report.rows) for source, report in sources}
+    colours = _in_colour([lines for of_cases in drawn.values() for lines in of_cases.values()])
+    if len(colours) > _MOST_COLOURS:
+        section.notes.append("Grey: integrators that are slower at error 1e-10 than those in colour.")
     for number, case in enumerate(cases[:MOST_CASES]):
-        lines = [(source, line) for source, report in sources for line in panels(report.rows).get(case, ())]
-        section.pictures.append(_picture(lines, keys, f"{clip(case, 40)}: time against error", f"work-{number}"))
+        lines = [(source, line) for source, of_cases in drawn.items() for line in of_cases.get(case, ())]
+        section.pictures.append(_picture(lines, colours, f"{clip(case, 40)}: time against error", f"work-{number}"))
     return section
+
+
+_MOST_COLOURS = 5
+
+
+def _in_colour(cases: Sequence[Sequence[WorkPrecisionLine]]) -> dict[str, int]:
+    """The place of each label: first the integrators of other packages and those that are fastest at error 1e-10, as
+    many as there are colours beside grey, in the order in which they come; then the others.
+    """
+    points: Counter[str] = Counter()
+    for lines in cases:
+        times = sorted((seconds, line.label) for line in lines if (seconds := line.seconds_at(-10.0)) is not None)
+        points.update({label: _MOST_COLOURS - place for place, (_, label) in enumerate(times[:_MOST_COLOURS])})
+    labels = list(dict.fromkeys(line.label for lines in cases for line in lines))
+    theirs = [line.label for lines in cases for line in lines if line.integrator not in INTEGRATORS]
+    best = list(dict.fromkeys([*theirs, *(label for label, _ in points.most_common()), *labels]))[:_MOST_COLOURS]
+    return {label: place for place, label in enumerate(sorted(labels, key=lambda label: label not in best))}
 
 
 def _lead_cells(lead: Lead, source: str) -> list[str]:
@@ -101,13 +124,13 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
         said(lead.ours),
         clip(lead.other, 40),
         said(lead.theirs) if lead.other else "",
-        "" if lead.ratio is None else f"{lead.ratio:.1f}",
+        "" if lead.ratio is None else f"{'slower, ' * (lead.ratio < 1)}{lead.ratio:.1f}\N{NO-BREAK SPACE}×",
         "" if lead.general is None else said(lead.general[1]),
         "" if lead.lanes is None else seconds_text(lead.lanes),
     ]
 
 
-def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], keys: Keys, title: str, name: str) -> Picture:
+def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, int], title: str, name: str) -> Picture:
     names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
     height = max(3.4, 1 + 0.17 * len(lines))
     axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
@@ -115,7 +138,8 @@ def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], keys: Keys, title: 
     decades(axes.yaxis)
     alternative, ends = [], []
     for (source, line), label in zip(lines, names, strict=True):
-        key = keys.key(clip(line.label, 30), source)
+        place = min(colours[line.label], _MOST_COLOURS)
+        key = numbered(label, place, source == "baseline")
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)

@@ -209,40 +209,33 @@ def _step(row: Row, log10: float) -> float:
 
 
 def beside_ours(rows: Sequence[Row]) -> list[Table]:
-    """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
-    a line a point of the curve, of its error, its seconds and, where heyoka is measured, what it takes for that error.
+    """The integrator that is measured beside heyoka alone, or comes from another package: a table a case, two at most,
+    a line a point of the curve with its error, its time and, where heyoka is measured, heyoka's time for that error.
     """
     found = panels(rows)
     names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
     beside = any(line.integrator == OURS for lines in found.values() for line in lines)
     tables = []
     for name in sorted(names if beside and len(names) == 1 else names - INTEGRATORS.keys()):
-        cases: dict[str, dict[str, str]] = {}
-        for case, lines in list(found.items())[:_MOST_CASES]:
-            for line in lines:
-                if line.integrator == name:
-                    ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
-                    cells = {_rung(line, point): _cell(point, ours) for point in line.points}
-                    seen = {} if line.order is None else {"order seen": line.order_text}
-                    cases[case] = cases.get(case, {}) | cells | seen
-        points = dict.fromkeys(point for cells in cases.values() for point in cells)
-        lines_of = [[point, *(cells.get(point, "-") for cells in cases.values())] for point in points]
-        note = f"{name}: largest error in its time" + (" (heyoka's time for that error)" if beside else "")
-        if lines_of:
-            tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
+        of_name = {case: [line for line in lines if line.integrator == name] for case, lines in found.items()}
+        for case in [case for case, lines in of_name.items() if any(line.points for line in lines)][:_MOST_CASES]:
+            cells = []
+            for line in of_name[case]:
+                ours = [each for each in found[case] if (each.integrator, each.precision) == (OURS, line.precision)]
+                cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
+                cells += [] if line.order is None else [["order seen", line.order_text, "", ""][: 3 + beside]]
+            columns = [f"{name}, {case}", "error", "time", "heyoka's time"][: 3 + beside]
+            tables.append(Table("", columns, cells, shown=In.SHORT))
     return tables
 
 
-def _rung(line: WorkPrecisionLine, point: WorkPrecisionPoint) -> str:
-    return point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
-
-
-def _cell(point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> str:
-    cell = f"{10**point.log10:.1e} in {point.takes(2)}"
-    if not ours or not point.resolved:
-        return cell
-    seconds, _ = _quickest(ours, point.log10)
-    return f"{cell} ({'not reached' if seconds is None else seconds_text(seconds, 2)})"
+def _point(line: WorkPrecisionLine, point: WorkPrecisionPoint, ours: Sequence[WorkPrecisionLine]) -> list[str]:
+    """The setting of a point, its error and its time, and heyoka's time for that error."""
+    setting = point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
+    seconds = _quickest(ours, point.log10)[0]
+    known = "not reached" if seconds is None else seconds_text(seconds, 2)
+    compared = known if ours and point.resolved else "-"
+    return [setting, f"{10**point.log10:.1e}", point.takes(2), compared]
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:

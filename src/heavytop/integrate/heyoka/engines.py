@@ -16,6 +16,7 @@ from typing import Any
 import numpy
 
 from heavytop.errors import Contradiction, InputError
+from heavytop.extras import import_heyoka
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import (
     DOUBLE,
@@ -225,7 +226,7 @@ _compiling: dict[tuple[Any, ...], RLock] = {}
 @cache
 def not_finite() -> Any:
     """The outcome of a step to a state that is not finite."""
-    import heyoka
+    heyoka = import_heyoka()
 
     return heyoka.taylor_outcome.err_nf_state
 
@@ -236,7 +237,7 @@ def expressions(system: System, attitude: bool, constants: Parameters | None = N
 
     constants: doubles in the place of all par[i].
     """
-    import heyoka  # when it is used: its loading takes half of a start
+    heyoka = import_heyoka()
 
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
@@ -298,7 +299,7 @@ def _built(
     constants: Parameters | None,
 ) -> tuple[Any, float]:
     """A new engine, and the seconds that compiling it took."""
-    import heyoka
+    heyoka = import_heyoka()
 
     # a cache of machine code on disk is not protected against corruption: a flipped bit gives wrong numbers silently
     heyoka.llvm_state.set_diskcache_enabled(False)

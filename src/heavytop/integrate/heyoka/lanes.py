@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy
 
+from heavytop.extras import import_heyoka
 from heavytop.integrate.heyoka.engines import arrays, compiled, not_finite
 from heavytop.integrate.heyoka.motions import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -345,7 +346,7 @@ def states_on_a_grid(
     above 0.  options: tolerance.  A motion is not good where it, or one of the seven beside it, did anything but get
     there in steps that move its time.
     """
-    import heyoka
+    heyoka = import_heyoka()
 
     tool = compiled(system, DOUBLE, lanes=LANES, **options)
     count, ends = len(starts), numpy.array([0.0, *map(float, times)])

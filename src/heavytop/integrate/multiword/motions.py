@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Any
 
 from heavytop.errors import InputError, OutOfReach
+from heavytop.extras import import_heyoka
 from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.registry import expected_steps
 from heavytop.integrate.trajectory import (
@@ -225,7 +226,7 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
 
     Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
     """
-    import heyoka
+    heyoka = import_heyoka()
     import numpy
 
     zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
@@ -254,7 +255,7 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     """The sums of words of a grid, shape (n, K + 1, components), times a size each, rounded once; and the rows in which
     only exact numbers tell.
     """
-    import heyoka
+    heyoka = import_heyoka()
     import numpy
 
     each = [words[:, k] for k in range(words.shape[1])]
@@ -282,7 +283,7 @@ def _exact_sums(words: Iterable[Doubles]) -> tuple[Fraction, ...]:
 def _widening(precision: Precision) -> Callable[[float], Any]:
     """A double as a number of a format with as many bits or more."""
     if precision.family in ("double-double", "real"):
-        import heyoka
+        heyoka = import_heyoka()
 
         return lambda value: heyoka.real(value, precision.bits)
     import numpy

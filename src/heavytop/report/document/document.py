@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import Flag, auto
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError
 from heavytop.measure.integrator import HEYOKA
@@ -45,6 +45,14 @@ def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
     name = "" if subject.name == HEYOKA else subject.name
     mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
     return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
+
+
+_INTEGRALS = {"gamma_squared": "|γ|²", "momentum_squared": "|M|²", "area": "M·γ"}
+
+
+def integral_text(name: str) -> str:
+    """A first integral by its formula, or by its name in words."""
+    return _INTEGRALS.get(name, name.replace("_", " "))
 
 
 def with_source(name: str, source: str) -> str:
@@ -99,14 +107,6 @@ class Key:
     line: bool = True
 
 
-class Answers(NamedTuple):
-    """The results that the pictures of a section show: cells under their columns; the first of each row names it."""
-
-    caption: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
 @dataclass(slots=True)
 class Section:
     """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn.
@@ -117,11 +117,11 @@ class Section:
     id: str
     title: str
     text: list[str]
-    answers: Answers | None = None
+    answers: Table | None = None
     pictures: list[Picture] = field(default_factory=list)
     legend: dict[str, Key] = field(default_factory=dict)
     columns: list[str] = field(default_factory=list)
-    rows: list[list[str]] = field(default_factory=list)
+    rows: list[Sequence[Cell]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     across: int = 3
     place: int = 100
@@ -132,7 +132,7 @@ class Section:
 
     def drop_empty_columns(self) -> None:
         """Take columns in which no row has anything out of the numbers."""
-        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        used = [index for index in range(len(self.columns)) if any(cell_text(row[index]) for row in self.rows)]
         self.columns = [self.columns[index] for index in used]
         self.rows = [[row[index] for index in used] for row in self.rows]
 

@@ -25,12 +25,10 @@ from heavytop.precision import exact
 from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import Change, folded, line, statistics
-from heavytop.report.compare.rows import Finding
 from heavytop.report.document.document import (
     Card,
     Cell,
     Chart,
-    Document,
     Headline,
     In,
     Make,
@@ -39,9 +37,11 @@ from heavytop.report.document.document import (
     Sources,
     Table,
     Value,
+    Word,
     cell_text,
     clip,
     computed_by,
+    integral_text,
     logarithm,
     row_name,
     short,
@@ -73,11 +73,12 @@ def report_page(report: Report, kinds: Kinds) -> str:
     return render(
         "report.html.j2",
         report=report,
-        headlines=_headlines(found, kinds)
+        headlines=headlines(found, kinds)
         or [Headline(f"{plural(len(report.rows), 'measurement')}, {len(failures)} of which failed.")],
         notes=[block for block in blocks if isinstance(block, Note)],
         cards=[block for block in blocks if isinstance(block, Card)],
-        failures=failures[:MOST_FAILURES],
+        failures=[_failure(row) for row in failures[:MOST_FAILURES]],
+        failed_columns=_FAILED,
         failed=len(failures),
         not_supported=unsupported(report.rows),
         lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
@@ -93,11 +94,14 @@ def report_page(report: Report, kinds: Kinds) -> str:
     )
 
 
-def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
-    """The answer of each kind; one that has cards is repeated in a sentence only where it opens the page alone."""
-    said = headlines(found, kinds)
-    with_cards = [blocks for blocks in found.values() if any(isinstance(block, Card) for block in blocks)]
-    return [each for number, each in enumerate(said) if not number or not any(each in blocks for blocks in with_cards)]
+_FAILED = ("case", "measure", "integrator", "format", "outcome", "reached |t|", "of", "steps", "why")
+
+
+def _failure(row: Row) -> list[Cell]:
+    """A measurement that failed: where it stopped, and why where it was not measured."""
+    names = (row.case, row.measure.replace("_", " "), row.integrator, row.precision)
+    reached = (Word(clip(row.outcome, 30)), short(row.time_reached), short(row.horizon), str(row.steps))
+    return [*map(clip, names), *reached, "" if row.metrics else clip(row.against, 200)]
 
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:
@@ -156,8 +160,9 @@ def _only(sources: Sources, names: Container[str]) -> Sources:
 def _add(tables: dict[str, Section], table: Table, source: str) -> None:
     """Take the rows of a table of a report into the section of that title."""
     new = Section(f"table-{len(tables)}", table.title, list(table.notes), columns=list(table.columns))
-    rows = ([clip(cell_text(cell), 120) for cell in row] for row in table.rows)
-    tables.setdefault(table.title, new).rows += [[with_source(name, source), *cells] for name, *cells in rows]
+    for name, *cells in table.rows:
+        shown = [cell if isinstance(cell, Word) else clip(cell_text(cell), 180) for cell in cells]
+        tables.setdefault(table.title, new).rows.append([with_source(clip(cell_text(name), 120), source), *shown])
 
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
@@ -195,7 +200,7 @@ def metric_cells(row: Row) -> list[list[str]]:
     """Name, value, and rounding noise in decades of the first metrics."""
     return [
         [
-            clip(name, 80),
+            clip(name.replace("_", " "), 80),
             clip(metric.value, 40) + (f" (below {short(metric.bound)})" if metric.bound else ""),
             f"{metric.band:.2f}" if metric.band else "",
         ]
@@ -203,9 +208,17 @@ def metric_cells(row: Row) -> list[list[str]]:
     ]
 
 
-def quantities(changed: Change) -> list[tuple[str, Finding]]:
+def quantities(changed: Change) -> list[list[Cell]]:
     """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
-    return [(statistics(changed, name, found), found[0]) for name, found in folded(changed)]
+    return [
+        [
+            clip(statistics(changed, name, found) or "whole row", 80),
+            Word(found[0].verdict.value),
+            *(clip(short(value or "–"), 40) for value in (found[0].baseline, found[0].candidate)),
+            clip(found[0].reason, 200),
+        ]
+        for name, found in folded(changed)
+    ]
 
 
 def commands(report: Report) -> list[str]:
@@ -252,6 +265,7 @@ def render(template: str, **context: Any) -> str:
         "folded": quantities,
         "plural": plural,
     }
+    environment.tests["verdict"] = lambda cell: isinstance(cell, Word)
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)
 
@@ -264,30 +278,32 @@ _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved
 
 
 def digits_headline(rows: Sequence[Row]) -> Headline | None:
-    """The fewest significant digits at the longest horizon: of a third-party integrator beside heyoka's, else
-    of heyoka beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has
-    lost all significant digits, counts where there is no other.
+    """The fewest digits right at the longest horizon: of a third-party integrator beside heyoka's, else of heyoka
+    beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has lost all
+    significant digits, counts where there is no other.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
     at_least = "" if known else "at least "
     known = known or [(row, kept) for row in finished if (kept := _at_least(row)) is not None]
-    known = [each for each in known if not each[0].reference.until] or known
-    theirs = [each for each in known if each[0].key.subject.name not in (HEYOKA, MULTIWORD)]
-    ours = [each for each in known if each[0].key.subject.name == HEYOKA]
-    beside = HEYOKA if theirs else MULTIWORD
-    second = {_place(row): kept for row, kept in known if row.key.subject.name == beside}
+    known = [pair for pair in known if not pair[0].reference.until] or known
+    theirs = [pair for pair in known if pair[0].key.subject.name not in (HEYOKA, MULTIWORD)]
+    ours = [pair for pair in known if pair[0].key.subject.name == HEYOKA]
+    other = HEYOKA if theirs else MULTIWORD
+    second = {_place(row): kept for row, kept in known if row.key.subject.name == other}
     own = theirs or ours or known
-    chosen = [each for each in own if theirs and _place(each[0]) in second] or own
+    chosen = [pair for pair in own if theirs and _place(pair[0]) in second] or own
     if not chosen:
         return None
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
-    row, kept = min((each for each in chosen if abs(exact(each[0].horizon)) == last), key=lambda each: each[1])
-    digits = f"{digits_text(kept)} of {digits_of(row.bits)} significant digits"
-    said = f"{clip(row.key.subject.name, 40)} has {at_least}{digits}"
-    said += f" at T = {short(row.horizon)} ({clip(row.case, 40)} in {clip(row.precision, 20)})"
-    other = second.get(_place(row))
-    return Headline(said + ("." if other is None else f", {beside} {digits_text(other)}."))
+    longest = [pair for pair in chosen if abs(exact(pair[0].horizon)) == last]
+    row, kept = min(longest, key=lambda pair: pair[1])
+    said = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(kept)} of "
+    said += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
+    cases = {row.case for row, _ in longest}
+    said += f", worst of {len(cases)})" if len(cases) > 1 else ")"
+    said += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
+    return Headline(said, shown=In.SHORT | In.FULL | In.PAGE)
 
 
 def _at_least(row: Row) -> float | None:
@@ -302,9 +318,9 @@ def _place(row: Row) -> tuple[str, int, str]:
 
 
 def named(rows: Sequence[Row]) -> Callable[[Row], str]:
-    """What a row is called among these: its case, and its integrator where they have several."""
+    """What a row is called among these: its case, and its integrator, where they have several and it is not heyoka."""
     several = len({row.key.subject.name for row in rows}) > 1
-    return lambda row: f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
+    return lambda row: row.key.case + (f",{name}" if several and (name := computed_by(row)) else "")
 
 
 def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT) -> list[Table]:
@@ -346,7 +362,7 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
             known[place] = row
     found = list(known.values())
     more = "; of the attitude" if any(map(_attitude_asked, found)) else ""
-    return in_columns(f"Digits right, to |t|{more}", _digits_until, found)
+    return in_columns(f"Digits right, to |t|{more}", digits_until, found)
 
 
 def attitude_columns(rows: Sequence[Row]) -> list[Table]:
@@ -376,7 +392,8 @@ def _end(row: Row) -> float:
     return -math.inf if found is None else found
 
 
-def _digits_until(row: Row) -> str:
+def digits_until(row: Row) -> str:
+    """``9.2 to 1e5``; ``0.0 from 700`` where the format has lost all significant digits by then."""
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
@@ -412,7 +429,7 @@ def _motion(row: Row) -> list[Cell]:
         row.outcome,
         digits + (f" from {row.reference.until}" if row.reference.until else ""),
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
-        "  ".join(f"{name} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
+        "  ".join(f"{integral_text(name)} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
     ]
 
 

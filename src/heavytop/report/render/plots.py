@@ -8,8 +8,8 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
 
+from heavytop.display import plural
 from heavytop.errors import InputError
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.records import Law, Metric, Quantity, Report, Row, Series
@@ -17,6 +17,7 @@ from heavytop.report.document.document import (
     DASHED,
     MOST_PLOTS,
     TIME,
+    Cell,
     Key,
     Keys,
     Section,
@@ -34,7 +35,6 @@ from heavytop.report.document.document import (
 from heavytop.report.document.kind import Kinds
 from heavytop.report.document.svg import (
     COLOURS,
-    MARKERS,
     End,
     Picture,
     decades,
@@ -45,7 +45,7 @@ from heavytop.report.document.svg import (
     room,
     spoken,
 )
-from heavytop.report.render.page import sections
+from heavytop.report.render.page import digits_until, sections
 
 _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")
@@ -95,7 +95,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         return None
     section = Section(
         "growth",
-        "Drift and state error over time",
+        "Errors over time",
         [
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
             "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
@@ -233,136 +233,94 @@ def _law_words(law: Law | None) -> list[str]:
     return [law.growth, exponent, short(law.lost_at) if law.lost_at else ""]
 
 
-# The section of a page that says how many digits are lost by the horizon.
+# The section of a page that says how many digits are right: a chart a format.
 
 
 MOST_LANES, MOST_LISTED = 40, 160
-_NONE = digits_text(0)
-
-
-def digits_lost(row: Row) -> float | None:
-    """Of the digits that the format has; None for a run that failed, and where nothing says."""
-    kept = digits_kept(row) if row.outcome == "success" else None
-    return None if kept is None else row.bits * math.log10(2) - max(kept, 0.0)
+_Run = tuple[str, Row]
+"""With the source of its report."""
 
 
 def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits lost against the horizon: a line a motion and integrator, a marker a format.
+    """Digits right at every sample: a chart a format, a line a motion and integrator; those of ``first`` on top.
 
     Runs with other options than the usual, planted faults among them, are in the numbers alone.
     """
-    lanes: dict[tuple[str, str], list[tuple[str, Row]]] = {}
-    for source, report in sources:
-        for row in report.rows:
-            if RELATIVE.text in row.metrics:
-                lanes.setdefault((row.case, variant(row, sources)), []).append((source, row))
-    if not lanes:
+    runs = [(source, row) for source, report in sources for row in report.rows if RELATIVE.text in row.metrics]
+    if not runs:
         return None
     section = Section(
         "digits",
-        "Digits lost over a run",
+        "Digits right",
         [
-            "Digits lost: digits of the format less those right, −log10 of the largest |error|/max(1, |true value|) "
-            "of a component of Ω or γ over the samples, against the known motion, or for many starts without one "
-            "against runs in a wider format, which prove nothing; of many starts the root mean square over them. A bar "
-            "is the interval in which rounding noise alone moves it.",
-            "A line joins the formats of a motion, dashed where another integrator than heyoka computed it. Where all "
-            "digits of a format are lost, its point is off the line.",
+            "Digits right at every sample up to a time: −log10 of the largest |error|/max(1, |true value|) of a "
+            "component of Ω or γ, compared with the reference; of many starts the root mean square. A bar is the "
+            "interval in which rounding noise alone moves it; dashed: all digits of the format. × is a run that "
+            "failed, or whose error is not available.",
         ],
-        columns=["case", "format", "T", "samples", "of digits", "lost", "kept", "± digits"],
+        columns=["case", "format", "T", "samples", "digits right", "of digits", "± digits"],
+        across=2,
         place=10,
     )
-    usual = [lane for lane, rows in lanes.items() if not any(row.key.subject.variant for _, row in rows)]
-    wanted, colours = set(first), list(dict.fromkeys(case for case, _ in usual or lanes))
-    names = sorted(usual or lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
-    listed = [*names, *(lane for lane in lanes if lane not in names)][:MOST_LISTED]
-    if len(listed) > len(names):
-        section.notes.append(f"{len(listed) - len(names)} more runs are in the numbers alone.")
-    left_out(section, len(lanes) - len(listed), "run")
-    labels = [_label(lane) for lane in names]
-    axes = new_axes(
-        "T (time units of the data)", "digits lost (decimal digits)", 1 + 0.17 * max(14, len(names)), room(labels)
-    )
-    decades(axes.xaxis)
-    drawing = _Digits(section, axes, _formats(sources), [])
-    ends = [end for lane in names if (end := drawing.lane(lane, lanes[lane], colours.index(lane[0]) % _GREY))]
-    section.rows = [_cells(_label(lane), *each) for lane in listed for each in _by_horizon(lanes[lane])]
-    for key in sorted(section.legend.values(), key=lambda key: MARKERS.index(key.marker)):
-        section.legend[key.label] = section.legend.pop(key.label)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    low, high = axes.dataLim.intervalx
-    axes.set_xlim(math.floor(low - 0.1), math.ceil(high + 0.1))
-    section.pictures.append(finish(axes, section.title, spoken(drawing.alternative, 24), "digits", ends=ends))
-    if any(cell[5] == "" for cell in section.rows):
-        section.notes.append("A cross at the top is a run that failed, or one whose error is not available.")
+    wanted = set(first)
+    lanes: dict[str, list[_Run]] = {}
+    for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in wanted)):
+        how = variant(row, sources)
+        lanes.setdefault(clip(row.case, 30) + (f" ({clip(how, 30)})" if how else ""), []).append((source, row))
+    usual = [name for name, members in lanes.items() if not members[0][1].key.subject.variant] or list(lanes)
+    for name in usual[:MOST_LANES]:
+        lanes[name].sort(key=lambda run: logarithm(run[1].horizon) or 0.0)
+    formats = sorted({(row.bits, row.precision) for name in usual[:MOST_LANES] for _, row in lanes[name]})
+    for number, (_, precision) in enumerate(formats[:MOST_PLOTS]):
+        drawn = {name: [run for run in lanes[name] if run[1].precision == precision] for name in usual[:MOST_LANES]}
+        drawn = {name: members for name, members in drawn.items() if members}
+        section.pictures.append(_digits_right(section, clip(precision, 20), drawn, f"digits-{number}"))
+    listed: list[Sequence[Cell]] = [_cells(name, *run) for name, members in lanes.items() for run in members]
+    section.rows = listed[:MOST_LISTED]
+    if (more := len(lanes) - len(usual[:MOST_LANES])) > 0:
+        section.notes.append(f"{plural(more, 'more run')} in the numbers alone.")
+    left_out(section, len(listed) - MOST_LISTED, "run")
     return section
 
 
-def _label(lane: tuple[str, str]) -> str:
-    """A motion, and in brackets who computed it and how."""
-    return clip(lane[0], 30) + (f" ({clip(lane[1], 30)})" if lane[1] else "")
+def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]], name: str) -> Picture:
+    """The chart of one format; the run of the longest horizon is named, the candidate's of two reports."""
+    most = max(row.bits for members in lanes.values() for _, row in members) * math.log10(2)
+    texts = {lane: f"{lane}: {_right(members[-1][1], digits_until)}" for lane, members in lanes.items()}
+    axes = new_axes(f"digits right, of {most:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
+    ends = []
+    for place, (lane, members) in enumerate(lanes.items()):
+        for source, row in members:
+            kept, band = _kept(row), row.metrics[RELATIVE.text].band or 0.0
+            key = Key(source, 0, "x" if kept is None else "o", old=source == "baseline", line=False)
+            if source and kept is not None:
+                section.key(key)
+            draw(axes, key, [kept or 0.0], [-place], 5)
+            axes.plot([(kept or 0.0) - band, (kept or 0.0) + band], [-place] * 2, color=COLOURS[0], lw=3, alpha=0.3)
+        ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -place))
+    axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
+    axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
+    said = spoken([f"{text}." for text in texts.values()], 24)
+    return finish(axes, f"Digits right in {precision}", said, name, ends=ends)
 
 
-def _by_horizon(members: Sequence[tuple[str, Row]]) -> list[tuple[str, Row]]:
-    return sorted(members, key=lambda each: logarithm(each[1].horizon) or 0.0)
+def _kept(row: Row) -> float | None:
+    """Digits right; None for a run that failed, and where nothing says."""
+    return digits_kept(row) if row.outcome == "success" else None
 
 
-def _cells(label: str, source: str, row: Row) -> list[str]:
+def _right(row: Row, text: Callable[[Row], str]) -> str:
+    """Digits right in words, or why there are none."""
+    if _kept(row) is not None:
+        return text(row)
+    return row.outcome if row.outcome != "success" else row.metrics[RELATIVE.text].value
+
+
+def _cells(lane: str, source: str, row: Row) -> list[str]:
     """One run in the numbers."""
-    lost, full, metric = digits_lost(row), row.bits * math.log10(2), row.metrics[RELATIVE.text]
-    said = row.outcome if row.outcome != "success" else metric.value if lost is None else digits_text(full - lost)
-    shown = "" if lost is None else f"{lost:z.1f}"
-    band = f"{metric.band:.2f}" if metric.band else ""
-    name = with_source(clip(row.precision, 20), source)
-    return [label, name, short(row.horizon), str(row.samples or ""), f"{full:.1f}", shown, said, band]
-
-
-def _formats(sources: Sources) -> dict[str, int]:
-    """Formats by their bits, each with its place: its marker."""
-    bits = {row.precision: row.bits for _, report in sources for row in report.rows if row.bits}
-    return {name: place for place, name in enumerate(sorted(bits, key=lambda name: (bits[name], name)))}
-
-
-class _Digits(NamedTuple):
-    """The chart of digits lost.  formats: the place of each, its marker."""
-
-    section: Section
-    axes: Any
-    formats: dict[str, int]
-    alternative: list[str]
-
-    def lane(self, lane: tuple[str, str], members: Sequence[tuple[str, Row]], colour: int) -> End | None:
-        """Draw one motion in its formats; where its last point is."""
-        ink, found = COLOURS[colour], []
-        for source, row in _by_horizon(members):
-            lost, until = digits_lost(row), logarithm(row.horizon)
-            old, band = source == "baseline", row.metrics[RELATIVE.text].band or 0.0
-            key = self.section.key(self._key(row, source))
-            cells = _cells(_label(lane), source, row)
-            lost_text = f"{cells[5] or cells[6]} of {cells[4]} lost at {cells[2]}."
-            self.alternative.append(f"{cells[0]}, {key.label}: {lost_text}")
-            if until is None:
-                continue
-            if lost is None:
-                edge = {"transform": self.axes.get_xaxis_transform(), "clip_on": False, "color": ink}
-                self.axes.plot([until], [1], "x", mew=1.6, ms=6, **edge)
-                continue
-            face = "none" if old else ink
-            self.axes.plot([until], [lost], key.marker, ms=6, color=ink, mfc=face, mec=ink, label=key.label)
-            self.axes.plot([until] * 2, [lost - band, lost + band], "-", color=ink, lw=3, alpha=0.3)
-            found.append((source, row, until, lost))
-        dash = "-" if all(row.key.subject.name == HEYOKA for _, row in members) else DASHED
-        for source in dict.fromkeys(source for source, *_ in found):
-            own = [
-                (x, y) for other, row, x, y in found if other == source and digits_text(digits_kept(row) or 0) != _NONE
-            ]
-            x, y = [x for x, _ in own], [y for _, y in own]
-            self.axes.plot(x, y, ls=dash, color=ink, lw=1.2, alpha=0.5 if source == "baseline" else 1)
-        return End(_label(lane), ink, *found[-1][2:]) if found else None
-
-    def _key(self, row: Row, source: str) -> Key:
-        marker = MARKERS[self.formats[row.precision] % len(MARKERS)] if row.precision in self.formats else "o"
-        return Key(with_source(clip(row.precision, 20), source), _GREY, marker, old=source == "baseline", line=False)
+    band, right = row.metrics[RELATIVE.text].band, _right(row, lambda row: digits_text(digits_kept(row) or 0.0))
+    name, full = with_source(clip(row.precision, 20), source), f"{row.bits * math.log10(2):.1f}"
+    return [lane, name, short(row.horizon), str(row.samples or ""), right, full, f"{band:.2f}" if band else ""]
 
 
 # Every picture of a report as a file of its own, as SVG and as PDF: the title above it, the legend below it.

@@ -124,7 +124,9 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if len(first) <= MOST_ROWS:
         held = list(seen(first))
         found = document(replace(report, rows=held), kinds, In.SHORT)
-        parts = [_lines(_shown(blocks, brief=True)) for blocks in found.values()]
+        answers: list[Block] = [*headlines(found, kinds)]
+        others = ([block for block in blocks if block not in answers] for blocks in found.values())
+        parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
     else:
         parts = [_counted(seen(chain(first, stream)))]

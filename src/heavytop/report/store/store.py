@@ -21,6 +21,7 @@ from msgspec.structs import replace as replace_struct
 
 from heavytop import records
 from heavytop.errors import InputError
+from heavytop.extras import import_heyoka
 from heavytop.files import read_whole, replace, without_repeats
 from heavytop.harness.run import versions
 from heavytop.precision import available
@@ -206,7 +207,8 @@ def _has_its_digest(file: Path, content: bytes) -> bool:
 def environment() -> dict[str, Any]:
     """Versions, processor, formats; ``commit`` of the checkout or of the wheel, where one is known."""
     import flint
-    import heyoka
+
+    heyoka = import_heyoka()
     import numpy
 
     return {
@@ -229,7 +231,7 @@ def environment() -> dict[str, Any]:
 
 def _target() -> dict[str, Any]:
     """The processor and its features that heyoka compiles for."""
-    import heyoka
+    heyoka = import_heyoka()
 
     x = heyoka.make_vars("x")
     said = str(heyoka.cfunc([x], [x]).llvm_states[0])

@@ -378,6 +378,9 @@ class Transcendental:
         1/℘, which stands in conditions alone, is one of its own: it may be 0.
         """
         t, kind = self._tower, name.removesuffix("prime")
+        lowest = self._lowest_root(*arguments[1:]) if kind == "wp3" and not arguments[0].numerator else None
+        if lowest is not None:
+            return lowest if kind == name else t.number(0)
         key = _key(kind, *arguments)
         if key not in self._weierstrass:
             self._weierstrass[key] = self._new_weierstrass(kind, arguments)
@@ -386,6 +389,23 @@ class Transcendental:
             return t.polynomial(t.gens[value])
         scale = t.times(arguments[1].denominator, arguments[2].denominator)
         return t.divide(t.polynomial(t.gens[rate]), t.polynomial(scale))
+
+    def _lowest_root(self, g2: Quotient, g3: Quotient) -> Quotient | None:
+        """℘(ω3): the root e < 0 of 4x³ − g2 x − g3 with 12e² > g2, where it is a rational function of the symbols."""
+        t = self._tower
+        index = t.add(f"root {len(t.generators)}", constant=True)
+        x = t.polynomial(t.gens[index])
+        cubic = t.sum(
+            (t.product((t.number(4), x, x, x)), t.product((t.number(-1), g2, x)), t.product((t.number(-1), g3)))
+        )
+        for factor, _ in cubic.numerator.factor()[1]:
+            parts = t.by_power(factor, index)
+            if parts.keys() == {0, 1}:
+                e = t.quotient(-parts[0], parts[1])
+                slope = t.sum((t.product((t.number(12), e, e)), t.product((t.number(-1), g2))))
+                if t.sign(e) == Sign(-1, True) and t.sign(slope) == Sign(1, True):
+                    return e
+        return None
 
     def _new_weierstrass(self, kind: str, arguments: tuple[Quotient, Quotient, Quotient]) -> tuple[int, int]:
         t, (_, g2, g3) = self._tower, arguments

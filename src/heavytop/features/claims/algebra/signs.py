@@ -208,6 +208,7 @@ class Signs:
     def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
         if len(p) <= _MAX_PARTED and self._left > 0:
+            yield self._by_square_of_a_sine
             yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
             yield self._by_difference_from_facts
             yield self._by_products_of_facts
@@ -415,6 +416,16 @@ class Signs:
             signs = self.of(total), self.of(straight)
             if signs[0].value == signs[1].value != 0:
                 return Sign(signs[0].value, signs[0].strict and signs[1].strict)
+        return UNKNOWN
+
+    def _by_square_of_a_sine(self, p: fmpq_mpoly) -> Sign:
+        """Linear in g² with −1 ≤ g ≤ 1: between its values at g² = 0 and g² = 1."""
+        for index in used(p):
+            parts = self._ring.by_power(p, index) if self.ranges.get(index) == (Fraction(-1), Fraction(1)) else {}
+            if parts.keys() == {0, 2}:
+                ends = self.of(parts[0]), self.of(parts[0] + parts[2])
+                if ends[0].value and ends[0].value == ends[1].value:
+                    return Sign(ends[0].value, ends[0].strict and ends[1].strict)
         return UNKNOWN
 
     def _half_angle(self, sine: int) -> int:

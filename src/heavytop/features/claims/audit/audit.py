@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
+from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
@@ -35,6 +36,13 @@ from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
 # nothing in a file is ever evaluated as code.
 
 
+_TABLES: dict[str, tuple[str, Callable[[ClaimFile], Auditable]]] = {
+    "motion": ("motion", UserMotion),
+    "component": ("component", UserComponent),
+    "integral": ("integral", UserIntegral),
+    "relation": ("integral", UserIntegral),
+}
+"""The table that each kind of claim needs, and what it is read as."""
 _MAX_BYTES = 100_000
 _REMEDY = "`heavytop docs claims-in-toml` has the format, with examples."
 
@@ -66,18 +74,17 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
-    tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
-    if content.kind not in tables:
-        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral, relation or value.")
-    wanted = "motion" if content.kind == "motion" else "integral"
-    if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
+    if content.kind not in _TABLES:
+        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
+    wanted, made = _TABLES[content.kind]
+    if {name for name, _ in _TABLES.values() if getattr(content, name) is not None} != {wanted}:
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
-    if content.quadrature is not None and content.kind != "motion":
+    if content.quadrature is not None and wanted == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)
-    return UserMotion(content) if content.kind == "motion" else UserIntegral(content)
+    return made(content)
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
@@ -144,12 +151,20 @@ def audit_claim(
         return Audit(
             claim.content.name, about.name, claim.content.source, claim.rows(about), kind=claim.kind, entry=claim.entry
         )
-    rows = judge(claim.statements(about), claim.setting, progress)
+    rows = _rows(claim, about, progress)
     deciding = would_decide(claim, about, rows, perf_counter() - began)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
     return Audit(*said, deciding)
+
+
+def _rows(
+    claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None
+) -> tuple[StatementVerdict, ...]:
+    if not isinstance(claim, UserComponent):
+        return judge(claim.statements(about), claim.setting, progress)
+    return tuple(row for statements, setting in claim.groups(about) for row in judge(statements, setting))
 
 
 def would_decide(
@@ -170,8 +185,7 @@ def would_decide(
         if (bound.replace(">", "!="), "holds") in found:  # more than is needed
             continue
         try:
-            other = claim.assuming(bound)
-            verdict = verdict_of(judge(other.statements(about), other.setting))
+            verdict = verdict_of(_rows(claim.assuming(bound), about))
         except HeavyTopError:  # a sample breaks it, or the formula is none that may be assumed
             continue
         if verdict != "undecided":

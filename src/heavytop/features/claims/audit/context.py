@@ -81,11 +81,15 @@ class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[quadrature]: the formulas of [motion] hold u, and t = F(u) + constant where u is between bounds.
 
     time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u to look for a witness at.
+    phi, theta, psi: of a component, rates of the angles in the state and u.
     """
 
     variable: Name
     time: Text | None = None
     integrand: Text | None = None
+    phi: Text | None = None
+    theta: Text | None = None
+    psi: Text | None = None
     where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
     points: Samples | None = None
 
@@ -105,6 +109,23 @@ class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+
+
+class ComponentTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[component]: a quantity of the state, u, which is claimed to be a function of t, and angles beside it.
+
+    reduced: f(u), the square of its rate.  constants: first integrals that have the value of the start, beside energy
+    and area.  where: formulas that are 0 at every state the claim is about.
+    """
+
+    quantity: Text
+    value: Text | None = None
+    reduced: Text | None = None
+    constants: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    phi: Text | None = None
+    theta: Text | None = None
+    psi: Text | None = None
 
 
 class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -127,6 +148,8 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     motion: ClaimedMotionTable | None = None
     quadrature: QuadratureTable | None = None
     integral: IntegralTable | None = None
+    component: ComponentTable | None = None
+    start: ClaimedMotionTable | None = None
     entry: Entry | None = None
 
 
@@ -478,7 +501,7 @@ class FileClaim:
 
     @property
     def kind(self) -> str:
-        """motion, integral or relation."""
+        """motion, component, integral or relation."""
         return self.content.kind
 
     def about(self, asked: System | None) -> System:
@@ -497,7 +520,7 @@ class FileClaim:
 # with u' = 1/F'(u), and rates are taken through it.
 
 
-_DOMAINS = {"all": ALL, "t<=0": BEFORE, "t>0": AFTER}
+DOMAINS = {"all": ALL, "t<=0": BEFORE, "t>0": AFTER}
 _POINTS = tuple(Fraction(*pair) for pair in ((1, 3), (-1, 2), (7, 5), (-9, 4)))
 _BETWEEN = (Fraction(1, 2), Fraction(1, 3), Fraction(4, 5))
 _BEYOND = (Fraction(1, 7), Fraction(3, 2))
@@ -536,7 +559,7 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     """The clock of a motion claimed in a file; raises InputError for a quadrature that cannot be understood."""
     table, u = content.quadrature, variable_of(content)
     if table is None:
-        return Clock(TIME, rate_along({TIME: sympy.Integer(1)}), _DOMAINS[content.domain])
+        return Clock(TIME, rate_along({TIME: sympy.Integer(1)}), DOMAINS[content.domain])
     if content.domain != "all" or content.times is not None:
         cause = f"domain and times are about t, and the formulas of this claim hold {u}."
         raise InputError(cause, "Bound it by where, and give points, in [quadrature].")

@@ -33,6 +33,7 @@ from heavytop.top.equations import System
 VERDICTS = {True: "holds", False: "refuted", None: "undecided"}
 ABOUT = {
     "motion": "a motion",
+    "component": "a component of a motion",
     "integral": "a first integral",
     "relation": "an invariant relation",
     "value": "numbers of a motion",

@@ -299,7 +299,7 @@ _STATES = (
 _ENOUGH = 3
 _BITS = 192
 # 0 at every state of a body: |γ|² - 1
-_OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
+OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
 
 
 @dataclass(frozen=True)
@@ -340,15 +340,20 @@ class UserIntegral(FileClaim):
         assert self.content.integral is not None
         return self.content.integral
 
-    @cached_property
+    @property
     def setting(self) -> Setting:
+        """That of the states."""
+        return self.at_states
+
+    @cached_property
+    def at_states(self) -> Setting:
         """The file's assumptions; the samples are its parameters at each of the states."""
         base = setting_of(self.context, TIME)
         conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
         samples = tuple({**row, **state} for row in self.context.samples for state in self._states(conditions, row))
         relations = (*base.relations, *conditions)
         ranges = (*base.ranges, *((component, (Fraction(-1), Fraction(1))) for component in STATE[3:]))
-        return replace(base, samples=samples, relations=(*relations, _OFF_SPHERE) if relations else (), ranges=ranges)
+        return replace(base, samples=samples, relations=(*relations, OFF_SPHERE) if relations else (), ranges=ranges)
 
     @property
     def _zero(self) -> tuple[Formula, ...]:
@@ -368,7 +373,7 @@ class UserIntegral(FileClaim):
 
         if any(serves(state) for state in given):
             return given
-        found = [*islice(filter(serves, states_on([*conditions, _OFF_SPHERE], STATE, parameters)), _ENOUGH)]
+        found = [*islice(filter(serves, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
         return found or given
 
     def statements(self, system: System) -> list[Statement]:
@@ -384,7 +389,7 @@ class UserIntegral(FileClaim):
             text += ", where the conditions hold"
         value, named, names = self._with_names(rate, needs)
         is_relation = self.kind == "relation"
-        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), is_relation, (_OFF_SPHERE,), names)
+        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), is_relation, (OFF_SPHERE,), names)
         # a condition in simpler words is the same set
         where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
         rotor = (self.context.rotor,) if system is GYROSTAT and self.context.rotor is not None else ()
@@ -418,7 +423,7 @@ class UserIntegral(FileClaim):
         )
 
     def _on_relations(self, rate: sympy.Expr) -> sympy.Expr:
-        return on_conditions(rate, (*self.setting.relations, _OFF_SPHERE))
+        return on_conditions(rate, (*self.at_states.relations, OFF_SPHERE))
 
     def _with_names(
         self, rate: Rate, needs: frozenset[Need]
@@ -429,7 +434,7 @@ class UserIntegral(FileClaim):
         """
         if self.kind == "relation":
             return self.value.expression, needs, {}
-        value = all_over(self.value.expression, [_OFF_SPHERE])
+        value = all_over(self.value.expression, [OFF_SPHERE])
         assumptions = self.setting.assumptions(0)
         state = frozenset(STATE)
         names = Names(state, lambda e: _is_constant(rate(e), assumptions, self.setting.samples))
@@ -437,7 +442,7 @@ class UserIntegral(FileClaim):
         if named.free_symbols & state:
             return value, needs, {}
         renamed = frozenset(
-            Need(need.kind, names.put_into(all_over(need.expression, [_OFF_SPHERE])), need.text) for need in needs
+            Need(need.kind, names.put_into(all_over(need.expression, [OFF_SPHERE])), need.text) for need in needs
         )
         return named, renamed, names.meanings
 

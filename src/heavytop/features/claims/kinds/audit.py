@@ -13,7 +13,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, exact_row
 from heavytop.kind import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document.document import Block, Card, Headline, In, Note, Word, clip
+from heavytop.report.document.document import Block, Card, Cell, Headline, In, Note, Table, Word, clip
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
 NAME, LIBRARY = "audit", "library"
@@ -78,6 +78,7 @@ class AuditKind(Kind):
 
     name = NAME
     table = AuditTable
+    place = 31
 
     def cost(self, task: Task) -> float:
         """The same for all."""
@@ -108,16 +109,16 @@ class AuditKind(Kind):
             yield _of_paper(paper)
         elif entries:
             yield _of_verdicts(entries)
-        for sentence in _of_library(entries):
-            yield Note(sentence, shown=In.SHORT)
-            yield Card("Library of claims (heavytop claims)", [Note(sentence)], shown=In.FULL | In.PAGE)
-        for verdict, about in dict.fromkeys((_verdict(row)[0], row.system) for row in paper):
-            found = [row.case for row in paper if (_verdict(row)[0], row.system) == (verdict, about)]
-            said = f"Ershkov's claims {', '.join(found)}: {verdict} for {_SYSTEMS.get(about, about)}."
-            yield Note(said, shown=In.SHORT)
+        if entries:
+            yield Note(_of_library(entries), shown=In.SHORT | In.FULL | In.PAGE if paper else In.SHORT)
+            yield Table("Library of claims", _COLUMNS, [_entry(row) for row in _worst_first(entries)], shown=In.PAGE)
         if paper:
             lines = [line for claim in sorted({row.case for row in paper}) for line in _equations(claim, paper)]
             yield Card("Equation by equation (heavytop audit)", lines, shown=In.FULL | In.PAGE)
+
+
+_CLAIM = "Ershkov's published solution of the heavy top, in which γ stays parallel to M, "
+_COLUMNS = ("claim", "of", "verdict", "equations proven", "refuted", "source")
 
 
 def _of_paper(rows: Sequence[Row]) -> Headline:
@@ -125,14 +126,28 @@ def _of_paper(rows: Sequence[Row]) -> Headline:
     verdicts = {_verdict(row)[0] for row in rows if row.system == HEAVY_TOP.name}
     others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
     solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
-    instead = f" It solves {solved} instead." if others else ""
-    if verdicts == {"refuted"}:
-        return Headline(f"The claimed solution is not a motion of the heavy top.{instead}", Word("refuted"))
     if "refuted" in verdicts:
-        return Headline(f"Some of the claimed solutions are not motions of the heavy top.{instead}", Word("refuted"))
+        said = _CLAIM + ("is not a motion of it" if verdicts == {"refuted"} else "is not a motion of it in every case")
+        return Headline(said + (f": it solves {solved} instead." if others else "."), Word("refuted"), _EVERYWHERE)
     if verdicts == {"holds"}:
-        return Headline("Every equation of the claim is proven for the heavy top.", Word("holds"))
-    return Headline("No equation of the claim is refuted, but not all are proven.", Word("undecided"))
+        return Headline(_CLAIM + "solves every equation.", Word("holds"), _EVERYWHERE)
+    return Headline(_CLAIM + "is not refuted, but not every equation is proven.", Word("undecided"), _EVERYWHERE)
+
+
+_EVERYWHERE = In.SHORT | In.FULL | In.PAGE
+
+
+def _worst_first(rows: Sequence[Row]) -> list[Row]:
+    """Refuted claims before undecided ones, and these before what holds."""
+    return sorted(rows, key=lambda row: ("refuted", "undecided", "holds").index(_verdict(row)[0]))
+
+
+def _entry(row: Row) -> list[Cell]:
+    """A claim of the library: its system, verdict, how many equations are proven and refuted, and its source."""
+    verdict, refuted, held = _verdict(row)
+    counts = str(held or ""), str(len(refuted) or "")
+    system, source = row.system.replace("_", " "), row.measured.removeprefix("claimed: ")
+    return [clip(row.case), system, Word(verdict), *counts, source]
 
 
 def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
@@ -182,24 +197,22 @@ def _parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     return [row for row in rows if EXPECTED.text not in row.metrics], of_library
 
 
-def _of_library(rows: Sequence[Row]) -> list[str]:
+def _of_library(rows: Sequence[Row]) -> str:
     """How many claims hold and are refuted, and those whose verdict is not the expected one."""
-    if not rows:
-        return []
     verdicts = [_verdict(row)[0] for row in rows]
     counts = ((verdicts.count("holds"), "proven"), (verdicts.count("refuted"), "refuted"))
     open_ones = verdicts.count("undecided")
     said = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
     off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
     expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
-    return [f"Library of {plural(len(rows), 'claim')}: {', '.join(said)}; {expected}."]
+    return f"Library of {plural(len(rows), 'claim')}: {', '.join(said)}; {expected}."
 
 
 def _of_verdicts(rows: Sequence[Row]) -> Headline:
     wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
     undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
     word = Word("failed") if wrong else Word("undecided") if undecided else None
-    return Headline(" ".join(_of_library(rows)), word)
+    return Headline(_of_library(rows), word)
 
 
 def _value(holds: bool | None) -> Metric:

@@ -96,7 +96,7 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     bases = [(case, "forward" if "forward" in found else found[0]) for case, found in directions.items()]
     section = Section(
         "claim-error",
-        "Where the claim’s error comes from",
+        "Error of the claim",
         [
             "Three errors that are easily taken for one another. Model: the formulas, exactly evaluated, against the "
             "true motion of the heavy top from the same data. Evaluation: the formulas in floating point against the "
@@ -242,7 +242,7 @@ class ClaimModel(Kind):
     name = NAME
     table = ClaimModelTable
     needed = (PARTS.text,)
-    place = 20
+    place = 32
 
     def cost(self, task: Task) -> float:
         """The same for all."""
@@ -381,4 +381,4 @@ def _card(row: Row, others: Iterable[Row]) -> Card:
     cells = [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega]
     title = f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from"
     table = Cells("Error of Ω (1/time unit) and of γ (|γ| = 1)", ("|t|", "|ΔΩ|", "|Δγ|"), cells)
-    return Card(title, lines, table, f"True motion: {row.against}")
+    return Card(title, lines, table, f"True motion: {row.reference.brief}")

@@ -24,6 +24,7 @@ class RigidBody:
 
     mass, gravity (it points down, −z of space), centre (from the pivot), inertia (3 × 3, about the centre of mass),
     quaternion (w, x, y, z) and rotation (3 × 3, body to space), omega (in body axes), omega_space.
+    principal: moments about the centre of mass, and their axes as the columns of a rotation.
     """
 
     def __init__(self, request: dict[str, list[str]]) -> None:
@@ -35,6 +36,8 @@ class RigidBody:
         self.rotation = matrix(self.quaternion)
         self.omega = np.array(request["state"][:3], float)
         self.omega_space = self.rotation @ self.omega
+        moments, axes = np.linalg.eigh(self.inertia)
+        self.principal = moments, axes * np.sign(np.linalg.det(axes))
 
     @property
     def about_pivot(self) -> Any:
@@ -53,6 +56,17 @@ def matrix(quaternion: Any) -> Any:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def quaternion(rotation: Any) -> Any:
+    """(w, x, y, z) of a rotation, the largest component positive."""
+    r = np.asarray(rotation)
+    off = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    both = np.empty((4, 4))  # 4 q qᵀ
+    both[0, 0], both[0, 1:], both[1:, 0] = 1 + np.trace(r), off, off
+    both[1:, 1:] = r + r.T + (1 - np.trace(r)) * np.eye(3)
+    column = both[:, np.argmax(np.diag(both))]
+    return column / np.linalg.norm(column)
 
 
 def serve(name: str, engine: Any) -> None:

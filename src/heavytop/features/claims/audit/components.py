@@ -1,0 +1,339 @@
+"""One component of a motion as a function of time, its reduced equation, and the angles by their rates.
+
+A component u of the state obeys u'² = f(u) where first integrals have the values of a start.  Proven are, where they
+have these values, that equation and u'' = f'(u)/2 from the equations of motion; then the same two of the function of
+time, and that it begins with the u and u' of the start: the second has one solution alone, and that is it.  A
+quadrature t = ∫ du/√f(u) and the rates of angles are statements on the state; angles are judged by their rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+
+import sympy
+
+from heavytop.errors import InputError
+from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition, is_exactly_zero
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.rational import forces_zero
+from heavytop.features.claims.algebra.reader import Formula, parse, symbol
+from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Place, Setting, Statement
+from heavytop.features.claims.algebra.structure import at_values, rate_along
+from heavytop.features.claims.audit.context import (
+    DOMAINS,
+    STATE,
+    TIME,
+    ComponentTable,
+    IntegralTable,
+    needs_of,
+    setting_of,
+    three,
+)
+from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, verdict_of
+from heavytop.features.claims.audit.user_claims import OFF_SPHERE, UserIntegral
+from heavytop.top.equations import HEAVY_GYROSTAT, System, area, area_with_rotor, energy
+
+_OMEGA, _GAMMA = STATE[:3], STATE[3:]
+_ACROSS = _GAMMA[0] ** 2 + _GAMMA[1] ** 2
+_POLE = "gamma is not vertical in the body: elsewhere phi and psi are undefined"
+_IN_TIME = rate_along({TIME: sympy.Integer(1)})
+_AT_A_STATE = replace(ALL, points=(Fraction(0),))
+_ANGLES = ("phi", "theta", "psi")
+
+
+def _rate_of_angle(name: str, omega: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, sympy.Expr]:
+    """(a, b): the rate of an angle of (3.2) is a/b, where b is 0 at the poles alone."""
+    level = omega[0] * _GAMMA[0] + omega[1] * _GAMMA[1]
+    if name == "psi":
+        return level, _ACROSS
+    if name == "phi":
+        return omega[2] * _ACROSS - level * _GAMMA[2], _ACROSS
+    return omega[0] * _GAMMA[1] - omega[1] * _GAMMA[0], sympy.sqrt(_ACROSS)
+
+
+@dataclass(frozen=True)
+class UserComponent(UserIntegral):
+    """A component claimed in a file: its statements on the state are those of relations, the values of the start."""
+
+    quantity: Formula = field(init=False)
+    start: tuple[Formula, ...] = field(init=False)
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """Ω, γ, and the name of the component in reduced equations."""
+        return (*STATE, self._u)
+
+    @property
+    def _u(self) -> sympy.Symbol:
+        table = self.content.quadrature
+        return sympy.Symbol("u" if table is None else table.variable, real=True)
+
+    @property
+    def _component(self) -> ComponentTable:
+        assert self.content.component is not None
+        return self.content.component
+
+    @property
+    def _table(self) -> IntegralTable:
+        return IntegralTable("0", self._component.where)
+
+    def __post_init__(self) -> None:
+        UserIntegral.__post_init__(self)
+        names, table, start = self.context.names, self._component, self.content.start
+        quantity = parse(table.quantity, names, "component.quantity")
+        self._check(table, quantity)
+        begin: tuple[Formula, ...] = ()
+        if start is not None and start.omega is not None and start.gamma is not None:
+            begin = (*three(start.omega, names, "start.omega"), *three(start.gamma, names, "start.gamma"))
+        elif start is not None or table.value is not None:
+            raise InputError("[start] needs omega and gamma.", "Give the state at t = 0, in the parameters.")
+        object.__setattr__(self, "quantity", quantity)
+        object.__setattr__(self, "start", begin)
+        object.__setattr__(self, "where", (*self.where, *self._levels()))
+
+    def _check(self, table: ComponentTable, quantity: Formula) -> None:
+        if not quantity.expression.free_symbols & frozenset(STATE):
+            raise InputError(f"component.quantity: {table.quantity[:40]!r} is constant.", "Name a component: gamma3.")
+        if table.value is not None and self._square is None:
+            remedy = "Give reduced = f(u) in [component], or time or integrand in [quadrature]."
+            raise InputError("[component] gives a value and no reduced equation u'^2 = f(u).", remedy)
+        rates = self.content.quadrature
+        for name in _ANGLES:
+            if getattr(table, name) is not None and (rates is None or getattr(rates, name) is None):
+                raise InputError(f"[component] gives {name} and no rate of it.", f"Give {name} in [quadrature].")
+
+    def _levels(self) -> Iterator[Formula]:
+        """First integrals less their values at the start."""
+        if not self.start:
+            return
+        about = self.about(None)
+        p = self.context.parameters(about)
+        standard = [energy(p, STATE), (area_with_rotor if about is HEAVY_GYROSTAT else area)(p, STATE)]
+        own = [parse(text, self.context.names, "component.constants") for text in self._component.constants]
+        for formula in (*map(symbol, standard), *own):
+            yield replace(formula, expression=formula.expression - self._at_start(formula.expression))
+
+    def _at_start(self, e: sympy.Expr) -> sympy.Expr:
+        return e.xreplace({x: part.expression for x, part in zip(STATE, self.start, strict=True)})
+
+    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
+        """The start where it is rational at these parameters; states on the conditions where none is given."""
+        if not self.start:
+            return super()._states(conditions, parameters)
+        numbers = {x: sympy.Rational(value.numerator, value.denominator) for x, value in parameters.items()}
+        values = [part.expression.xreplace(numbers) for part in self.start]
+        exact = [Fraction(int(value.p), int(value.q)) for value in values if value.is_Rational]
+        return [dict(zip(STATE, exact, strict=True))] if len(exact) == len(values) else []
+
+    @cached_property
+    def _square(self) -> Formula | None:
+        """f(u)."""
+        table, names = self.content.quadrature, self.context.names
+        if self._component.reduced is not None:
+            return parse(self._component.reduced, names, "component.reduced")
+        if table is None or (table.time is None and table.integrand is None):
+            return None
+        given = parse(table.time or table.integrand or "", names, "quadrature")
+        slope = given.expression if table.time is None else rate_along({self._u: sympy.Integer(1)})(given.expression)
+        # the equation without roots says as much where the integrand is real
+        return replace(given, expression=1 / slope**2, needs=_without(given.needs, self._u))
+
+    def _of(self, name: str, table: object, extra: bool) -> Formula | None:
+        text = getattr(table, name, None)
+        names = self.context.names | ({"t": symbol(TIME)} if extra else {})
+        return None if text is None else parse(text, names, f"{name} of the claim")
+
+    # --- on the state -------------------------------------------------------------------------------------------------
+
+    def groups(self, system: System) -> Iterator[tuple[list[Statement], Setting]]:
+        """Statements with what they are about: u alone, the state where u alone does not tell, and the time."""
+        in_u, on_state = self._reduced(system)
+        base = setting_of(self.context, self._u)
+        yield in_u, replace(base, samples=tuple(s for s in base.samples if self._moves(system, dict(s))))
+        if on_state:
+            yield on_state, self.at_states
+        yield self._in_time(system), self.setting
+
+    def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
+        """No steps; the system that it is about, where every row holds."""
+        return [], (about.name,) if verdict_of(rows) == "holds" else ()
+
+    @property
+    def setting(self) -> Setting:
+        """The file's assumptions and samples of parameters."""
+        return setting_of(self.context, TIME)
+
+    def statements(self, system: System) -> list[Statement]:
+        """All of them."""
+        return [statement for statements, _ in self.groups(system) for statement in statements]
+
+    def _moves(self, system: System, sample: Place) -> bool:
+        """Whether u is not constant along the motion from the start."""
+        rate = self._rate(system)
+        first = rate(self.quantity.expression)
+        zeros = [is_exactly_zero(self._at_start(e), sample) for e in (first, rate(first))] if self.start else [False]
+        return any(zero is False for zero in zeros)
+
+    def _reduced(self, system: System) -> tuple[list[Statement], list[Statement]]:
+        """u'² = f(u), u'' = f'(u)/2 and the rates of the angles, where the first integrals have their values."""
+        rate, u, q = self._rate(system), self._u, self.quantity
+        kept = tuple((str(part.expression), sympy.expand(rate(part.expression))) for part in self.where)
+        base = needs_of([q, *self.where, *self.start]) | self.context.needs
+        omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
+        in_u: list[Statement] = []
+        on_state: list[Statement] = []
+        claims: list[tuple[str, int, sympy.Expr, sympy.Expr, sympy.Expr, str, frozenset[Need]]] = []
+        one, slope = sympy.Integer(1), rate(q.expression)
+        if self._square is not None:
+            f, needs = self._square.expression, self._square.needs
+            claims.append(("reduced", 1, f, slope**2, one, "u'^2 = f(u)", needs))
+            claims.append(("reduced", 2, sympy.diff(f, u) / 2, rate(slope), one, "u'' = f'(u)/2", needs))
+        for index, name in enumerate(_ANGLES, 1):
+            claimed = self._of(name, self.content.quadrature, False)
+            if claimed is not None:
+                above, below = _rate_of_angle(name, omega)
+                text = f"{name}' of the angles"
+                claims.append(("rate", index, claimed.expression, above, below, text, claimed.needs))
+        if not claims:
+            raise InputError("[component] claims nothing.", "Give reduced, or rates of angles in [quadrature].")
+        zeros = [*(part.expression for part in self.where), OFF_SPHERE]
+        for equation, index, claimed, above, below, text, needs in claims:
+            pole = _POLE if equation == "rate" else ""
+            held = None if claimed.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
+            needs = frozenset(
+                _off_pole(need, u if held else None) for need in _put(needs, u, u if held else q.expression)
+            )
+            if held is not None and all(sympy.expand(e) == 0 for _, e in kept):
+                residual = sympy.numer(sympy.together(claimed * held[1] - held[0]))
+                formulas = Formulas((u,), _without(base, *STATE) | needs | condition("/", (held[2],)), pole=pole)
+                in_u.append(Statement(equation, index, "smooth", ALL, residual, text, formulas))
+            elif index == 1 or equation == "rate":
+                residual = sympy.numer(sympy.together(claimed.xreplace({u: q.expression}) * below - above))
+                flow = Flow(rate, frozenset(STATE), kept, False, (OFF_SPHERE,))
+                formulas = Formulas(STATE, base | needs, pole=pole)
+                on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
+        return in_u, on_state
+
+    # --- in time ------------------------------------------------------------------------------------------------------
+
+    def _in_time(self, system: System) -> list[Statement]:
+        """The two equations of the function of time, its start, and the rates of the angles along it."""
+        value = self._of("value", self._component, True)
+        if value is None or self._square is None:
+            return []
+        c, u, f = value.expression, self._u, self._square.expression
+        domain = DOMAINS[self.content.domain]
+        along = _put(self._square.needs, u, c)
+        formulas = Formulas((c,), value.needs | along | self.context.needs)
+
+        def made(
+            equation: str, component: int, residual: sympy.Expr, text: str, extra: Formulas = formulas
+        ) -> Statement:
+            return Statement(equation, component, "smooth", domain, residual, text, extra)
+
+        first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
+        found = [
+            made("component", 1, first**2 - f.xreplace({u: c}), "u'^2 = f(u) of the function of t"),
+            made("component", 2, second - sympy.diff(f, u).xreplace({u: c}) / 2, "u'' = f'(u)/2 of the function of t"),
+        ]
+        at_zero = Formulas(needs=needs_of(self.start))
+        begin = ((c, self.quantity.expression), (first, self._rate(system)(self.quantity.expression)))
+        for component, (ours, theirs) in enumerate(begin, 1):
+            residual = at_values(ours, {TIME: sympy.Integer(0)}) - self._at_start(theirs)
+            found.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
+        found.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
+        for index, name in enumerate(_ANGLES, 1):
+            angle, claimed = self._of(name, self._component, True), self._of(name, self.content.quadrature, False)
+            if angle is not None and claimed is not None:
+                if claimed.expression.free_symbols & frozenset(STATE):
+                    raise InputError(f"{name} is given in t, and its rate in the state.", f"Give its rate in {u}.")
+                needs = angle.needs | _put(claimed.needs, u, c) | formulas.needs
+                residual = _IN_TIME(angle.expression) - claimed.expression.xreplace({u: c})
+                found.append(
+                    made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
+                )
+        return found
+
+
+def _put(needs: frozenset[Need], u: sympy.Symbol, value: sympy.Expr) -> frozenset[Need]:
+    return frozenset(Need(need.kind, need.expression.xreplace({u: value})) for need in needs)
+
+
+def _off_pole(need: Need, u: sympy.Symbol | None) -> Need:
+    """What is left of it where γ is not vertical in the body; u: γ3 in it, where it is one."""
+    across = _ACROSS if u is None else 1 - u**2
+    ratio = sympy.cancel(need.expression.subs(_GAMMA[2] ** 2, 1 - _ACROSS) / across)
+    ours = need.kind is ConditionKind.NONZERO and not ratio.free_symbols & frozenset((*STATE, u))
+    return Need(need.kind, ratio) if ours else need
+
+
+def _without(needs: frozenset[Need], *symbols: sympy.Symbol) -> frozenset[Need]:
+    """Those that are about none of the symbols."""
+    return frozenset(need for need in needs if not need.expression.free_symbols & frozenset(symbols))
+
+
+def _through(
+    u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
+) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
+    """Polynomials of the state as functions of u = q where ``zeros`` are 0, and what must not be 0 for that.
+
+    Coefficients are symbols of their own: what is found by a Gröbner basis over their fractions is proven without any,
+    as a combination of the zeros.  None where they are no functions of u.
+    """
+    if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
+        return None
+    near = set().union(*(e.free_symbols for e in (q, *parts))).union(*(z.free_symbols for z in zeros if _alone(z)))
+    zeros = [z for z in zeros if z.free_symbols & frozenset(STATE)]
+    close = [z for z in zeros if z.free_symbols & frozenset(STATE) <= near]
+    for chosen in (close, zeros) if len(close) < len(zeros) else (zeros,):
+        found = _found(u, q, chosen, parts)
+        if found is not None:
+            return found
+    return None
+
+
+def _alone(zero: sympy.Expr) -> bool:
+    """Whether it holds one component of the state."""
+    return len(zero.free_symbols & frozenset(STATE)) == 1
+
+
+def _found(
+    u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
+) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
+    """What :func:`_through` returns, by these zeros alone."""
+    names: dict[sympy.Expr, sympy.Symbol] = {}
+
+    def named(e: sympy.Expr, monic: bool) -> sympy.Expr:
+        p = sympy.Poly(e, *STATE, u)
+        scale = p.LC() if monic else sympy.Integer(1)
+        total = sympy.Integer(0)
+        for monomial, coefficient in p.terms():
+            value = sympy.cancel(coefficient / scale)
+            value = value if value.is_Rational else names.setdefault(value, sympy.Symbol(f"c{len(names)}", real=True))
+            total += value * sympy.prod(x**n for x, n in zip((*STATE, u), monomial, strict=True))
+        return total
+
+    relations = [named(e, True) for e in (*zeros, u - q)]
+    wanted = [named(e, False) for e in parts]
+    order = (*(x for x in STATE if x != q), *(x for x in STATE if x == q), u)
+    basis = sympy.groebner(
+        relations, *order, order="lex", domain=sympy.QQ.frac_field(*names.values()) if names else sympy.QQ
+    )
+    meanings = {name: value for value, name in names.items()}
+    divisor, found = sympy.Integer(1), []
+    for e in wanted:
+        above, below = sympy.fraction(sympy.together(basis.reduce(e)[1]))
+        if above.free_symbols & frozenset(STATE):
+            return None
+        field_ = Field(Assumptions(u), [*relations, below * e - above])
+        numerators = [field_.enter(relation).numerator for relation in relations]
+        if not forces_zero(numerators, field_.enter(below * e - above).numerator, radical=False):
+            return None
+        divisor *= below.xreplace(meanings)
+        found.append((above / below).xreplace(meanings))
+    for z in (*zeros, u - q):
+        divisor *= sympy.Poly(z, *STATE, u).LC()
+    return found[0], found[1], divisor

@@ -1,0 +1,49 @@
+"""MJX, MuJoCo on JAX: RK4-64 computes in double, RK4-32 in single precision, which is its default."""
+
+import os
+import sys
+
+METHOD, BITS = sys.argv[1].split("-")
+os.environ["JAX_ENABLE_X64"] = str(BITS == "64")
+
+import jax  # noqa: E402
+import mujoco  # noqa: E402
+from heavytop_engine import serve  # noqa: E402
+from mujoco import mjx  # noqa: E402
+
+MODEL = """
+<mujoco>
+  <option gravity="0 0 {down}" integrator="{method}"><flag contact="disable"/></option>
+  <worldbody><body>
+    <joint type="ball"/><inertial pos="{centre}" mass="{mass}" fullinertia="{inertia}"/>
+  </body></worldbody>
+</mujoco>"""
+
+
+def text(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+@jax.jit
+def steps(model, data, count):
+    return jax.lax.fori_loop(0, count, lambda _, data: mjx.step(model, data), data)
+
+
+class Engine:
+    def __init__(self, body):
+        six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        numbers = {"centre": text(body.centre), "mass": body.mass, "inertia": text(six), "down": -body.gravity}
+        model = mujoco.MjModel.from_xml_string(MODEL.format(method=METHOD, **numbers))
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = body.quaternion, body.omega
+        self.model, self.data = mjx.put_model(model), mjx.put_data(model, data)
+
+    def advance(self, step, count):
+        model = self.model.replace(opt=self.model.opt.replace(timestep=jax.numpy.asarray(step)))
+        self.data = steps(model, self.data, count)
+
+    def read(self):
+        return self.data.qpos, self.data.qvel
+
+
+serve(f"MJX:{sys.argv[1]} {mujoco.__version__}", Engine)

@@ -1,0 +1,43 @@
+"""Siconos: Newton-Euler equations about the centre of mass, held by a knee joint; Moreau-Jean with theta = 1/2."""
+
+import numpy as np
+import siconos.kernel as kernel
+import siconos.mechanics.joints as joints
+from heavytop_engine import matrix, serve
+
+LONG = 1e6
+
+
+class Engine:
+    def __init__(self, body):
+        self.centre, self.simulation = body.centre, None
+        place = body.rotation @ body.centre
+        speed = body.rotation @ np.cross(body.omega, body.centre)
+        start, twist = np.r_[place, body.quaternion], np.r_[speed, body.omega]
+        self.body = kernel.NewtonEulerDS(start, twist, body.mass, body.inertia)
+        self.weight = np.array([0, 0, -body.mass * body.gravity])
+        self.body.setFExtPtr(self.weight)
+        self.model = kernel.NonSmoothDynamicalSystem(0, LONG)
+        self.model.insertDynamicalSystem(self.body)
+        self.joint = joints.KneeJointR([0, 0, 0], True, self.body)
+        held = kernel.EqualityConditionNSL(self.joint.numberOfConstraints())
+        self.model.link(kernel.Interaction(held, self.joint), self.body)
+
+    def advance(self, step, count):
+        if self.simulation is None:
+            grid, method = kernel.TimeDiscretisation(0, step), kernel.MoreauJeanOSI(0.5)
+            self.simulation = kernel.TimeStepping(self.model, grid, method, kernel.MLCP())
+            self.simulation.setNewtonTolerance(1e-12)
+            self.simulation.setNewtonMaxIteration(50)
+        for _ in range(count):
+            self.simulation.computeOneStep()
+            self.simulation.nextStep()
+
+    def read(self):
+        return self.body.q()[3:], self.body.twist()[3:]
+
+    def pivot(self):
+        return self.body.q()[:3] - matrix(self.body.q()[3:]) @ self.centre
+
+
+serve("Siconos:Moreau-Jean", Engine)

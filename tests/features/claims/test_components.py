@@ -1,0 +1,160 @@
+"""One component of a motion as a function of time, its reduced equation, and angles by their rates."""
+
+from typing import Any
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.features.claims.audit.judge import Audit
+
+# Lagrange's top between the heights u1 and u2, from rest at u1, with numbers
+LAGRANGE: dict[str, Any] = {
+    "name": "nutation",
+    "kind": "component",
+    "parameters": {"C": ["1", "2"]},
+    "assume": ["C > 0"],
+    "definitions": {
+        "u1": "3/5",
+        "u2": "4/5",
+        "u3": "13/5",
+        "m": "(u2 - u1)/(u3 - u1)",
+        "p": "sqrt((u3 - u1)*5/16)",
+        "L": "2",
+        "g2": "4*(u1^2 + u2^2 + u3^2 - u1*u2 - u1*u3 - u2*u3)/3*(5/16)^2",
+        "g3": "4*((2*u1 - u2 - u3)*(2*u2 - u1 - u3)*(2*u3 - u1 - u2))/27*(5/16)^3",
+    },
+    "top": {"inertia": ["1", "1", "C"], "weight": "1", "centre": ["0", "0", "5/8"]},
+    "start": {"omega": ["0", "L*(u2 - u1)/(4/5)", "L/C"], "gamma": ["0", "4/5", "u1"]},
+    "component": {
+        "quantity": "gamma3",
+        "constants": ["Omega3"],
+        "reduced": "5/4*(u - u1)*(u - u2)*(u - u3)",
+        "value": "u1 + (u2 - u1)*sn(p*t, m)^2",
+        "psi": "L/(2*p)*((1 + u2)/(1 + u1)*ellipticPi(-(u2 - u1)/(1 + u1), am(p*t, m), m)"
+        " - (1 - u2)/(1 - u1)*ellipticPi((u2 - u1)/(1 - u1), am(p*t, m), m))",
+    },
+    "quadrature": {"variable": "u", "psi": "L*(u2 - u)/(1 - u^2)"},
+}
+
+
+def audit(**parts: Any) -> Audit:
+    table = dict(LAGRANGE)
+    for key, value in parts.items():
+        table[key] = {k: v for k, v in {**LAGRANGE[key], **value}.items() if v is not None}
+    return audit_claim(claim_from_table(table, "claim"))
+
+
+def rows(report: Audit) -> dict[tuple[str, int], bool | None]:
+    return {(row.equation, row.component): row.holds for row in report.rows}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "value", ["u1 + (u2 - u1)*sn(p*t, m)^2", "u2 - (u2 - u1)*cn(p*t, m)^2", "(u1+u2+u3)/3 + 16/5*wp3(t, g2, g3)"]
+)
+def test_lagranges_solution_holds_in_each_of_its_forms(value: str) -> None:
+    # psi is written in sn
+    parts = {"value": value} | ({"psi": None} if "wp3" in value else {})
+    assert audit(component=parts).verdict == "holds"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "first"),
+    [
+        ({"reduced": "5/4*(u - u1)*(u - u2)*(u3 - u)"}, ("reduced", 1)),
+        ({"value": "u1 + (u2 - u1)*sn(p*t, m^2)^2"}, ("component", 1)),
+        ({"value": "u1 + (u2 - u1)*sn(p*(t + 1), m)^2"}, ("start", 1)),
+        ({"value": "u1"}, ("component", 2)),
+        ({"psi": "L*t"}, ("angle", 3)),
+    ],
+)
+def test_what_is_wrong_is_refuted_where_it_is_wrong(part: dict[str, str], first: tuple[str, int]) -> None:
+    report = audit(component=part)
+    assert report.verdict == "refuted"
+    assert next(key for key, holds in rows(report).items() if holds is False) == first
+
+
+@pytest.mark.parametrize(
+    ("psi", "verdict"), [("L*(u2 - u)/(1 - u^2)", "holds"), ("L*(u2 + u)/(1 - u^2)", "refuted"), ("u", "refuted")]
+)
+def test_rates_of_angles_are_claims_by_themselves(psi: str, verdict: str) -> None:
+    parts = {"quantity": "gamma3", "constants": ["Omega3"]}
+    table = LAGRANGE | {"component": parts, "quadrature": {"variable": "u", "psi": psi}}
+    assert audit_claim(claim_from_table(table, "claim")).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"), [("sn(t, 1/3)", "holds"), ("-sn(t, 1/3)", "refuted"), ("sn(t, 1/9)", "refuted")]
+)
+def test_eulers_component_obeys_its_quartic(value: str, verdict: str) -> None:
+    """Ω2 of I = (1, 2, 3) from Ω = (1, 0, 1): Ω1² = 1 − u², Ω3² = 1 − u²/3, u' = Ω1 Ω3."""
+    table = {
+        "name": "euler",
+        "kind": "component",
+        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
+        "start": {"omega": ["1", "0", "1"], "gamma": ["0", "0", "1"]},
+        "component": {
+            "quantity": "Omega2",
+            "constants": ["Omega1^2 + 4*Omega2^2 + 9*Omega3^2"],
+            "reduced": "(1 - u^2)*(1 - u^2/3)",
+            "value": value,
+        },
+    }
+    assert audit_claim(claim_from_table(table, "claim")).verdict == verdict
+
+
+SEED: dict[str, Any] = {
+    "name": "(2.3)",
+    "kind": "component",
+    "parameters": {"C1": ["1", "3/2"]},
+    "definitions": {
+        "f1": "(6*C1 - 1)/2 - 6*u - u^2",
+        "f2": "(1 - 2*C1)/6 + 2/3*u - u^2/3",
+    },
+    "top": {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "1", "0"]},
+    "component": {
+        "quantity": "Omega2",
+        "where": [
+            "9*Omega1^2 + 4*Omega2^2 + Omega3^2 - 1",
+            "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)/2 + 2*Omega2 - C1",
+        ],
+    },
+    "quadrature": {"variable": "u", "integrand": "1/sqrt(f1*f2)"},
+}
+
+
+def test_the_papers_quadrature_is_that_of_the_gyrostat_and_not_of_the_top() -> None:
+    gyrostat = SEED | {"system": "gyrostat", "top": SEED["top"] | {"rotor": "1"}}
+    assert audit_claim(claim_from_table(gyrostat, "claim")).verdict == "holds"
+    wrong = gyrostat | {"quadrature": {"variable": "u", "integrand": "1/sqrt(2*f1*f2)"}}
+    assert audit_claim(claim_from_table(wrong, "claim")).verdict == "refuted"
+
+
+@pytest.mark.slow
+def test_the_papers_rate_of_psi_is_refuted_for_the_top_by_conditions_that_do_not_last() -> None:
+    table = SEED | {
+        "definitions": {"rest": "gamma3*(Omega1*gamma1 + Omega2*gamma2)/(gamma1^2 + gamma2^2)"},
+        "component": {"quantity": "Omega2", "where": ["3*Omega1 - gamma1", "2*Omega2 - gamma2", "Omega3 - gamma3"]},
+        "quadrature": {"variable": "u", "psi": "1 - (Omega3 - rest)/Omega3"},
+    }
+    assert audit_claim(claim_from_table(table, "claim")).verdict == "refuted"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"start": None}, "start"),
+        ({"component": {"reduced": None}}, "reduced"),
+        ({"component": {"quantity": "C"}}, "constant"),
+        ({"component": {"phi": "t"}}, "phi"),
+    ],
+)
+def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], message: str) -> None:
+    table = {**LAGRANGE, **{k: LAGRANGE[k] | v if v else v for k, v in change.items()}}
+    table = {
+        k: {a: b for a, b in v.items() if b is not None} if isinstance(v, dict) else v for k, v in table.items() if v
+    }
+    with pytest.raises(InputError, match=message):
+        claim_from_table(table, "claim")

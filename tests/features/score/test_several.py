@@ -1,0 +1,59 @@
+"""Several files at once: a line each, and the order of those that differ in their step alone."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from heavytop.errors import ExitCode
+from heavytop.features.score.several import ScoredFile, exit_code, orders, text
+from support.in_process import heavytop
+
+HEAD = "# name: slow\n# integrator: {}\n# step: {}\n# inertia: 2, 2, 1\n# weight: 1\n# centre: 0, 0, 1/2\n"
+ROWS = "# omega: 0, 0, 1\n# gamma: 0, 0, 1\nt,w1,w2,w3,gamma1,gamma2,gamma3\n1,{0},0,1,0,0,1\n2,{0},0,1,0,0,1\n"
+
+
+def scored(path: str, step: str, error: float | None, method: str = "rk4", code: int = 0) -> ScoredFile:
+    return ScoredFile(path, {}, code, "5.0", "", (method,), Fraction(step), error)
+
+
+def test_the_order_is_that_of_the_two_finest_steps_above_rounding() -> None:
+    files = [scored("a", "1/10", 1e-3), scored("c", "1/40", 1e-15), scored("b", "1/20", 1e-3 / 16)]
+    (found,) = orders([*files, scored("other", "1/20", 1.0, "euler"), scored("unsaid", "0", 1e-2)])
+    assert (found.paths, round(found.order, 9)) == (("a", "b", "c"), 4)
+    assert "order 4.0 over 3 steps: a to c" in text(files)
+
+
+@pytest.mark.parametrize(
+    ("second", "third"), [(None, 1e-4), (1e-3, None)], ids=["the first unresolved", "the second unresolved"]
+)
+def test_one_resolved_error_gives_no_order(second: float | None, third: float | None) -> None:
+    assert list(orders([scored("b", "1/20", second), scored("c", "1/40", third)])) == []
+
+
+@pytest.mark.parametrize(("codes", "whole"), [((0, 0), 0), ((0, 3), 3), ((1, 3), 1), ((2, 1), 2)])
+def test_the_exit_code_is_the_gravest(codes: tuple[int, ...], whole: int) -> None:
+    assert exit_code([scored("a", "1", 1.0, code=code) for code in codes]) == whole
+
+
+@pytest.mark.slow
+def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp_path: Path) -> None:
+    for name, step, off in (("coarse", "1/10", 1e-4), ("fine", "1/20", 2.5e-5)):
+        (tmp_path / f"{name}.csv").write_text(HEAD.format("mine", step) + ROWS.format(off))
+    (tmp_path / "bad.csv").write_text("none\n")
+    paths = [str(tmp_path / f"{name}.csv") for name in ("coarse", "bad", "fine")]
+    done = heavytop("score", *paths, "--json")
+    assert done.returncode == ExitCode.BAD_INPUT
+    document = json.loads(done.stdout)
+    assert [each["file"] for each in document["files"]] == paths
+    assert document["files"][0]["digits_right"] == pytest.approx(4, abs=0.1)
+    assert "first line" in document["files"][1]["error"]
+    (order,) = document["orders"]
+    assert order["order"] == pytest.approx(2, abs=0.01)
+
+
+def test_a_page_is_of_one_trajectory() -> None:
+    done = heavytop("score", "a.csv", "b.csv", "--html", "page.html")
+    assert done.returncode == ExitCode.BAD_INPUT
+    assert "one trajectory; got 2" in done.stderr

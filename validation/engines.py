@@ -1,0 +1,100 @@
+"""Every engine of rigid bodies that is installed, on four bodies: what results/engines holds.
+
+    python -m validation.engines ENVIRONMENTS --out DIR [--only NAME ...]
+
+ENVIRONMENTS holds a virtual environment for each engine, by its name: ENVIRONMENTS/mujoco, made by ``python3 -m venv``
+and the ``pip install`` that the head of its table names.  Siconos is the system's.  Engines that are not there are left
+out; one that is named ``mujoco=mujoco-3.3.0`` is taken from that environment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import heavytop
+from heavytop.__main__ import main as command_line
+from heavytop.integrate.registry import commands_in
+
+ADAPTERS = Path(heavytop.__file__).parent / "features" / "engines"
+COARSE, FINE, FINEST = (
+    [f"1/{n}" for n in counts] for counts in ((25, 50, 100, 200), (125, 250, 500, 1000), (1000, 2000, 4000, 8000))
+)
+STEPS = {
+    "mujoco:RK4": COARSE,
+    "mjx": ["1/25", "1/50", "1/100"],
+    "pinocchio:R": COARSE,
+    "exudyn:RK": COARSE,
+    "basilisk": ["1/10", "1/20", "1/50", "1/100"],
+    "siconos": ["1/50", "1/100", "1/200", "1/400"],
+}
+"""By the beginning of an integrator's name; of all others FINE."""
+TOLERANCES = ["1e-3", "1e-5", "1e-7", "1e-9"]
+ON = {
+    "generic-body": ("mujoco", "mjx", "pinocchio", "exudyn", "drake", "dart", "pybullet", "siconos"),
+    "middle-axis": ("mujoco", "pinocchio:RKMK4", "basilisk"),
+    "slow-lagrange": ("mujoco", "pinocchio:RKMK4"),
+    "bruels-cardona-arnold": ("mujoco",),
+}
+"""The beginnings of the names that are measured on a body: all on one, some on the others."""
+MEASURES = {"generic-body": "10", "middle-axis": "10", "slow-lagrange": "10", "bruels-cardona-arnold": "2"}
+
+
+def curve(name: str, setting: str, body: str) -> str:
+    """The line of a ladder."""
+    steps = next((steps for head, steps in STEPS.items() if name.startswith(head)), FINE)
+    points = TOLERANCES if setting == "tolerance" else FINEST if body == "bruels-cardona-arnold" else steps
+    return f'  {{ integrator = "{name}", {setting}s = {points} }},'.replace("'", '"')
+
+
+def plan(folder: Path, environments: dict[str, Path]) -> Path:
+    """The plan, beside the adapters and their tables, in which each engine has its interpreter."""
+    shutil.copytree(ADAPTERS / "adapters", folder, dirs_exist_ok=True)
+    _, *tables = (ADAPTERS / "engines.toml").read_text("utf-8").split("\n[[")
+    tops = ["[[" + table for table in tables if table.startswith("top]]")]
+    names: list[tuple[str, str]] = []
+    for engine, environment in environments.items():
+        table = folder / f"{engine}.toml"
+        table.write_text(table.read_text("utf-8").replace("{python}", str(environment / "bin" / "python")), "utf-8")
+        names += [(each.name, each.setting) for each in commands_in(table)]
+    measures = []
+    for body, horizon in MEASURES.items():
+        curves = [curve(*each, body) for each in names if each[0].startswith(ON[body])]
+        lines = "\n".join(curves)
+        if not curves:
+            continue
+        measures.append(
+            f'[[measure]]\nkind = "work_precision"\ncases = ["{body}"]\nattitude = true\nhorizon = "{horizon}"\n'
+            f"samples = 20\nladders = [\n{lines}\n]\n"
+        )
+    used = [top for top in tops if re.search(r'name = "(.*)"', top)[1] in "".join(measures)]  # type: ignore[index]
+    files = ", ".join(f'"{engine}.toml"' for engine in environments)
+    path = folder / "plan.toml"
+    path.write_text("\n".join([f'name = "engines"\nintegrators = [{files}]\n', *used, *measures]), "utf-8")
+    return path
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("environments", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--only", nargs="*", default=[])
+    parser.add_argument("--workers", default="2")
+    asked = parser.parse_args()
+    found = {}
+    for each in asked.only or sorted(path.stem for path in (ADAPTERS / "adapters").glob("*.toml")):
+        engine, _, environment = each.partition("=")
+        if engine == "siconos" or (asked.environments / (environment or engine)).is_dir():
+            found[engine] = (asked.environments / (environment or engine)).absolute()
+    with tempfile.TemporaryDirectory() as folder:
+        path = plan(Path(folder), found)
+        sys.argv = ["heavytop", "run", "--plan", str(path), "--out", str(asked.out), "--workers", asked.workers]
+        return int(command_line() or 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
