@@ -40,7 +40,7 @@ def test_a_folder_is_complete_and_works_at_once_where_its_compiler_is_there(lang
     )
     for name in files:
         text = (folder / name).read_text()
-        assert not re.search(r"\b(COMMAND|LANGUAGE|BUILD|FILE|TITLE|KEYS|CONTROL|LADDER|METHOD|WHERE)\b", text), name
+        assert not re.search(r"\b(COMMAND|LANGUAGE|BUILD|FILE|TITLE|KEYS|CONTROL|POINTS|METHOD|WHERE)\b", text), name
         assert max(map(len, text.splitlines())) <= 130, name
     program = (folder / LANGUAGES[language].file).read_text()
     assert program.isascii() or language == "julia"

@@ -1,25 +1,77 @@
 """Whether an unchanged program is green at its own gate: `validation/starters.py [--repeats N] [--load N]`.
 
-An untouched starter in each language whose compiler is here is checked and measured by its own gate N times, every
-other time beside processes that do nothing but compute.  Each report is compared with each other one, both ways round,
-under the policy of the starter.  Prints a line for each that is not green; exit code 1 where there is one.
+An untouched starter in each language whose compiler is here, each method of `heavytop new` in C and BDF2 in Python, is
+checked and measured by its own gate N times, every other time beside processes that do nothing but compute.  Each
+report is compared with each other one, both ways round, under the policy of the starter.  Prints a line for each that
+is not green; exit code 1 where there is one.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from itertools import permutations
 from pathlib import Path
 
-from heavytop.api.integrators import LANGUAGES
+from heavytop.api.integrators import LANGUAGES, METHODS
 
 HEAVYTOP = [sys.executable, "-m", "heavytop"]
 COMPILERS = {"python": "python3", "c": "cc", "cpp": "g++", "rust": "rustc", "julia": "julia", "fortran": "gfortran"}
 BUSY = [sys.executable, "-c", "while True: pass"]
+
+
+BDF2 = '''def step(f, y, h, before):
+    """y after one step of BDF2, of which `before` is the state before y: Newton's method with differences."""
+    z = [2 * a - b for a, b in zip(y, before)]
+    for _ in range(3):
+        rates = f(z)
+        rest = numpy.array(z) - (4 * numpy.array(y) - numpy.array(before)) / 3 - 2 * h / 3 * numpy.array(rates)
+        slopes = [(numpy.array(f([*z[:i], z[i] + 1e-7, *z[i + 1 :]])) - rates) / 1e-7 for i in range(len(z))]
+        z = list(z - numpy.linalg.solve(numpy.eye(len(z)) - 2 * h / 3 * numpy.array(slopes).T, rest))
+    return z
+
+
+def advance(f, y, span, h, memory):
+    """y after the span, and how many equal steps that takes; the first of a size by the midpoint rule."""
+    count = math.ceil(abs(span) / h)
+    h = span / max(count, 1)
+    before = memory.get("before") if abs(memory.get("h", 0.0) - h) < 1e-9 * abs(h) else None
+    for _ in range(count):
+        if before is None:
+            half = f([a + h / 2 * b for a, b in zip(y, f(y))])
+            before, y = y, [a + h * b for a, b in zip(y, half)]
+        else:
+            before, y = y, step(f, y, h, before)
+        y = [float(a) for a in y]
+    memory.update(h=h, before=before)
+    return y, count
+'''
+
+
+def starters(folder: Path) -> Iterator[Path]:
+    """Their folders: each language in fixed steps, the other methods in C, and BDF2 in Python."""
+    for language in LANGUAGES:
+        for method in METHODS if language == "c" else ("step",):
+            if shutil.which(COMPILERS[language]) is not None:
+                yield made(folder / f"{language}-{method}", language, method)
+    bdf2 = made(folder / "python-bdf2", "python", "multistep")
+    program, table = bdf2 / "mine.py", bdf2 / "mine.toml"
+    head, tail = re.split(r"\ndef start.*?(?=\ndef run)", program.read_text(), flags=re.DOTALL)
+    program.write_text(f"{head}import numpy\n\n\n{BDF2}\n{tail}")
+    table.write_text(table.read_text().replace("order = 4", "order = 2").replace("python3", sys.executable))
+    yield bdf2
+
+
+def made(folder: Path, language: str, method: str) -> Path:
+    ran(folder.parent, "new", folder.name, "--language", language, "--method", method)
+    if (folder / "Makefile").exists():
+        subprocess.run(["make"], cwd=folder, check=True, capture_output=True)
+    return folder
 
 
 def ran(folder: Path, *words: str) -> tuple[int, str]:
@@ -66,14 +118,9 @@ def main() -> int:
     asked = parser.parse_args()
     wrong = 0
     with tempfile.TemporaryDirectory() as place:
-        for language in LANGUAGES:
-            if asked.only not in language or shutil.which(COMPILERS[language]) is None:
-                continue
-            folder = Path(place) / language
-            ran(Path(place), "new", language, "--language", language)
-            if (folder / "Makefile").exists():
-                subprocess.run(["make"], cwd=folder, check=True, capture_output=True)
-            wrong += findings(folder, asked.repeats, asked.load)
+        for folder in starters(Path(place)):
+            if asked.only in folder.name:
+                wrong += findings(folder, asked.repeats, asked.load)
     return int(wrong > 0)
 
 

@@ -43,12 +43,12 @@ LANGUAGES = {
 
 
 class Method(NamedTuple):
-    """A method of `heavytop new`: what it is called, the keys of its table, and its control and ladder in the plan."""
+    """A method of `heavytop new`: what it is called, the keys of its table, its control and points in the plan."""
 
     title: str
     keys: str
     control: str
-    ladder: str
+    points: str
 
 
 _STEPS = 'steps = ["1/10", "1/30", "1/100", "1/300"]'
@@ -130,7 +130,7 @@ def _program(language: str, method: str, place: str) -> dict[str, str]:
     files[".gitignore"], files[_WORKFLOW] = files.pop("gitignore"), files.pop("workflow.yml")
     files[about.file] = re.sub(r"^.*\bMETHOD\b.*\n", lambda _: parts[method], files[about.file], flags=re.MULTILINE)
     words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-    words |= {"TITLE": chosen.title, "KEYS": chosen.keys, "CONTROL": chosen.control, "LADDER": chosen.ladder}
+    words |= {"TITLE": chosen.title, "KEYS": chosen.keys, "CONTROL": chosen.control, "POINTS": chosen.points}
     return {
         name: text if name in (".gitignore", "Makefile", "policy.toml") else _filled(text, words, place)
         for name, text in files.items()
