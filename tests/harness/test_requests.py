@@ -74,7 +74,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
     "drift": [
         *({"cases": ["lagrange"]}, {"integrator": "multiword"}, {"attitude": True}, {"noise": False}),
         *({"runs": [DRIFT | {key: value}]} for key, value in (("precision", "extended"), ("horizon", "3"))),
-        {"runs": [DRIFT | {"samples": 8}]},
+        *({"runs": [DRIFT | {"samples": 8}]}, {"integrator": "splitting:2", "step": "1/50"}),
     ],
     "growth": [
         *({"cases": ["lagrange"]}, {"integrator": "multiword"}),
@@ -105,7 +105,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
         {"cases": ["sweep:others"], "sweep": RANDOM | {"name": "others"}},
     ],
     "work_precision": [
-        *({"cases": ["lagrange"]}, {"horizon": "3"}, {"samples": 8}, {"timings": True}),
+        *({"cases": ["lagrange"]}, {"horizon": "3"}, {"samples": 8}, {"timings": True}, {"attitude": True}),
         *({"ladders": [CURVE | {key: value}]} for key, value in (("precision", "extended"), ("tolerances", ["1e-8"]))),
         *({"ladders": [CURVE | {"integrator": name}]} for name in ("multiword", "heyoka:constants")),
         {"ladders": [CURVE | {"tolerances": [], "steps": ["1/50"], "integrator": "splitting:2"}]},

@@ -163,9 +163,9 @@ def _adapter(engine: str, place: str) -> dict[str, str]:
     files = {name: texts[source] for name, source in own.items()}
     tables = tomllib.loads(files["engine.toml"])["integrator"]
     line = '    {{ integrator = "{name}", {setting}s = {points} }},'
-    ladders = (line.format(**each, points=json.dumps(_POINTS[each["setting"]])) for each in tables)
+    curves = (line.format(**each, points=json.dumps(_POINTS[each["setting"]])) for each in tables)
     runs = "\n".join(_DRIFT.format(name=each["name"]) for each in tables)
-    words = {"ENGINE": engine, "LADDERS": "\n".join(ladders), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
+    words = {"ENGINE": engine, "LADDERS": "\n".join(curves), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
     words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
     words |= {"BUILD": words["INSTALL"].replace("pip", "python -m pip"), "mine.toml": f"engine.toml:{words['FIRST']}"}
     texts[f"{_WORKFLOW}.txt"] = _texts("common")["workflow.yml"]

@@ -88,15 +88,15 @@ def orders(files: Sequence[ScoredFile]) -> Iterator[Order]:
     """The order of each method of which two files with different steps have an error that is more than rounding."""
     with_step = sorted((each for each in files if each.step), key=lambda each: (each.method, -each.step))
     for _, group in groupby(with_step, key=lambda each: each.method):
-        rungs = list(group)
-        resolved = [each for each in rungs if each.error is not None and each.error > _ABOVE_ROUNDING * DOUBLE.eps]
+        series = list(group)
+        resolved = [each for each in series if each.error is not None and each.error > _ABOVE_ROUNDING * DOUBLE.eps]
         pairs = [(a, b) for a, b in pairwise(resolved) if a.step != b.step]
         if pairs:
             coarse, fine = pairs[-1]
             assert coarse.error is not None
             assert fine.error is not None
             order = log2(coarse.error / fine.error) / log2(coarse.step / fine.step)
-            yield Order(tuple(each.path for each in rungs), order)
+            yield Order(tuple(each.path for each in series), order)
 
 
 def text(files: Sequence[ScoredFile]) -> str:

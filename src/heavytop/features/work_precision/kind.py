@@ -107,7 +107,8 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
         times, keep = uniform(horizon, self.samples)
         points = [(parse(each.precision), subject) for each in self.ladders for subject in each.subjects()]
         options = Options(self.timings, self.attitude)
-        more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": options}
+        request = {"attitude": str(self.attitude)}
+        more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": options, "request": request}
         return [
             Task.of_run(NAME, case, by, precision, times, subject=f"{by.name} {by.setting}", **more)
             for case in map(find, self.cases)

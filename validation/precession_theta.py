@@ -1,4 +1,4 @@
-"""Landau and Lifshitz, Mechanics, 37.17-37.20: which signs of the theta functions give the precession, in 60 digits.
+"""The free body's precession by theta functions: which choice of signs is right, in 60 digits.
 
 At random bodies and starts the equations of motion are integrated by Taylor series of mpmath, with φ' of the
 kinematics beside them; nothing of heavytop is used.  Each of the four choices of signs in
@@ -7,7 +7,7 @@ kinematics beside them; nothing of heavytop is used.  Each of the four choices o
 
 with a = ±α, b = ±1 and sn(2iαK) = +i √(I3 (M² − 2EI1)/(I1 (2EI3 − M²))) is compared with it.
 
-    python -m validation.landau_lifshitz [CASES [SEED]]
+    python -m validation.precession_theta [CASES [SEED]]
 """
 
 from __future__ import annotations
