@@ -60,7 +60,7 @@ ODD: tuple[Any, ...] = (
 GENERATORS: tuple[Callable[[], Any], ...] = (failing, lambda: (x for x in (1, 2, 3)), lambda: iter("321"))
 
 GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0), "rotor": None}),
+    "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0), "rotor": None, "mass": None}),
     "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1), "attitude": None, "omega_space": None}),
     "Body": (
         ht.Body,
@@ -192,6 +192,25 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "require": 3,
         },
     ),
+    "digits_end": (ht.digits_end, {"top": TOP, "start": START, "until": 1, "precision": ht.DOUBLE, "system": None}),
+    "between_samples": (
+        ht.between_samples,
+        {"top": TOP, "start": START, "until": 1, "spacing": "1/2", "within": None, "system": None},
+    ),
+    "power": (
+        ht.power,
+        {
+            "top": TOP,
+            "start": START,
+            "until": 1,
+            "tolerance": "1e-3",
+            "step": "1/2",
+            "planted": "all",
+            "integrator": "heyoka",
+            "control": None,
+            "system": None,
+        },
+    ),
     "drift": (ht.drift, {"run": None}),
     "audit": (ht.audit, {"claim": "none", "system": "heavy_top", "branch": None}),
     "run": (
@@ -230,6 +249,9 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "history": (ht.history, {"reports": ["nowhere", "nowhere"], "metric": "", "case": "*", "policy": None}),
 }
+
+
+SLOW = ("hunt", "score", "digits_end", "between_samples", "power")
 
 
 def answered(function: Callable[..., Any], arguments: dict[str, Any]) -> None:
@@ -282,9 +304,9 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     function, arguments = GOOD[name]
-    # the arguments of score are checked in one place, and a hunt takes its time: every 12th value, another for each
+    # the arguments of score are checked in one place, and these take their time: every 12th value, another for each
     index = list(arguments).index(argument)
-    values = ODD[index % 12 :: 12] if name in ("hunt", "score") else ODD
+    values = ODD[index % 12 :: 12] if name in SLOW else ODD
     for odd in itertools.chain(values, (make() for make in GENERATORS)):
         if name == "run" and isinstance(odd, str) and odd == "smoke":
             continue  # a plan that is there

@@ -18,7 +18,7 @@ import numpy
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.integrate.registry import Setup, named, propagator
 from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact, exact_text, real
 from heavytop.top.bodies import PIVOT, Body
@@ -154,13 +154,14 @@ def power(
 
 
 def _names(planted: str | Sequence[str]) -> list[str]:
-    names = planted.split(",") if isinstance(planted, str) else list(planted)
-    if names == ["all"]:
+    names, remedy = planted.split(",") if isinstance(planted, str) else planted, f"Use {', '.join(FAULTS)}, or all."
+    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"planted must be names of faults; got {quoted(planted)}.", remedy)
+    if list(names) == ["all"]:
         return list(FAULTS)
-    for name in names:
-        if name not in FAULTS:
-            raise InputError(f"Unknown fault {name!r}.", f"Use {', '.join(FAULTS)}, or all.")
-    return names
+    if unknown := [name for name in names if name not in FAULTS]:
+        raise InputError(f"Unknown fault {quoted(unknown[0])}.", remedy)
+    return list(names)
 
 
 def _off(rows: Array, true: Array) -> Array:
