@@ -237,6 +237,10 @@ COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: ht.run("smoke", row_timeout="0"),
     ),
     "gate of no plan": (["gate", "--plan", "nobody", "--bless"], lambda: ht.run("nobody")),
+    "power of no fault": (
+        ["power", "--until", "1", "--tolerance", "1e-3", "--case", "euler", "--planted", "none"],
+        lambda: ht.power(case("euler").top, case("euler").start, 1, "1e-3", planted="none"),
+    ),
     "selftest without workers": (["selftest", "--workers", "0"], lambda: ht.run("smoke", workers=0)),
     "hunt of nobody": (["hunt", "--integrator", "nobody"], lambda: ht.hunt("nobody")),
     "hunt for no time": (["hunt", "--horizon", "0"], lambda: ht.hunt(horizon="0")),

@@ -42,8 +42,7 @@ def plan_of(tmp_path: Path, text: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_the_plans_that_ship_expand(name: str) -> None:
-    plan, digest = load(name)
-    tasks = expand(plan)
+    plan, digest, tasks = read(name)
     assert plan.name == name
     assert len(digest) == 64
     assert len({task.label for task in tasks}) == len(tasks) > 5

@@ -414,7 +414,7 @@ def test_the_command_line_shows_printed_and_proven(tmp_path: Path) -> None:
 
 def test_a_claim_of_numbers_is_no_claim_of_formulas() -> None:
     assert isinstance(claim_from_table(claim([one("omega", 1, "0.1")]), "x"), ValueClaim)
-    with pytest.raises(InputError, match="start"):
+    with pytest.raises(InputError, match=r"needs the table \[motion\]"):
         claim_from_table({"name": "x", "kind": "motion", "top": TOP, "start": START}, "x")
 
 
