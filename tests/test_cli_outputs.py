@@ -166,9 +166,9 @@ def test_eighty_digits_are_readable_on_eighty_columns() -> None:
     value = json.loads(heavytop("reference", "--digits", "80", "--json"))["states"][0][0]["value"]
     lines = text.splitlines()
     place = next(i for i, line in enumerate(lines) if line.startswith(" Ω1"))
-    first, second = lines[place].split(), lines[place + 1].split()
+    first, second, radius = (line.split() for line in lines[place : place + 3])
     assert first[1] + second[0] == value
-    assert first[2] == "±"
+    assert radius[0] == "±"
 
 
 @pytest.mark.slow

@@ -347,7 +347,7 @@ def test_what_is_computed_is_scored_with_the_rotor_of_the_file(tmp_path) -> None
         file.write_text(json.dumps(data | {"rotor": rotor}))
         answer = CliRunner().invoke(app, ["score", str(file)], catch_exceptions=False)
         assert said in answer.output
-        assert "heavy_gyrostat" in answer.output
+        assert "heavy gyrostat" in answer.output
     score = ht.score(times, run.to_numpy(), top=CASE.top, start=CASE.start)
     assert score.row.system == "heavy_gyrostat"
     assert score.row.data.rotor == ("1/2", "-1/3", "3/4")
