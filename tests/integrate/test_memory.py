@@ -17,6 +17,7 @@ from heavytop.cases import CASES
 from heavytop.errors import Unsupported
 from heavytop.features.kinds import KINDS
 from heavytop.features.local_error.kind import _said
+from heavytop.features.work_precision.kind import Options
 from heavytop.harness import integrator_check
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import read
@@ -82,7 +83,7 @@ def test_a_wrong_order_is_found_whatever_is_declared(name: str) -> None:
         found = row(integrator)
         order = memory.METHODS[name][1]
         assert int(found.metrics["observed_order_runs"].value) < order
-        assert f", not the {order} that it says" in _said(found)
+        assert f", not the declared {order}" in _said(found)
 
 
 @pytest.mark.parametrize("name", memory.HEALTHY)
@@ -349,7 +350,7 @@ def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
         run = propagate(top, start, times, precision, system=system)
         return replace(run, order=1, steps=20, flags={})
 
-    found = row(of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), step="1/10")
+    found = row(of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), Options(), step="1/10")
     assert found.outcome == "success", found.reference.reason
     assert found.explained.kind == "steps"
     assert "it is exact on this motion, or takes more steps than it counts" in found.explained.text

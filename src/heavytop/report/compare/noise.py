@@ -283,10 +283,10 @@ class RoundingBound:
         data = self.row.data
         if data is None or not data.omega or not data.gamma:
             return None
-        inertia, centre, rotor, omega, gamma = (
-            tuple(map(exact, part)) for part in (data.inertia, data.centre, data.rotor, data.omega, data.gamma)
-        )
         try:
+            inertia, centre, rotor, omega, gamma = (
+                tuple(map(exact, part)) for part in (data.inertia, data.centre, data.rotor, data.omega, data.gamma)
+            )
             top, start = HeavyTop(inertia, exact(data.weight), centre, rotor or None), State(omega, gamma)
             which = system(self.row.system)
             return top, start, which, which.parameters(top, start)
