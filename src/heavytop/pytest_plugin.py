@@ -79,7 +79,7 @@ def gate(
 
     known = case_named(case)
     given = integrator_or_states
-    if isinstance(given, str) or callable(given):
+    if isinstance(given, str) or (callable(given) and not isinstance(given, ht.Trajectory)):
         wanted = list(range(1, 11)) if times is None else times
         given = ht.propagate(
             known.top, known.start, wanted, precision, integrator=given, system=known.system, **options

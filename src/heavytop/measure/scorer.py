@@ -425,7 +425,14 @@ def sample_errors(
     states, known: exact numbers, six each, at the same times.
     """
     true = dict(zip(times, known, strict=True))
-    error = SolutionError(problem, Truth(Against("computed"), lambda time, bits: to_balls(true[time])), times)
+
+    def state_at(time: Fraction, bits: int) -> list[arb]:
+        with working_precision(bits):
+            return to_balls(true[time])
+
+    error = SolutionError(problem, Truth(Against("computed"), state_at), times)
+    # as many bits as tell a state of the format from one that is right to as many digits again
+    error.bits = 2 * problem.precision.bits + GUARD_BITS
     for time, state in zip(times, states, strict=True):
         error(time, state)
     return {part: _logs(running) for part, running in error.running.items()}
