@@ -350,7 +350,9 @@ def test_a_method_that_is_exact_on_a_motion_counts_no_step_too_few() -> None:
         run = propagate(top, start, times, precision, system=system)
         return replace(run, order=1, steps=20, flags={})
 
-    found = row(of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), Options(), step="1/10")
+    found = row(
+        of_callable(exactly), "work_precision", tuple(Fraction(i, 5) for i in range(1, 11)), Options(), step="1/10"
+    )
     assert found.outcome == "success", found.reference.reason
     assert found.explained.kind == "steps"
     assert "it is exact on this motion, or takes more steps than it counts" in found.explained.text

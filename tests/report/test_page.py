@@ -249,8 +249,8 @@ return [...document.querySelectorAll('main figure svg')].map(svg => ({
 }));
 """
 UNITS = re.compile(
-    r"case|digits right, of \d+|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|units of the energy|s|decimal digits"
-    r"|time units of the data)\)"
+    r"case|digits right, of \d+|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|units of the energy|s"
+    r"|decimal digits|time units of the data)\)"
 )
 
 
