@@ -78,7 +78,7 @@ def between_samples(
         within: the error wanted, above 1e-12.
 
     Returns:
-        A :class:`BetweenSamples`: ``errors`` and ``largest`` by "slerp" (of the attitude, radians), "linear", "hermite"
+        A ``BetweenSamples``: ``errors`` and ``largest`` by "slerp" (of the attitude, radians), "linear", "hermite"
         and "lagrange" (of Ω and γ), measured at seven points of each interval.
 
     Raises:

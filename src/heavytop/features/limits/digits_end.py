@@ -109,7 +109,7 @@ def digits_end(
         until: an exact time, not 0; 64 times up to it are looked at.
 
     Returns:
-        A :class:`DigitsEnd`: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
+        A ``DigitsEnd``: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
 
     Raises:
         InputError: for what is no motion or time, and for the gyrostat of the paper.

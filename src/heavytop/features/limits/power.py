@@ -117,11 +117,11 @@ def power(
         top, start, system: as in :func:`heavytop.propagate`.
         until: where the test ends.  tolerance: of the test, relative above 1.
         step: between samples, a hundredth of ``until`` where None; of the fault ``late`` the step.
-        planted: names of :data:`FAULTS`, or "all".
+        planted: names of faults, or "all"; the error of an unknown one lists them.
         integrator, control: of a right run in double, and its tolerance or step.
 
     Returns:
-        A :class:`Power`: ``faults`` with ``name``, ``detected_from`` and ``tolerance``; ``error``, ``passes``.
+        A ``Power``: ``faults`` with ``name``, ``detected_from`` and ``tolerance``; ``error``, ``passes``.
 
     Raises:
         InputError: for what is no motion, an unknown fault, more than 100,000 samples, and for other numbers.
