@@ -75,7 +75,8 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(fractions|decimal|collections|os|pathlib|typing|enum|numpy|np|pandas|msgspec|NDArray)\b.*"),
     ("py:.*", r"(Any|Callable|Iterable|Sequence|Fraction|Decimal|Path|PathLike|Enum|TypeAlias|SupportsIndex)"),
-    ("py:.*", r"(Struct|Numbers?|Motion|Crossings|PoincareSection|PowerCurves|SpacedErrors|Rotation|Axes(3D)?|FuncAnimation)"),
+    ("py:.*", r"(Struct|Numbers?|Motion|Crossings|PoincareSection|PowerCurves|SpacedErrors|Rotation)"),
+    ("py:.*", r"(Axes(3D)?|FuncAnimation)"),
     ("py:.*", r"heavytop\.[a-z_]+\..*"),
 ]
 
