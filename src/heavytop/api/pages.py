@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from pathlib import Path
 
+from heavytop.api.formulas import plain_formula
 from heavytop.errors import InputError, quoted
 
 _INSTALLED = Path(__file__).parents[1] / "docs"
@@ -20,13 +22,18 @@ def topics() -> dict[str, str]:
 
 
 def page(topic: str) -> str:
-    """The page as it was written, in Markdown; raises InputError for a topic without a page."""
+    """The page in Markdown, its formulas as text; raises InputError for a topic without a page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
         near = get_close_matches(name.lower(), files, 1)
         remedy = f"Did you mean {near[0]}?  " if near else ""
         raise InputError(f"There is no page {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
-    return files[name].read_text("utf-8")
+    return re.sub(
+        r"\$\$\n(.*?)\$\$",
+        lambda formula: f"```text\n{plain_formula(formula[1])}\n```",
+        files[name].read_text("utf-8"),
+        flags=re.DOTALL,
+    )
 
 
 def _files() -> dict[str, Path]:
