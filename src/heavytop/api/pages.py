@@ -38,12 +38,12 @@ def page(topic: str) -> str:
 
 def _files() -> dict[str, Path]:
     folder = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT
-    found = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
-    if not found:
+    paths = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
+    if not paths:
         raise InputError(
             "The pages of the documentation are not installed.", "Install heavytop from a wheel or from its checkout."
         )
-    return {name: path for name, path in found.items() if name not in _OF_THE_SITE}
+    return {name: path for name, path in paths.items() if name not in _OF_THE_SITE}
 
 
 def _title(text: str) -> str:
