@@ -518,10 +518,10 @@ def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _
 
 
 def in_other_bits(field: Quadratic, taken: Step, precision: int, certified: CertifiedSeries | None) -> Step | None:
-    """``found`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
+    """``taken`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
 
-    The set of errors is a box around that of ``found``, wider by what was rounded.  V̂ remains that along the polynomial
-    of ``found``: W is the larger of both, so that the motion is within it of either.
+    The set of errors is a box around that of ``taken``, wider by what was rounded.  V̂ remains that along the polynomial
+    of ``taken``: W is the larger of both, so that the motion is within it of either.
     """
     node, shift = taken.node, precision - taken.precision
     if not shift and isinstance(taken.series, Whole) == (certified is None):

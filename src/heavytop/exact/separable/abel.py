@@ -221,7 +221,7 @@ def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
 
 
 class Rest:
-    """The variable at rest at ``place``; its phase stays 0."""
+    """The variable at rest at ``point``; its phase stays 0."""
 
     turn = 1.0
     periodic = False
@@ -256,7 +256,7 @@ class Rest:
 
 
 class RestingVariable:
-    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
+    """``variable`` with the one integral H for a variable at rest at ``point``, outside its gap."""
 
     def __init__(self, variable: Variable, point: arb) -> None:
         self.variable, self.place = variable, point

@@ -81,7 +81,7 @@ class Roots:
         return replace(self, lead=self.lead * factor)
 
     def polynomial(self, point: arb) -> arb_poly:
-        """g as a polynomial, with the sign that makes it positive at ``place``."""
+        """g as a polynomial, with the sign that makes it positive at ``point``."""
         product = arb_poly([self.lead])
         for b, many in self.real:
             product *= arb_poly([-b, 1]) ** many

@@ -176,7 +176,7 @@ class Keys:
 
 
 def numbered(label: str, index: int, old: bool = False) -> Key:
-    """The entry of the curve that is the ``place``-th: no two of the first thirty-six look alike; further ones, from
+    """The entry of the curve that is the ``index``-th: no two of the first thirty-six look alike; further ones, from
     one turn through the colours to the next, differ in their dashes.
     """
     turn = index // len(COLOURS)
