@@ -12,8 +12,6 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -431,6 +429,8 @@ def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control_name`; a third-party one is looked at in a process of its own, which it may end or hold."""
     if isinstance(which, Command) or described(which).own:
         return control_name(which)
+    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+
     from heavytop.processes import ChildContext
 
     context = ChildContext()
