@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,7 +11,7 @@ from fractions import Fraction
 from math import inf
 from time import perf_counter
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
@@ -621,36 +622,64 @@ def _shown(value: Any, digits: int) -> str:
 
 
 Observer = Callable[[Fraction, Any], None]
-
+EnsembleObserver = Callable[[int, Fraction, Any], None]
+"""Given the index of a motion, the time and the state."""
 
 Ended = tuple[Sequence[Fraction], Any, "Outcome", float]
 """The times that a run reached, the states there, its outcome and its seconds."""
 
 
-class SampledRun(Protocol):
-    """A run that is advanced to wherever its next sample lies."""
+class SampledRun(ABC):
+    """A run that is advanced to wherever its next sample lies.
+
+    between: called between chunks of steps; it may raise to give the run up.
+    """
+
+    step_limit: int | None
+    between: Callable[[], None] | None
 
     @property
+    @abstractmethod
     def steps(self) -> int:
         """Taken so far."""
-        ...
 
     @property
+    @abstractmethod
     def time(self) -> Any:
         """Where the last step ended, exactly or as a native number."""
-        ...
 
+    def reach(self, target: Any) -> Outcome:
+        """Step until the last step covers ``target``."""
+        while not self.covers(target):
+            left = None if self.step_limit is None else self.step_limit - self.steps
+            if left is not None and left <= 0:
+                return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
+            outcome = self.advance(target, left)
+            if outcome is not Outcome.SUCCESS:
+                return outcome
+        return Outcome.SUCCESS
+
+    @abstractmethod
+    def covers(self, target: Any) -> bool:
+        """Whether there is a state at ``target`` without another step."""
+
+    @abstractmethod
+    def advance(self, target: Any, most: int | None) -> Outcome:
+        """Some steps towards ``target``, at most so many."""
+
+    @abstractmethod
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """How it came to the time, given as the native number and exactly, and the native state there."""
-        ...
 
+    @abstractmethod
     def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
-        ...
 
+    @abstractmethod
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""
-        ...
 
 
 def sampled(
@@ -704,6 +733,10 @@ def trajectory_of(
     reached = times[-1] if outcome is Outcome.SUCCESS and times else exact(run.time)
     spent = {"compile": compiling, "run": seconds}
     return Trajectory(problem, integrator, times, states, outcome, reached, run.steps, order, spent, flags)
+
+
+Finished = Callable[[int, Trajectory], None]
+"""Given the index of a motion of an ensemble and the motion, when it ends."""
 
 
 @dataclass(frozen=True, slots=True)

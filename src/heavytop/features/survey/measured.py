@@ -22,8 +22,9 @@ from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Lazy, Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
 from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
+from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
@@ -191,7 +192,7 @@ Columns = dict[str, Any]
 
 
 def measured(
-    drawn: Drawn, integrator: ChosenIntegrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+    drawn: Drawn, integrator: Integrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
 ) -> Columns:
     """Each quantity over the motions.  Errors of Ω are in 1/time unit, drifts in units of the integral; NaN where a run
     or its reference did not reach the horizon.
@@ -217,13 +218,13 @@ def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> boo
 
 
 def _runs(
-    integrator: ChosenIntegrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+    integrator: Integrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
 ) -> tuple[Any, Pairs, Any]:
     """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
     count = len(drawn.problems)
     outcomes, steps = numpy.full(count, Outcome.SUCCESS.value, object), numpy.zeros(count, int)
     states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
-    if integrator == ChosenIntegrator(HEYOKA) and _usual(drawn, times, precision):
+    if integrator == described(HEYOKA) and _usual(drawn, times, precision):
         given = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
         found, steps, good = states_on_a_grid(drawn.system, *given, times, **options)
         states = Pairs(found, numpy.zeros_like(found))
@@ -239,10 +240,10 @@ def _runs(
 
 
 def _one_by_one(
-    integrator: ChosenIntegrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
+    integrator: Integrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
 ) -> list[tuple[str, Sequence[Any], int]]:
     """Outcome, states and steps of each, by the integrator's own ensembles where it has them."""
-    if integrator.supports_ensemble:
+    if integrator.ensemble:
         many = integrator.propagate_many(problems, times, threads=1, **options)
         return [(run.outcome.value, run.states, run.steps) for run in many]
     runs = [_alone(integrator, problem, times, options) for problem in problems]
@@ -253,7 +254,7 @@ def _one_by_one(
 
 
 def _alone(
-    integrator: ChosenIntegrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
+    integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
 ) -> tuple[str, Sequence[Any], int] | PeerFailed:
     """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
     try:

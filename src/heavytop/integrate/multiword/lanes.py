@@ -20,7 +20,7 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.guard import processors
-from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind
+from heavytop.integrate.ensemble import in_threads, one_kind
 from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (
@@ -30,7 +30,7 @@ from heavytop.integrate.multiword.motions import (
     native_state,
     sums_of_two,
 )
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
@@ -220,7 +220,7 @@ def propagate_multiword_ensemble(
     problems: Sequence[Problem],
     times: Sequence[Any],
     *,
-    observer: Observer | None = None,
+    observer: EnsembleObserver | None = None,
     finished: Finished | None = None,
     threads: int | None = None,
     step_limit: int | None = None,

@@ -18,6 +18,7 @@ from heavytop.integrate.trajectory import (
     Outcome,
     Problem,
     ResumePoint,
+    SampledRun,
     Trajectory,
     sampled,
     trajectory_of,
@@ -292,7 +293,7 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
 
 
 @dataclass(slots=True)
-class _Pace:
+class _Pace(SampledRun):
     """A run advanced in chunks, in the units of the problem."""
 
     run: ResumableRun
@@ -312,24 +313,19 @@ class _Pace:
         """Where the last step ended."""
         return self.run.time / self.scaled.rate * (1 if self.run.forwards else -1)
 
-    def reach(self, target: Fraction) -> Outcome:
-        """Step until the last step covers ``target``; there are no steps at an equilibrium."""
-        goal = abs(target) * self.scaled.rate
-        while not self.scaled.rest and self.run.time < goal:
-            most = self._chunk
-            if self.step_limit is not None:
-                most = min(most, self.step_limit - self.run.steps)
-            if most <= 0:
-                return Outcome.STEP_LIMIT
-            if self.between is not None:
-                self.between()
-            began, before = perf_counter(), self.run.steps
-            status = self.run.advance(goal, most)
-            if status is not Status.OK:
-                return OUTCOMES[status]
+    def covers(self, target: Fraction) -> bool:
+        """Whether the last step covers ``target``; there are no steps at an equilibrium."""
+        return self.scaled.rest or self.run.time >= abs(target) * self.scaled.rate
+
+    def advance(self, target: Fraction, most: int | None) -> Outcome:
+        """A chunk of steps of a quarter of a second, or fewer."""
+        chunk = self._chunk if most is None else min(self._chunk, most)
+        began, before = perf_counter(), self.run.steps
+        status = self.run.advance(abs(target) * self.scaled.rate, chunk)
+        if status is Status.OK:
             a_step = (perf_counter() - began) / max(1, self.run.steps - before)
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
-        return Outcome.SUCCESS
+        return OUTCOMES[status]
 
     def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, int, Callable[[], Array]]:
         """The outcome, how many of many times are reached, and what makes the states there, as from :meth:`reach` and
