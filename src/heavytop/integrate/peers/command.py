@@ -713,11 +713,7 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them within 20 s, or why it cannot be started."""
-    seconds = str(min(command.seconds, _GREETING))
-    try:
-        program = Session(msgspec.structs.replace(command, timeout=seconds))
-    except PeerFailed as error:
-        return f"not started: {error.cause}"
+    """Name and version as the program says them; raises PeerFailed where it does not within 20 s."""
+    program = Session(msgspec.structs.replace(command, timeout=str(min(command.seconds, _GREETING))))
     program.close(_FAREWELL)
     return program.greeting
