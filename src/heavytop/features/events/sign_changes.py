@@ -57,7 +57,7 @@ def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[
 
 
 def _isolated(part: fmpz_poly, position: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
-    """The changes in the part ``position`` of the 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
+    """The changes in part ``position`` of 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
     part = _without_root_at_zero(part)
     variations = _variations(part)
     if variations == 0:
