@@ -12,7 +12,7 @@ from heavytop.errors import InputError, quoted
 _INSTALLED = Path(__file__).parents[1] / "docs"
 """Where hatch_build.py puts the pages of a wheel."""
 _CHECKOUT = Path(__file__).parents[3] / "docs"
-_OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index"})
+_OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index", "public"})
 """Pages that are made when the site is built."""
 
 
