@@ -509,7 +509,7 @@ class Integrator:
             if given.ndim == 2 and given.shape[1] == 6 and len(given):
                 return given, True
         except (TypeError, ValueError):
-            raise InputError(f"start = {quoted(start)} is no start.", _SHAPES) from None
+            raise InputError(f"start must be a State or an array of numbers; got {quoted(start)}.", _SHAPES) from None
         raise InputError(f"start has the shape {given.shape}.", _SHAPES)
 
     def _one(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:

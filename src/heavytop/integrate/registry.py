@@ -395,7 +395,7 @@ def of_callable(call: Any) -> IntegratorSource:
     if isinstance(call, Command | PythonFile | PythonObject):
         return call
     if not callable(call):
-        raise InputError(f"integrator = {quoted(call)} is none.", "Give a name, a file or a callable.")
+        raise InputError(f"integrator must be callable; got {quoted(call)}.", "Give a name, a file or a callable.")
     own = getattr(call, "integrator_name", None)
     file, function = place_of(call)
     plain = PythonFile(file, function).name if file else re.sub(r"[^\w.:+-]", "", function)[:64]
@@ -497,7 +497,7 @@ def require(which: str | IntegratorSource) -> None:
     """
     integrator = described(which)
     if isinstance(integrator.source, PythonFile) and not Path(integrator.source.path).is_file():
-        raise InputError(f"There is no file {integrator.source.path}.", "Give FILE.py:FUNCTION.")
+        raise InputError(f"The file {integrator.source.path} does not exist.", "Give FILE.py:FUNCTION.")
     if not integrator.is_known or (integrator.own and isinstance(integrator.function, str)):
         integrator.load()
 

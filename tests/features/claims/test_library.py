@@ -152,7 +152,7 @@ def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: p
         ({"source": {"authors": ["x"], "year": 1788, "title": " "}}, "title"),
         ({"tags": "one"}, "tags"),
         ({"name": "both"}, "name and id"),
-        ({"entry": {}}, "entry is no key"),
+        ({"entry": {}}, "a claim has no key entry"),
     ],
 )
 def test_what_is_no_entry_is_named(change: dict[str, Any], cause: str) -> None:

@@ -158,7 +158,7 @@ def _known_events(
         raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     if not function.rational:
         raise InputError(
-            f"The function {quoted(function.name)} is no rational function of Ω and γ, so nothing is proven of it.",
+            f"For a proof the function must be rational in Ω and γ; got {quoted(function.name)}.",
             "Write it with +, -, * and / alone, or leave digits out: then it is sampled.",
         )
     resolved = _resolved(top, start, until, digits, system)
@@ -261,5 +261,7 @@ def require_direction(value: int) -> int:
     """1, -1 or 0; raises InputError for any other."""
     found = as_integer(value, "direction")
     if found not in (-1, 0, 1):
-        raise InputError(f"direction = {quoted(found)} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")
+        raise InputError(
+            f"direction must be a sign; got {quoted(found)}.", "Give 1 (rising), -1 (falling) or 0 (both)."
+        )
     return found

@@ -143,7 +143,7 @@ def _relative(value: Array, true: Array) -> float:
 
 
 def _lagrange(nodes: Array, u: float) -> Array:
-    """Of the inner intervals, by the two samples on either side."""
+    """Interpolation on inner intervals by the two samples on either side."""
     w, x, y, z = (nodes[:, k : nodes.shape[1] - 3 + k] for k in range(4))
     weights = (-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2, -(u + 1) * u * (u - 2) / 2)
     return weights[0] * w + weights[1] * x + weights[2] * y + (u + 1) * u * (u - 1) / 6 * z

@@ -73,7 +73,7 @@ class DigitsEnd(Tabular):
         return {"precision": self.precision, "of_digits": round(self.of_digits, 2)} | ends
 
     def sentences(self) -> list[str]:
-        """What it says of the first digit and of the last."""
+        """Sentences on the times at which the first and the last digit end."""
         found = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:

@@ -48,7 +48,7 @@ class PlantedFault:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Power(Tabular):
-    """What a test detects.
+    """The faults that a test detects.
 
     times: of its samples.  tolerance: of it.  error: the largest of a right run; passes: whether that is within it.
     faults: planted, a :class:`PlantedFault` each.  left_out: why a fault is not planted, by its name.

@@ -134,7 +134,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
         place = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
         if not os.path.isfile(place):
-            raise PeerFailed(f"{self.name}: there is no program {said(program)}")
+            raise PeerFailed(f"{self.name}: the program {said(program)} does not exist")
         if not os.access(place, os.X_OK):
             raise PeerFailed(f"{self.name}: {said(program)} is not executable")
         return [os.path.abspath(place), *rest]
@@ -397,7 +397,7 @@ class Reply:
             self.failure = said(" ".join(words[1:])) or "without a reason"
             return True
         if words[0] != "done":
-            raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which is no line of the protocol")
+            raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which the protocol does not know")
         self._take_counts(words[1:])
         if self.due:
             raise PeerFailed(f"{self.name} said done after {len(self.states)} of {len(self.request.times)} states")

@@ -228,7 +228,7 @@ def of_quaternion(name: str, problem: Problem, state: Sequence[Any]) -> Any:
     """(Ω, γ), or (Ω, γ, ξ) of a problem with ξ, as numbers of the format, from (Ω, w, x, y, z), q of any length."""
     omega, q = state[:3], [exact(value) for value in state[3:]]
     if not any(q):
-        raise PeerFailed(f"{name} returned a quaternion that is 0, which is no attitude")
+        raise PeerFailed(f"{name} returned a quaternion that is zero")
     rows = rotation_of(q)
     vectors = rows[2] if problem.xi is None else (*rows[2], *rows[0])
     return numpy.array([*omega, *(number(value, problem.precision) for value in vectors)])

@@ -227,7 +227,7 @@ def _one_line(text: str) -> str:
 
 
 def _caption(facts: dict[str, str]) -> str:
-    """What a reader of the table alone must know."""
+    """Caption that makes the table readable alone."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
     known = [(key, facts[key]) for key in ("name", *_DATA, *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
@@ -354,7 +354,7 @@ def _at_each_time(table: MotionTable) -> list[RenderableType]:
 
 
 def _undefined(table: MotionTable) -> list[RenderableType]:
-    """What is said where Euler angles are not defined."""
+    """Error text where Euler angles are not defined."""
     places = [
         time
         for time, line in zip(table.times, table.values, strict=True)

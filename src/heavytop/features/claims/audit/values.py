@@ -78,7 +78,7 @@ class PrintedNumber:
         found = _DECIMAL.fullmatch(plain)
         whole, part = (found["whole"], found["part"] or "") if found is not None else ("", "")
         if found is None or not whole + part:
-            raise InputError(f"{what}: {quoted(text)} is no decimal number.", _REMEDY)
+            raise InputError(f"{what} must be a decimal number; got {quoted(text)}.", _REMEDY)
         power = int(found["power"] or 0)
         if len(whole + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
             raise InputError(
@@ -449,7 +449,7 @@ class _KnownNumbers:
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
                 known = ", ".join((*SIZES, *self._integrals))
                 raise InputError(
-                    f"quantity = {figure.quantity[:40]!r} is none of this motion.",
+                    f"quantity must be one of this motion; got {figure.quantity[:40]!r}.",
                     f"Use {known}: the first integrals are those that are constant along it.",
                 )
             turned = figure.quantity in ("quaternion", "omega_space")
