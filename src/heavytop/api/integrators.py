@@ -98,9 +98,9 @@ def new_integrator(
     Raises InputError for an unknown language, method or engine, a folder that holds anything, a workflow that exists,
     and what cannot be written.
     """
-    for name, choices, noun in ((language, LANGUAGES, "program in"), (method, METHODS, "method")):
+    for name, choices, noun in ((language, LANGUAGES, "language"), (method, METHODS, "method")):
         if name not in choices:
-            raise InputError(f"{noun} must be a known one; got {quoted(name)}.", f"Use {', '.join(choices)}.")
+            raise InputError(f"Unknown {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
     if engine and engine not in (known := engines()):
         raise InputError(f"engine must have an adapter; got {quoted(engine)}.", f"Use {', '.join(known)}.")
     workflow = (into or folder) / _WORKFLOW

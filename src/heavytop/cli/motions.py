@@ -84,13 +84,15 @@ BodyFile = Annotated[
 Link = Annotated[str | None, typer.Option(help="Link or body of --file, where it has several.")]
 CaseName = Annotated[str | None, typer.Option("--case", help="A case of `heavytop list` in place of body and start.")]
 Omega = Annotated[str | None, typer.Option(help="Angular velocity x,y,z at t = 0, in body axes.")]
-OmegaSpace = Annotated[str | None, typer.Option(help="The same in space axes, with an attitude.")]
+OmegaSpace = Annotated[str | None, typer.Option(help="Angular velocity at t = 0 in space axes; needs an attitude.")]
 Gamma = Annotated[str | None, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0, body to space.")]
 Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
 AxisAngle = Annotated[str | None, typer.Option(help="Attitude as x,y,z:angle; radians, or 30deg.")]
 Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
-Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
+Times = Annotated[
+    str, typer.Option(help="Times t1,t2,..., each farther from 0 than the last, on one side of it; the first may be 0.")
+]
 Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
 SystemName = Annotated[
     str | None,

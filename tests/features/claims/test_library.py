@@ -165,7 +165,7 @@ def test_names_and_twins_are_checked(folder: Path) -> None:
     with pytest.raises(ht.InputError, match="is the name of"):
         entries.library()
     put(folder, HEAD | CLAIM | {"corrects": "nothing"})
-    with pytest.raises(ht.InputError, match="corrects nothing"):
+    with pytest.raises(ht.InputError, match="must correct an entry that fails; got nothing"):
         entries.library()
 
 

@@ -304,7 +304,7 @@ def test_scales_times_and_digits_far_from_one() -> None:
     [
         ({"value": []}, "length >= 1"),
         ({"value": [one("speed", 1, "1")]}, "quantity must be one of this motion; got 'speed'"),
-        ({"value": [one("kovalevskaya", 1, "1")]}, "none of this motion"),
+        ({"value": [one("kovalevskaya", 1, "1")]}, "one of this motion"),
         ({"value": [one("omega", 4, "1")]}, "no component 4"),
         ({"value": [one("energy", 2, "1")]}, "no component 2"),
         ({"value": [{"quantity": "gamma", "number": "1", "time": "0"}]}, "gamma of a component that is not named"),

@@ -178,7 +178,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"rows": "1,1,0,0,0\nx,1,0,0,0"}, "Line 8, column t: 'x' is not a finite number"),
         ({"rows": "1,1,0,0"}, "Line 7 has 4 columns, not 5"),
         ({"rows": "1,2,0,0,0"}, r"The quaternion of line 7 must have length 1; \|q\|\^2 - 1 = 3"),
-        ({"rows": "1,0,0,0,0"}, "The quaternion of line 7 is 0"),
+        ({"rows": "1,0,0,0,0"}, "The quaternion of line 7 must not be zero"),
         ({"up": "w"}, "up = 'w' is not known"),
         ({"frame": "moon"}, "frame = 'moon' is not known"),
         ({"quaternion_order": "zyxw"}, "quaternion_order = 'zyxw' is not known"),

@@ -18,7 +18,7 @@ from heavytop.measure.derivatives import PARAMETERS, STARTS, Ball, Derivatives
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.precision import REAL_BITS, dot, exact, exact_text
-from heavytop.report.document.document import short
+from heavytop.report.document.document import integral_text, short
 from heavytop.top.attitude import Output, perpendicular, rows_of
 from heavytop.top.equations import NAMES, VARIABLES
 
@@ -308,7 +308,7 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         worst = [
             (quantity.component, metric) for quantity, metric in quantities if quantity and quantity.statistic == "max"
         ]
-        drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
+        drifts = ", ".join(f"{integral_text(name)} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
     if (steady := run.stability) is not None:
         parts += [Text(), Text(f"{steady.text(precision.bits).capitalize()}.")]

@@ -138,7 +138,7 @@ def _repeats(count: int) -> list[str]:
 
 
 def quaternions_of(parameters: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Quaternions of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set gives the same rotation."""
+    """Quaternions of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set is the same rotation."""
     return [None if s is None else _ordered(_of_rodrigues(s), scalar_last) for s in parameters]
 
 
