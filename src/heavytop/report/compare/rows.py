@@ -274,12 +274,14 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     def to_json(self) -> dict[str, Any]:
         """The row of `compare --json`."""
+        versions = {"versions": self.row.versions} if self.row.versions else {}
         return self.row.named | {
             "metric": self.metric,
             "verdict": self.verdict.value,
             "baseline": self.baseline,
             "candidate": self.candidate,
             "reason": self.reason,
+            **versions,
         }
 
 
@@ -315,7 +317,8 @@ class RowComparison:
 
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
-        key = old.identity
+        versions = old.key.subject.version, new.key.subject.version
+        key = old.identity._replace(versions=versions) if all(versions) else old.identity
         if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
             return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
         if (judged := self._outcomes(old, new)) is not None:
