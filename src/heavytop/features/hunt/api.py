@@ -83,9 +83,9 @@ def hunt(
     """
     which, form = named(integrator), arguments.precision(precision)
     other = None if against is None else named(against)
-    for each in (which, other):
-        if each is not None:
-            registry.require(each)
+    for chosen in (which, other):
+        if chosen is not None:
+            registry.require(chosen)
     if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"family must be a known one; got {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")

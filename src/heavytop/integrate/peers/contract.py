@@ -306,17 +306,17 @@ class CheckedPlugin:
             if self.declared.fixed_grid:
                 beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
-        given: list[Any]
+        arguments: list[Any]
         own: dict[str, Any]
         try:
-            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
+            *arguments, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
             seconds = stopwatch()
             try:
-                run = self.call(*given, system=system, **own)
+                run = self.call(*arguments, system=system, **own)
                 spent = seconds()
             finally:
                 changed = [name for name, part in parts.items() if getattr(system, name) is not part]
