@@ -310,14 +310,14 @@ def reference(
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
-    about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
-    arguments.any_times(given)
+    about, instants = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
+    arguments.any_times(instants)
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
     seconds = EFFORT if effort is None else seconds_of(effort, "effort")
     solution = arguments.callback(finder, "finder") or find
-    return proven(body, state, given, as_integer(digits, "digits"), about, solution, told, which, seconds)
+    return proven(body, state, instants, as_integer(digits, "digits"), about, solution, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
