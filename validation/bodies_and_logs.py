@@ -255,6 +255,7 @@ def bodies(seed: int) -> int:
             if name not in names:
                 wrong += 1
                 print(f"{name}, {suffix}: {names}")
+    print(f"bodies: {wrong} of 80 missed")
     return wrong
 
 
