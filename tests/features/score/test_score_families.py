@@ -156,7 +156,7 @@ def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (5, 0.0)])
+@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (2, -1.0), (5, 0.0)])
 def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float) -> None:
     states = RIGHT.copy()
     states[:, column] *= factor
@@ -164,6 +164,7 @@ def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float
     assert told.kind == ("column_scaled" if factor else "column_constant")
     assert told.numbers["column"] == ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")[column]
     assert float(told.numbers.get("factor", 0)) == pytest.approx(factor)
+    assert ("has the other sign in these states" in diagnosis_text(told)) == (factor == -1)
 
 
 @pytest.mark.slow

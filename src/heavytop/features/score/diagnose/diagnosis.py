@@ -183,9 +183,10 @@ def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
     given, error = tried.given, tried.error
     explained = [each for each in tried.hypotheses if each.left * (drop or each.drop) <= error]
     explained = [each for each in explained if each.drop == DROP or not drop]
-    if not explained and error > _WRONG and tried.fitted and not drop:
+    # a sign in the equations of a symmetric body is another top as well
+    if all(each.kind == "top" for each in explained) and error > _WRONG and tried.fitted and not drop:
         others = hypotheses.of_equations(given, tried.truth)
-        explained = [each for each in others if each.left * FITTED_DROP <= error]
+        explained = [each for each in others if each.left * FITTED_DROP <= error] + explained
     if not explained:
         return None
     best = min(max(each.left, FLOOR) for each in explained)

@@ -150,7 +150,7 @@ def scaled(given: Examined, truth: Array) -> Iterator[Hypothesis]:
             continue
         left = _divided(given, truth, columns, fitted)
         factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
-        if factor and factor != -1 and notable(factor, Fraction(1)):
+        if factor and (factor != -1 or true.shape[1] == 1) and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
             numbers["factor"] = decimal_text(factor, 8)
             yield Hypothesis(kind, numbers, _divided(given, truth, columns, float(factor)), FITTED_DROP)
