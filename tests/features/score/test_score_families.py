@@ -228,3 +228,11 @@ def test_units_of_any_size_change_no_diagnosis(power: int) -> None:
     assert (told.kind, told.numbers["state"]) == ("one_state", "7 of 20")
     assert kinds(scored(in_units * (1.02 * OMEGA + GAMMA), times, top, start)) == ["omega_scaled"]
     assert kinds(scored(in_units, times, top, start)) == []
+
+
+def test_decimals_of_small_numbers_are_named_though_the_digits_written_are_as_many() -> None:
+    start = State(("0.05", "-0.035", "0.001"), (0, 0, -1))
+    top, times = HeavyTop(("1.8", "1.2", "1.1"), 1, ("0.2", "0.1", 1)), TIMES[:8]
+    states = np.round(motion(top, start, HEAVY_TOP, times), 4)
+    (told,) = scored(states, times, top, start).diagnoses
+    assert (told.kind, told.numbers) == ("rounded", {"to": "decimals", "digits": "4"})

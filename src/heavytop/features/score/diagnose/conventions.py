@@ -51,6 +51,8 @@ WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""
 _NEIGHBOURS = 60
 """Samples whose attitudes are compared with Ω."""
+_TWO_MISTAKES = 0.05
+"""Relative errors below it are not those of two mistakes of convention at once."""
 _CONTRADICTS = 0.1
 """Ω that is off the rate of the attitude by less, relative to it, may be as right as the method."""
 AS_LIKELY = 3.0
@@ -146,7 +148,7 @@ class Suppositions:
             self.tried = [(each, self._left(each)) for each in _suppositions(self)]
         tried = [(each, each_error) for each, each_error in self.tried if first is None or each.drop == DROP]
         found = self._best(tried, own, looked, drop)
-        if found is None and first is None and not drop and _forms(self.seen) & set(FORMS):
+        if found is None and first is None and not drop and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
             pairs = [(each, self._left(each)) for each in _pairs(self.seen)]
             found = self._best(pairs, own, looked)
         return found

@@ -35,7 +35,7 @@ from heavytop.features.score.diagnose.samples import (
     examined,
     in_units,
 )
-from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, rounding
+from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, roundings
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
@@ -89,16 +89,18 @@ def diagnose(
     step: of the method, where it is known.
     """
 
-    def written_so(least: int) -> Rounding | None:
-        return None if frame else rounding([[value for value in row if value] for row in states], precision, least)
+    def written_so(least: int) -> list[Rounding]:
+        return [] if frame else roundings([[value for value in row if value] for row in states], precision, least)
 
     measured, written = numpy.array(errors, dtype=float), written_so(LEAST)
     if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= WORTH_ASKING:
-        return _rounded(written, relative_error)
+        return rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
         given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
-        if frame is None and _only_rounded(written_so(1), relative_error, None if given is None else given.trusted()):
-            return _rounded(written, relative_error)
+        shown = None if given is None or frame is not None else given.trusted()
+        alone = [each for each in written_so(1) if _only_rounded(each, relative_error, shown)]
+        if alone:
+            return rounded([each for each in alone if each in written], relative_error)
         mistake = _still(given, states, relative_error) or _reset(given) or _off_alone(given, times, measured)
         if mistake is None:
             if seen is None and system in WITH_ATTITUDE:
@@ -136,16 +138,15 @@ def _explanation(given: Examined | None, columns: Suppositions | None, columns_f
     return exact or likely or (None if given is None else _looked_at(given, _integrals_off(given)))
 
 
-def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
+def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
     """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
-    if written is None or error is None or not explains(written, error):
-        return []
-    return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
+    explaining = (each for each in written if error is not None and explains(each, error))
+    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
 
 
-def _only_rounded(written: Rounding | None, error: float | None, given: Examined | None) -> bool:
+def _only_rounded(written: Rounding, error: float | None, given: Examined | None) -> bool:
     """Whether every component that is looked at is the true one, rounded as it is written."""
-    if written is None or (error is not None and error > EXPLAINS * written.error):
+    if error is not None and error > EXPLAINS * written.error:
         return False
     truth = None if given is None or not given.rows else given.supposed(given.times)
     if given is None or truth is None:
