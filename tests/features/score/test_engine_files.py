@@ -49,7 +49,7 @@ def test_another_unit_of_g_is_no_name_for_moments_that_are_off(tmp_path: Path) -
     assert "gravity_unit" not in kinds(scored(engine, log, tmp_path))
 
 
-@pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "tensor about the other point"])
+@pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "free", "tensor about the other point"])
 def test_a_mistake_in_a_file_of_first_order_is_named(mistake: str, tmp_path: Path) -> None:
     named, build = engine_files.MISTAKES[mistake]
     assert set(kinds(scored(*build(COARSE), tmp_path))) & set(named)
