@@ -269,7 +269,7 @@ def measured(planned: PlannedRun) -> FinishedRun:
         with _stopped_by_signals(), Progress(planned.tasks, KINDS, planned.workers) as advance:
             return planned.measure(advance, advance.begin)
     except KeyboardInterrupt as stop:
-        kept = f"finished rows are kept: --out {planned.directory} --resume goes on"
+        kept = f"finished rows are kept: `heavytop run` with the same plan, --out {planned.directory} --resume goes on"
         say(f"interrupted; {kept if (planned.directory / ROWS).exists() else 'no row was finished'}")
         raise typer.Exit(ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED) from None
 

@@ -66,7 +66,13 @@ _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
 _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
 """What stands in the last brackets of a name, or behind its first slash."""
 _A_SECOND = ("/s", "/sec", "/second", "s-1")
-_SECOND = {"ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "μs": Fraction(1, 10**6), "min": Fraction(60)}
+_SECOND = {
+    "ms": Fraction(1, 10**3),
+    "ns": Fraction(1, 10**9),
+    "us": Fraction(1, 10**6),
+    "μs": Fraction(1, 10**6),
+    "min": Fraction(60),
+}
 _RATE = {
     **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
     **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
@@ -562,8 +568,10 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
     return row
 
 
-def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention) -> RawStart:
-    """The start: by its keys, else by the row t = 0.
+def start(
+    document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention, free: bool = False
+) -> RawStart:
+    """The start: by its keys, else by the row t = 0.  free: of a body without weight, Ω alone asks for no attitude.
 
     Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.
     """
@@ -584,6 +592,10 @@ def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said:
         raise InputError(f"{one} and {other} both give the attitude at t = 0.", "Give one of them.")
     if not forms and gamma is None:
         known = next((attitude for attitude in ("quaternion", "matrix", "euler", "gamma") if first.get(attitude)), None)
+        if known is None and free and set(table.values) == {"omega"}:
+            omega, space = _omega(document, first)
+            if not space:
+                return RawStart("quaternion", (Fraction(1), Fraction(0), Fraction(0), Fraction(0)), omega, space)
         if known is None:
             raise InputError(
                 "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
