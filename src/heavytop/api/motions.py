@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack, cast
+from typing import Any, TypeAlias, TypedDict, Unpack, cast
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
@@ -44,10 +45,6 @@ from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
 from heavytop.top.heavy_top import HeavyTop, State, TimeText, check_times
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
 EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]

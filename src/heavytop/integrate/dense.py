@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy
 from flint import fmpq, fmpq_poly, fmpz_poly
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
@@ -30,10 +32,6 @@ from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, decimal_text, exact, number
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
 """Each is looked at, in some 0.1 ms in double: these take hours."""
@@ -48,10 +46,8 @@ def dyadic(value: Any) -> Dyadic:
     return number.numerator, 1 - number.denominator.bit_length()
 
 
-def _of_row(rows: NDArray[np.float64], index: int) -> list[Dyadic]:
+def _of_row(rows: NDArray[numpy.float64], index: int) -> list[Dyadic]:
     """Numbers of a format as m 2^e each."""
-    import numpy
-
     values = rows[index]
 
     if values.dtype == numpy.float64:
@@ -101,8 +97,6 @@ class Piece:
         """(middles, half widths) of intervals that hold the components over the step, but for roundings; or None."""
         if self.doubles is None:
             return None
-        import numpy
-
         sizes = abs(float(self.length)) ** numpy.arange(self.doubles.shape[1])
         sizes[0] = 0.0
         return self.doubles[:, 0].tolist(), (abs(self.doubles) @ sizes).tolist()
@@ -110,12 +104,12 @@ class Piece:
     def _powers_of_length(self, count: int) -> list[Dyadic]:
         """length^n for 0 ≤ n < count, to as many bits as are kept."""
         m, e = dyadic(self.length)
-        found = [(1, 0)]
+        powers = [(1, 0)]
         for _ in range(count - 1):
-            k, f = found[-1][0] * m, found[-1][1] + e
+            k, f = powers[-1][0] * m, powers[-1][1] + e
             excess = max(0, k.bit_length() - self._bits)
-            found.append((k >> excess, f + excess))
-        return found
+            powers.append((k >> excess, f + excess))
+        return powers
 
     def state(self, s: fmpq) -> list[Fraction]:
         """(Ω, γ) at s, exactly as the polynomials give it."""
@@ -137,8 +131,8 @@ def _fixed_point(values: Sequence[Dyadic], bits: int) -> fmpq_poly:
     top = max((m.bit_length() + e for m, e in values if m), default=0)
     shift = bits - top
     integers = [m << (e + shift) if e + shift >= 0 else m >> -(e + shift) for m, e in values]
-    found = fmpq_poly(fmpz_poly(integers))
-    return found / (1 << shift) if shift >= 0 else found * (1 << -shift)
+    polynomial = fmpq_poly(fmpz_poly(integers))
+    return polynomial / (1 << shift) if shift >= 0 else polynomial * (1 << -shift)
 
 
 @dataclass(slots=True)

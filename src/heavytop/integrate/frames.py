@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError
 from heavytop.exact.bodies import resolve
@@ -15,10 +18,6 @@ from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 _SPLIT = 134217729.0
 """2^27 + 1, by which Dekker splits a double."""
@@ -35,10 +34,8 @@ def framed(run: Trajectory, frame: Frame) -> Trajectory:
     return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
 
 
-def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
+def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision) -> Any:
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
-    import numpy
-
     if not len(values):
         return values
     found = numpy.array(values, copy=True)
@@ -57,15 +54,11 @@ def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) ->
 
 def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
     """One state of an observer, as :func:`in_frame`."""
-    import numpy
-
     return in_frame(numpy.array([state]), frame, precision)[0]
 
 
-def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
+def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
     """Each component of the axes given is one of the others, or its negative."""
-    import numpy
-
     columns = []
     for row in frame.axes:
         axis = next(i for i in range(3) if row[i])
@@ -81,10 +74,8 @@ def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> 
     return [number(value, precision) for value in rotated(frame.axes, vector)]
 
 
-def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.float64]:
     """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
-    import numpy
-
     high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
     low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
     found = numpy.empty_like(part)
@@ -100,7 +91,7 @@ def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
     return found
 
 
-def _product(a: NDArray[np.float64], b: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _product(a: NDArray[numpy.float64], b: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
     """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
     product = a * b
     scaled, other = _SPLIT * a, _SPLIT * b

@@ -12,8 +12,6 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -575,6 +573,8 @@ def control_apart(which: str | IntegratorSource) -> str:
     integrator = described(which)
     if isinstance(integrator.source, Command) or integrator.own:
         return control_name(which)
+    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+
     from heavytop.processes import ChildContext
 
     context = ChildContext()

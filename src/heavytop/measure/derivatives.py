@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
+import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.bodies import Resolved, resolve
@@ -19,10 +21,6 @@ from heavytop.precision import exact, shown
 from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 WHICH = ("start", "data", "all")
 STARTS = tuple(f"{name}(0)" for name in NAMES)
@@ -68,10 +66,8 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
     data: list[list[list[Ball]]] | None = None
     lyapunov: list[Ball | None] | None = None
 
-    def numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+    def numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
         """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
-        import numpy
-
         arrays = {
             name: numpy.array([[[float(ball.value) for ball in row] for row in rows] for rows in part])
             for name, part in (("start", self.start), ("data", self.data))
@@ -110,15 +106,15 @@ def known_derivatives(
         )
     known = Validated(resolved.top, resolved.start, system, effort=effort)
     bits = bits_of(digits) + _SPARE_BITS
-    found = derivatives(known, times, bits, which != "start")
+    enclosed = derivatives(known, times, bits, which != "start")
     of_start = of_data = lyapunov = None
     if which != "data":
-        matrices = [in_axes(each.start, resolved) for each in found]
+        matrices = [in_axes(enclosed.start, resolved) for enclosed in enclosed]
         of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
         lyapunov = [None if value is None else Ball(*value_text(value, digits + 1)) for value in exponents]
     if which != "start":
-        matrices = [in_axes(each.data or [], resolved, kept=3) for each in found]
+        matrices = [in_axes(enclosed.data or [], resolved, kept=3) for enclosed in enclosed]
         of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
     return Derivatives(METHOD, of_start, of_data, lyapunov)
 
@@ -137,8 +133,8 @@ def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
 
         def turned(vector: list[Any]) -> list[Any]:
             return [
-                sum((a * x for a, x in zip(row, vector[place : place + 3], strict=True)), arb(0))
-                for place in range(0, len(vector), 3)
+                sum((a * x for a, x in zip(row, vector[begin : begin + 3], strict=True)), arb(0))
+                for begin in range(0, len(vector), 3)
                 for row in axes
             ]
 

@@ -16,17 +16,18 @@ from fractions import Fraction
 from functools import lru_cache
 from operator import itemgetter
 from threading import Lock
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.top.equations import Parameters, System
 
 if TYPE_CHECKING:
-    import numpy
     from gmpy2 import mpq
-    from numpy.typing import NDArray
 
 
-Doubles: TypeAlias = "NDArray[numpy.float64]"
+Doubles = NDArray[numpy.float64]
 _ORDER = 20
 _TOLERANCE = 2.0**-52
 _STEPS = 1000
@@ -118,7 +119,6 @@ def _units(scale: Fraction) -> list[Fraction]:
 
 def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Doubles, Doubles]:
     """L, shape (6, 6), and symmetric B, shape (6, 6, 6), of the field L y + B(y, y) in units of ``scale``."""
-    import numpy
     from gmpy2 import mpq
 
     units = [mpq(unit) for unit in _units(scale)]
@@ -146,8 +146,6 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Double
 
 def _nearest(value: mpq | Fraction) -> numpy.longdouble:
     """The nearest longdouble; raises OverflowError beyond doubles."""
-    import numpy
-
     exactly = Fraction(int(value.numerator), int(value.denominator))
     first = float(exactly)
     return numpy.longdouble(first) + numpy.longdouble(float(exactly - Fraction(first)))
@@ -161,8 +159,6 @@ class _Path:
     """
 
     def __init__(self, linear: Doubles, products: Doubles, start: Doubles) -> None:
-        import numpy
-
         self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
         self._steps = [(0.0, 1.0, 1.0)]
         kind = start.dtype
@@ -176,19 +172,17 @@ class _Path:
         with self._lock:
             while not self._ended and self._steps[-1][0] < span and len(self._steps) <= steps:
                 self._ended = not self._advance()
-        place = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
-        if place == min(len(self._steps), steps + 1):
-            time, largest, lost = self._steps[place - 1]
+        index = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
+        if index == min(len(self._steps), steps + 1):
+            time, largest, lost = self._steps[index - 1]
             return largest, lost, time
-        (time, *before), (end, *after) = self._steps[max(place - 1, 0)], self._steps[place]
+        (time, *before), (end, *after) = self._steps[max(index - 1, 0)], self._steps[index]
         part = (span - time) / (end - time) if math.isfinite(end) and end > time else 0.0
         largest, lost = (a ** (1 - part) * b**part for a, b in zip(before, after, strict=True))
         return largest, lost, span
 
     def _advance(self) -> bool:
         """One step; whether another may follow: not where Φ is beyond double, time stands still or all is lost."""
-        import numpy
-
         time, largest, lost = self._steps[-1]
         series = _series(self._linear, self._twice, self._state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
@@ -214,8 +208,6 @@ class _Path:
 @lru_cache(maxsize=64)
 def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], forwards: bool, wide: bool) -> _Path:
     """The path of a motion, in longdouble if wide; backwards in time is forwards with the field reversed."""
-    import numpy
-
     scale = rate(system, parameters, start)
     linear, products = _taken_apart(system, parameters, scale if forwards else -scale)
     state = numpy.array([_nearest(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
@@ -230,20 +222,18 @@ def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
 
     linear: L; None where it is 0.  twice: 2 B, shape (36, 6).
     """
-    import numpy
-
     kind = state.dtype
-    found, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
-    found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)
-    columns, shares = found.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
+    series, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
+    series[0, :, 0], series[0, :, 1:] = state, numpy.eye(6)
+    columns, shares = series.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):
-        place = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
-        jacobians[:, place : place + 6] = (twice @ found[n, :, 0]).reshape(6, 6)
-        sums = shares * (jacobians[:, place:] @ columns[: 6 * n + 6])
+        offset = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
+        jacobians[:, offset : offset + 6] = (twice @ series[n, :, 0]).reshape(6, 6)
+        sums = shares * (jacobians[:, offset:] @ columns[: 6 * n + 6])
         if linear is not None:
-            sums += linear @ found[n]
-        numpy.divide(sums, n + 1, out=found[n + 1])
-    return found
+            sums += linear @ series[n]
+        numpy.divide(sums, n + 1, out=series[n + 1])
+    return series
 
 
 def digits_eaten(factor: float) -> float:

@@ -138,10 +138,10 @@ def _motion(motion: AlgebraicMotion) -> OneGapMotion:
 @whole_evaluation
 def _largest(one: list[arb], other: list[arb], bits: int) -> arb:
     with working_precision(bits + 64):
-        found = arb(0)
+        largest = arb(0)
         for a, b in zip(one, other, strict=True):
-            found = found.max(abs(a - b))
-        return found
+            largest = largest.max(abs(a - b))
+        return largest
 
 
 def _signs(squares: tuple[Fraction, Fraction]) -> str:
@@ -162,10 +162,10 @@ def algebraic_motion(
     if curve is None or min(curve.inertia) <= 0 or curve.gamma_square() <= 0:
         raise InputError(f"No top has {name} motion with these numbers.", "Its builder says which are possible.")
     if place is None:
-        found = gaps(curve)
-        if not found:
+        intervals = gaps(curve)
+        if not intervals:
             raise InputError(f"{name} motion of this top is not real.", "Its builder says which are.")
-        (low, high), *_ = found
+        (low, high), *_ = intervals
         unit = Fraction(2) ** (exponent(Fraction(high) - Fraction(low)) - 4)
         place = round(Fraction(low + high) / (2 * unit)) * unit
     return AlgebraicMotion(curve, place, signs, f"algebraic: {name} motion, inversion of an Abel integral")

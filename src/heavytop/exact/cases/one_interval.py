@@ -26,7 +26,7 @@ from typing import Any
 
 from flint import acb, arb, arb_series, fmpq, fmpq_poly
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import NotInClass
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision
 from heavytop.exact.flint.balls import (
@@ -45,7 +45,6 @@ from heavytop.exact.flint.balls import (
 from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -74,14 +73,14 @@ class IntervalCurve:
     ) -> IntervalCurve:
         """The motions with these Q and R; raises NotInClass where an identity fails."""
         a, b, c = (rational(moment) for moment in inertia)
-        speed, place, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
+        speed, shift, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
         turning = factor.derivative()
-        t = (a - b) * factor * place - c * speed * (turning * third + _HALF * factor * third.derivative())
-        u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * place
+        t = (a - b) * factor * shift - c * speed * (turning * third + _HALF * factor * third.derivative())
+        u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * shift
         second_rate = speed * (t.derivative() * second + _HALF * t * second.derivative())
         third_rate = speed * (u.derivative() * third + _HALF * u * third.derivative())
-        s, left = divmod(u * place - second_rate, factor)
-        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * place
+        s, left = divmod(u * shift - second_rate, factor)
+        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * shift
         for defect in defects:
             if defect.degree() >= 0:
                 raise NotInClass(
@@ -101,11 +100,11 @@ class IntervalCurve:
         """
         a, b, c = (rational(moment) for moment in self.inertia)
         s, t, u = self.heights
-        place, factor = _X**self.power, _X ** (self.power // 2)
+        shift, factor = _X**self.power, _X ** (self.power // 2)
         square = rational(self.gamma_square())
-        area = a * place * s + factor * (b * self.second * t + c * self.third * u)
-        numerator = a * place - area * s / square
-        denominator = a * a * place * place + factor * factor * (b * b * self.second + c * c * self.third)
+        area = a * shift * s + factor * (b * self.second * t + c * self.third * u)
+        numerator = a * shift - area * s / square
+        denominator = a * a * shift * shift + factor * factor * (b * b * self.second + c * c * self.third)
         denominator -= area * area / square
         shared = numerator.gcd(denominator)
         return divmod(numerator, shared)[0], divmod(denominator, shared)[0]
@@ -122,8 +121,8 @@ class IntervalCurve:
 
 def value(polynomial: fmpq_poly, x: Fraction) -> Fraction:
     """The polynomial at a rational place."""
-    found = polynomial(rational(x))
-    return Fraction(int(found.p), int(found.q))
+    ball_of_value = polynomial(rational(x))
+    return Fraction(int(ball_of_value.p), int(ball_of_value.q))
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +190,8 @@ class OneGapMotion:
     def azimuth(self) -> Azimuth:
         """That of the level part of M about γ; see :meth:`Curve.turning`."""
         numerator, denominator = self.curve.turning()
-        found: Any = denominator.complex_roots()
-        doubled = [(acb(root), 2 * many) for root, many in found]
+        poles: Any = denominator.complex_roots()
+        doubled = [(acb(root), 2 * many) for root, many in poles]
         lead = ball(self.curve.speed) ** 2 * abs(_lead(self.curve.second) * _lead(self.curve.third))
         roots = Roots.of(lead * _lead(denominator) ** 2, [(root.place, 1) for root in self.others] + doubled)
         low, high = (end.place.real for end in self.stops)
@@ -220,10 +219,10 @@ class OneGapMotion:
     def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
-        found = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
+        roots = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
         for stop, half in zip(self.stops, halves, strict=True):
-            found[stop.of] *= -half if turns % 2 else half
-        return found[0], found[1]
+            roots[stop.of] *= -half if turns % 2 else half
+        return roots[0], roots[1]
 
     def _state(self, phase: Balls, turns: int) -> list[Balls]:
         x = self.gap.position(phase)
@@ -235,10 +234,10 @@ class OneGapMotion:
 
 def horner(polynomial: fmpq_poly, x: Balls) -> Balls:
     """A rational polynomial at a ball or series."""
-    found = x * 0
+    total = x * 0
     for coefficient in reversed(polynomial.coeffs()):
-        found = found * x + arb(coefficient)
-    return found
+        total = total * x + arb(coefficient)
+    return total
 
 
 def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[BallLike]:
@@ -266,8 +265,8 @@ def _lead(polynomial: fmpq_poly) -> arb:
 
 
 def _roots(curve: IntervalCurve) -> list[_End]:
-    found: Any = [part.complex_roots() for part in (curve.second, curve.third)]
-    return [_End(acb(place), which) for which in (0, 1) for place, _ in found[which]]
+    roots: Any = [part.complex_roots() for part in (curve.second, curve.third)]
+    return [_End(acb(root), which) for which in (0, 1) for root, _ in roots[which]]
 
 
 def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
@@ -400,24 +399,3 @@ def _curve(top: HeavyTop, start: State) -> IntervalCurve:
     b, c = top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0]
     b2, b0, c2, c0 = quadratics(Fraction(1), b, c)
     return IntervalCurve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
-
-
-def steklov_motion(
-    first: Fraction, second: Fraction, ratio: Fraction, rate: Fraction, upwards: int = 1, size: Fraction = Fraction(1)
-) -> Steklov:
-    """A top with a Steklov motion, and a start on it with Ω1 = 0 and γ = ±e1, all rational.
-
-    first, second: I1 and I2 over ``size``.  ratio: s = Ω2/Ω3 at the start, I3 = ½ (I1 + s² (I1 − 2 I2)).  rate: Ω3
-    there.  upwards: −1 turns γ and r round.  Raises InputError where a moment would not be positive or two are equal.
-    """
-    a, b = size * first, size * second
-    c = (a + ratio**2 * (a - 2 * b)) / 2
-    if min(a, b, c) <= 0 or 0 in ((a - b) * (a - c) * (b - c), (a - 2 * b) * (a - 2 * c), rate):
-        raise InputError(
-            f"No Steklov top has moments ({shown(a)}, {shown(b)}, {shown(c)}) and rate {shown(rate)}.",
-            "Give three different positive moments, I1 not twice another one, and a rate other than 0.",
-        )
-    _, _, _, c0 = quadratics(a, b, c)
-    height = rate**2 / c0
-    top = HeavyTop((a, b, c), 1, (upwards * height, 0, 0))
-    return Steklov(top, State((0, ratio * rate, rate), (upwards, 0, 0)))

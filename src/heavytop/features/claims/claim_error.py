@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
@@ -25,10 +26,6 @@ from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Array, Precision, Real, decimal_text, exact, number, shown
 from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
 from heavytop.top.equations import GYROSTAT, gyrostat_energy
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MODEL_BITS = 160
 
@@ -125,14 +122,14 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
     form: ``printed`` for (4.2)-(4.6) to the letter, with the positive roots also for t > 0; ``stable`` for the
     hyperbolic forms.
     """
-    given = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
-    i1, i3, c1, t = (exact(value) for value in given)
+    parameters = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
+    i1, i3, c1, t = (exact(value) for value in parameters)
     alpha = number(case.alpha, precision)
     with numpy.errstate(all="ignore"):
         if form == "printed":
-            computed = partial_case(given[0], given[1], given[2], given[3], numpy, "printed")
+            computed = partial_case(parameters[0], parameters[1], parameters[2], parameters[3], numpy, "printed")
         else:
-            computed = stable_case(alpha, given[0], given[1], given[3], numpy)
+            computed = stable_case(alpha, parameters[0], parameters[1], parameters[3], numpy)
     bits = precision.bits + 64
 
     def evaluate(_working: int) -> list[arb]:
@@ -278,12 +275,12 @@ class _Motion:
     def __init__(self, solution: ExactSolution, case: PartialCase) -> None:
         self.field = solution.system.field
         self.state = cache(lambda time: solution.state(time, _BITS))
-        given = solution.system.parameters(solution.top, solution.start)
+        parameters = solution.system.parameters(solution.top, solution.start)
         with working_precision(_BITS):
-            self.parameters = given.mapped(ball)
+            self.parameters = parameters.mapped(ball)
             # ½ I Ω² <= C1 + |P r| along the truth, and along the claim as well, which keeps (1.3)
-            most = 2 * (case.c1 + sum(map(abs, given.moment)))
-            omega = [ball(most / each).sqrt().abs_upper() for each in given.inertia]
+            most = 2 * (case.c1 + sum(map(abs, parameters.moment)))
+            omega = [ball(most / moment).sqrt().abs_upper() for moment in parameters.inertia]
             everywhere = [arb(0, bound) for bound in (*omega, *[arb(1)] * 3)]
             self.fastest = [rate.abs_upper() for rate in self.field(self.parameters, everywhere)]
 
@@ -349,8 +346,8 @@ class Curves:
     """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
 
     times: Array
-    states: NDArray[np.float64]
-    angles: NDArray[np.float64]
+    states: NDArray[numpy.float64]
+    angles: NDArray[numpy.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,7 +356,7 @@ class PaperCurve:
 
     figure: PaperFigure
     times: Array
-    values: NDArray[np.float64]
+    values: NDArray[numpy.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -449,8 +446,8 @@ def _levels(case: PartialCase) -> list[tuple[Array, Array, Array]]:
     state = [m / i for m, i in zip(point(turn, height), moments, strict=True)]
     lines = contour_generator(turn, height, gyrostat_energy(p, state))
     low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
-    found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
-    return [point(*numpy.asarray(line).T) for line in found]
+    line = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
+    return [point(*numpy.asarray(line).T) for line in line]
 
 
 def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
@@ -479,7 +476,7 @@ def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
 
 
-def _continuous(angles: NDArray[np.float64], states: NDArray[np.float64]) -> Any:
+def _continuous(angles: NDArray[numpy.float64], states: NDArray[numpy.float64]) -> Any:
     """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
 
     Whole turns are taken off until φ and ψ lie within a turn of 0 there.

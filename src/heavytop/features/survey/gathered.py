@@ -7,10 +7,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.cases import Case
 from heavytop.features.survey.measured import Chunk
@@ -21,10 +22,6 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
 from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # The file of a survey: one Parquet row group a chunk, one row a motion.
 
@@ -99,7 +96,7 @@ _MOST_BINS = 2000
 _FIRST = ("omega", "gamma", "inertia", "moment", "rotor")
 
 
-def histogram(values: NDArray[np.float64]) -> Histogram | None:
+def histogram(values: NDArray[numpy.float64]) -> Histogram | None:
     """The histogram of the values above 0; None without any."""
     positive = values[values > 0]
     if not len(positive):
@@ -117,7 +114,7 @@ def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def cell_map(
-    x: tuple[str, NDArray[np.float64]], y: tuple[str, NDArray[np.float64]], lost: NDArray[np.float64]
+    x: tuple[str, NDArray[numpy.float64]], y: tuple[str, NDArray[numpy.float64]], lost: NDArray[numpy.float64]
 ) -> CellMap | None:
     """Medians over at most 24 by 24 cells; cells of single values where there are no more of them.  NaN is left out."""
     kept = numpy.isfinite(lost) & numpy.isfinite(x[1]) & numpy.isfinite(y[1])
@@ -135,13 +132,13 @@ def cell_map(
     counts = numpy.bincount(cell, minlength=width * height)
     ends = numpy.cumsum(counts)
     ordered = lost[kept][order]
-    for place in numpy.flatnonzero(counts).tolist():
-        medians[place] = round(float(ordered[ends[place] - 1 - counts[place] // 2]), 3)
+    for index in numpy.flatnonzero(counts).tolist():
+        medians[index] = round(float(ordered[ends[index] - 1 - counts[index] // 2]), 3)
     rows = tuple(tuple(medians[k * width : (k + 1) * width]) for k in range(height))
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
 
-def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _edges(values: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     single = numpy.unique(values)
     if len(single) > _CELLS:
         return numpy.linspace(single[0], single[-1], _CELLS + 1)
@@ -204,7 +201,7 @@ class Gathered:
         self._steps += int(sum(table["steps"].to_pylist()))
         error = table["error_max"].to_numpy()
         error = numpy.where(numpy.isnan(error), 0.0, error)
-        success = numpy.array([each == Outcome.SUCCESS.value for each in outcomes])
+        success = numpy.array([outcome == Outcome.SUCCESS.value for outcome in outcomes])
         places = numpy.lexsort((-error, success))[:MOST_WORST].tolist()
         index, digits = table["index"].to_numpy(), table["digits_right"].to_numpy()
         worst = [_Bad(bool(success[i]), -error[i], int(index[i]), float(digits[i]), outcomes[i]) for i in places]
@@ -223,7 +220,7 @@ class Gathered:
         sorted_values = {column: numpy.sort(numpy.concatenate(values)) for column, values in self._values.items()}
         for column, values in sorted_values.items():
             metrics |= _quantiles(Quantity(*_QUANTITIES[column]), values)
-        histograms = {name: found for name, values in sorted_values.items() if (found := histogram(values))}
+        histograms = {name: bins for name, values in sorted_values.items() if (bins := histogram(values))}
         return msgspec.structs.replace(
             self._row,
             case=name,
@@ -236,7 +233,7 @@ class Gathered:
             data=None,
             request=_request(self._task),
             spread=Spread(histograms, self._cells()),
-            worst=tuple(_worst(self._task, cases[each.motion], each) for each in self._worst),
+            worst=tuple(_worst(self._task, cases[motion.motion], motion) for motion in self._worst),
         )
 
     def _cells(self) -> CellMap | None:
@@ -248,7 +245,7 @@ class Gathered:
         return cell_map(x, y, lost)
 
 
-def _quantiles(quantity: Quantity, values: NDArray[np.float64]) -> dict[Quantity, Metric]:
+def _quantiles(quantity: Quantity, values: NDArray[numpy.float64]) -> dict[Quantity, Metric]:
     """Order statistics of sorted values, with half the width in decades of the 95 % interval of each by its ranks."""
     quantiles: dict[Quantity, Metric] = {}
     n = len(values)
@@ -296,14 +293,14 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
         assert isinstance(task.case, Chunk)
         assert task.case.sweep is not None
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
-        found = sums.setdefault(key, None)
+        entry = sums.setdefault(key, None)
         if not isinstance(row.chunk, bytes):
             lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key, request=_request(task)))
             continue
-        if found is None:
-            found = sums[key] = Gathered(row, task)
-        found.take(row)
-    return [_survey(each, lost.get(key)) for key, each in sums.items()]
+        if entry is None:
+            entry = sums[key] = Gathered(row, task)
+        entry.take(row)
+    return [_survey(entry, lost.get(key)) for key, entry in sums.items()]
 
 
 def _request(task: Task) -> dict[str, str]:

@@ -12,9 +12,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.cases import Case
 from heavytop.errors import Contradiction, PeerFailed
@@ -30,10 +31,6 @@ from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # A chunk of a sweep as arrays: the tops and starts that the sweep's cases have, rounded to the format.
 
@@ -147,7 +144,7 @@ def _integrals(case: Case) -> tuple[Integral, ...]:
     return holding(case.top, case.start, case.system)
 
 
-def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rounded(numbers: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
 
     All of them are below 2^53, so that each quotient is the exact number rounded once.
@@ -157,7 +154,7 @@ def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     return numpy.hstack([thousandths, moment, numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
 
 
-def _problem(numbers: NDArray[np.float64]) -> Problem:
+def _problem(numbers: NDArray[numpy.float64]) -> Problem:
     i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
     given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
     return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)

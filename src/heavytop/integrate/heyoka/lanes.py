@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from threading import Event, Semaphore
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.extras import import_heyoka
 from heavytop.integrate.heyoka.engines import arrays, compiled, not_finite
@@ -23,10 +24,6 @@ from heavytop.integrate.heyoka.motions import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact
 from heavytop.top.equations import System
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # steps between two looks near a sample; a look costs as much as about ten
 _WINDOW = 64
@@ -140,9 +137,9 @@ class _Run(LaneRun):
 class _Ends(NamedTuple):
     """The last step ends of all lanes: states (n, lanes), both words of the times, steps taken."""
 
-    states: NDArray[np.float64]
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
+    states: NDArray[numpy.float64]
+    high: NDArray[numpy.float64]
+    low: NDArray[numpy.float64]
     steps: Any
 
 
@@ -335,8 +332,8 @@ LANES = 8
 
 def states_on_a_grid(
     system: System,
-    parameters: NDArray[np.float64],
-    starts: NDArray[np.float64],
+    parameters: NDArray[numpy.float64],
+    starts: NDArray[numpy.float64],
     times: Sequence[Fraction],
     **options: Any,
 ) -> tuple[Any, Any, Any]:
@@ -360,11 +357,11 @@ def states_on_a_grid(
             engine.set_time(0.0)
             engine.pars[:] = parameters[places].T
             engine.state[:] = starts[places].T
-            found = engine.propagate_grid(grid)
+            grid_run = engine.propagate_grid(grid)
             results = engine.propagate_res
             reached = heyoka.taylor_outcome.time_limit
-            moved = all(each[0] == reached and 2 * each[1] > least for each in results)
-            states[places] = (found[1] if isinstance(found, tuple) else found)[1:].transpose(2, 0, 1)
-            steps[places] = [each[3] for each in results]
+            moved = all(result[0] == reached and 2 * result[1] > least for result in results)
+            states[places] = (grid_run[1] if isinstance(grid_run, tuple) else grid_run)[1:].transpose(2, 0, 1)
+            steps[places] = [result[3] for result in results]
             good[places] = moved and numpy.isfinite(states[places]).all()
     return states, steps, good

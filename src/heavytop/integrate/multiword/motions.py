@@ -9,6 +9,8 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
+import numpy
+
 from heavytop.errors import InputError, OutOfReach
 from heavytop.extras import import_heyoka
 from heavytop.integrate.multiword.engines import choose, compiled
@@ -157,8 +159,6 @@ def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
 
     What is too small for the format becomes 0, as in the format's own arithmetic.
     """
-    import numpy
-
     values = []
     for value in state:
         try:
@@ -206,8 +206,6 @@ def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precisi
 
 def _outside(values: Doubles, least: float, most: float) -> Any:
     """The rows in which some number is neither 0 nor of a size between the two."""
-    import numpy
-
     sizes = abs(values)
     if sizes.min(initial=most) > least and sizes.max(initial=0) < most:
         return numpy.zeros(len(sizes), bool)
@@ -228,8 +226,6 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
     Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
     """
     heyoka = import_heyoka()
-    import numpy
-
     zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
     # a double has 53 bits: of a larger one none is lost behind what the others begin with
     least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
@@ -257,8 +253,6 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     only exact numbers tell.
     """
     heyoka = import_heyoka()
-    import numpy
-
     each = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
         return _reals(each, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
@@ -287,8 +281,6 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
         heyoka = import_heyoka()
 
         return lambda value: heyoka.real(value, precision.bits)
-    import numpy
-
     return numpy.longdouble if precision.family == "extended" else numpy.float64
 
 
@@ -331,8 +323,6 @@ class _Pace(SampledRun):
         """The outcome, how many of many times are reached, and what makes the states there, as from :meth:`reach` and
         :meth:`sample`, in few calls.
         """
-        import numpy
-
         if targets[0] == 0:
             outcome, count, make = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
@@ -360,8 +350,6 @@ class _Pace(SampledRun):
         """How it ended, how many times are reached, by their rows the states that only exact numbers tell, and what
         makes all others: to make reals takes longer than to sample.
         """
-        import numpy
-
         assert isinstance(self.run, Floating)
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
@@ -390,8 +378,6 @@ class _Pace(SampledRun):
         return self.run.status, count, others, make
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
-        import numpy
-
         assert isinstance(self.run, Fixed)
         given, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
         times: Doubles = given.astype(float)
@@ -411,8 +397,6 @@ class _Pace(SampledRun):
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""
-        import numpy
-
         outcome, precision = self.reach(time), self.precision
         if outcome is not Outcome.SUCCESS:
             return outcome, None

@@ -28,11 +28,10 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.guard import Guard, how_it_ended
+from heavytop.guard import Guard, how_it_ended, stopwatch
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
-from heavytop.processes import stopwatch
 from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System

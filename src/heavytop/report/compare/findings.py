@@ -249,7 +249,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
     named = frozenset[Identity]().union(*(each.rows for each in ranked))
     rest = [change for change in changes.rows if change.identity not in named]
-    end = f"{plural(len(rest), 'other row')} changed." if rest else "Nothing else changed."
+    end = f"{plural(len(rest), 'other row')} changed." if rest else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
     return [clip(text, _LONGEST) for text in (*(each.text for each in ranked), *still, end, *beside)]

@@ -28,7 +28,7 @@ NAME = "claim_evaluation"
 _COUNT = "claim_evaluation"
 _WORST, _LOST, _SINCE = "max_finite", "samples_not_finite", "not_finite_from"
 _SECONDS = 0.02
-_SUMMED_UP = ("omega", "theta", "psi")
+_SYMBOLS = {"omega": "Ω", "theta": "θ", "psi": "ψ"}
 
 
 class ClaimEvaluationTable(PlanTable, tag=NAME):
@@ -65,8 +65,8 @@ class ClaimEvaluation(Kind):
     table = ClaimEvaluationTable
     needed = tuple(
         quantity.text
-        for each in _SUMMED_UP
-        for quantity in (Quantity(EVALUATION_ERROR, each, _WORST), Quantity(_COUNT, each, _SINCE))
+        for what in _SYMBOLS
+        for quantity in (Quantity(EVALUATION_ERROR, what, _WORST), Quantity(_COUNT, what, _SINCE))
     )
     may_overflow = True
     place = 90
@@ -83,7 +83,7 @@ class ClaimEvaluation(Kind):
         metrics: dict[Quantity, Metric] = {}
         series: dict[str, Series] = {}
         with working_precision(precision.bits + 64):
-            for name in (each.name for each in fields(errors_of.EvaluationError)):
+            for name in (field.name for field in fields(errors_of.EvaluationError)):
                 values = [getattr(error, name) for error in errors]
                 finite = [value for value in values if value.is_finite()]
                 worst = metric(largest(finite)) if finite else Metric("missing", None)
@@ -112,8 +112,13 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
             if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
                 yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
-            found = sizes(series)
-            if worst is not None and worst.log10 is not None and found and abs(max(found) - worst.log10) > CLOSE:
+            sizes_of_series = sizes(series)
+            if (
+                worst is not None
+                and worst.log10 is not None
+                and sizes_of_series
+                and abs(max(sizes_of_series) - worst.log10) > CLOSE
+            ):
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
@@ -136,16 +141,22 @@ class ClaimEvaluation(Kind):
 
 
 def _cells(row: Row) -> list[Cell]:
-    errors = (row.metric(EVALUATION_ERROR, each, _WORST) for each in _SUMMED_UP)
-    times = (row.metric(_COUNT, each, _SINCE) for each in ("psi", "omega"))
+    errors = (row.metric(EVALUATION_ERROR, quantity, _WORST) for quantity in _SYMBOLS)
+    times = (row.metric(_COUNT, quantity, _SINCE) for quantity in ("psi", "omega"))
     return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
 
 
 def _said(rows: Sequence[Row]) -> str:
-    """``is off by up to 6.7e-8 in Ω, not finite from |t| = 37``."""
-    errors = [row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text] for row in rows]
-    worst = max((error for error in errors if error.log10 is not None), default=None)
-    times = [row.metrics[Quantity(_COUNT, each, _SINCE).text] for row in rows for each in _SUMMED_UP]
-    since = min((time for time in times if time.log10 is not None), default=None)
-    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst.value)} in Ω"
-    return off + (", finite throughout" if since is None else f", not finite from |t| = {short(since.value)}")
+    """``is off by up to 6.7e-8 in Ω (ershkov-partial-6/forward), ψ not finite from |t| = 7.4``."""
+    errors = ((row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text], row.case) for row in rows)
+    times = ((row.metrics[Quantity(_COUNT, name, _SINCE).text], name) for row in rows for name in _SYMBOLS)
+    worst = max(
+        ((metric.log10, metric.value, case) for metric, case in errors if metric.log10 is not None), default=None
+    )
+    since = min(
+        ((metric.log10, metric.value, name) for metric, name in times if metric.log10 is not None), default=None
+    )
+    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst[1])} in Ω ({worst[2]})"
+    if since is None:
+        return f"{off}, finite throughout"
+    return f"{off}, {_SYMBOLS[since[2]]} not finite from |t| = {short(since[1])}"

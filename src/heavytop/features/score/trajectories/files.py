@@ -87,6 +87,7 @@ class TextTable:
                 comment = stripped.lstrip("#%!/ ")
                 if not body and not self._key(comment, known) and _is_header(_cells(comment, None)):
                     header = _cells(comment, None)
+                    header[0] = "%time" if stripped.startswith("%time") else header[0]  # of rostopic, in nanoseconds
             elif stripped:
                 body.append(stripped)
                 self.lines.append(number)
@@ -102,21 +103,21 @@ class TextTable:
         self.notes += notes
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
-        found = observed_columns.header(names, str(self.keys.get("joint", "")))
-        logs.require_understood(found.others, [*found.places])
-        if found.time is not None:
-            self._without_repeats(found.time)
-        units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
+        meaning = observed_columns.header(names, str(self.keys.get("joint", "")))
+        logs.require_understood(names, meaning.others, [*meaning.places])
+        if meaning.time is not None:
+            self._without_repeats(meaning.time)
+        units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
         said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
         self.notes += [f"as the header says, {', '.join(said)}"] if said else []
-        if found.time is not None and (found.units or observed_columns.is_more_than_states(found)):
-            self.header, others = found, list(found.others)
+        if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
+            self.header, others = meaning, list(meaning.others)
         else:
-            places = found.of_state()
+            places = meaning.of_state()
             if missing := [name for name in COLUMNS if name not in places]:
                 raise _no_header(missing)
             self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
-            others = [name for place, name in enumerate(names) if place not in places.values()]
+            others = [name for index, name in enumerate(names) if index not in places.values()]
         self.notes += unread(others, names)
 
     def _key(self, comment: str, known: Sequence[str]) -> bool:
@@ -135,9 +136,9 @@ class TextTable:
         self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
         return True
 
-    def _without_repeats(self, place: int) -> None:
+    def _without_repeats(self, index: int) -> None:
         """Leave out rows that repeat one, and those behind a time that goes back."""
-        times = [time for row in self.cells if (time := logs.number(row[place])) is not None]
+        times = [time for row in self.cells if (time := logs.number(row[index])) is not None]
         if len(times) == len(self.cells):
             kept, notes = logs.without_repeats(times, self.cells, self.lines)
             self.cells, self.lines = [self.cells[i] for i in kept], [self.lines[i] for i in kept]
@@ -149,6 +150,11 @@ class TextTable:
         if width == len(logs.TUM) and logs.is_unit(first[-4:]):
             self.notes.append(f"there is no header; the columns are taken as {' '.join(logs.TUM)}")
             return logs.TUM
+        if width == len(logs.KITTI):
+            raise InputError(
+                "Rows of 12 numbers without times, as KITTI has them: the first three rows of [R p; 0 1].",
+                f"Put the time before each row, and above the first the line t {' '.join(logs.KITTI)}.",
+            )
         if width != len(COLUMNS):
             raise InputError(
                 f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
@@ -194,8 +200,10 @@ def _is_number(text: str) -> bool:
 
 def _is_header(names: list[str]) -> bool:
     """Whether the words of a comment name the columns."""
-    found = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
-    return len(found.of_state()) == len(COLUMNS) or (found.time is not None and not found.others and bool(found.places))
+    header = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
+    return len(header.of_state()) == len(COLUMNS) or (
+        header.time is not None and not header.others and bool(header.places)
+    )
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
@@ -208,7 +216,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
             remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon separates, a comma is the point of a decimal
-        rows.append([each.replace(",", ".") for each in cells] if separator == ";" else cells)
+        rows.append([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
     return rows
 
 
@@ -223,7 +231,7 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
     said += [
         (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
     ]
-    rotors = (each.rotor or (Fraction(0),) * 3 for each in (top, case.top))
+    rotors = (top.rotor or (Fraction(0),) * 3 for top in (top, case.top))
     said += [(f"k{i} of the rotor", new, old) for i, (new, old) in enumerate(zip(*rotors, strict=True), 1)]
     said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
     if at_start is not None:
@@ -304,9 +312,9 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     try:
         document, notes = (_json(text), []) if is_json else _table(text)
         name = "given" if piped else path.stem
-        given = _observed if observed_columns.is_observed(document) else _given
-        found = given(document, name, case, normalize)
-        return replace(found, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
+        reader = _observed if observed_columns.is_observed(document) else _given
+        trajectory = reader(document, name, case, normalize)
+        return replace(trajectory, sha256=hashlib.sha256(content).hexdigest(), notes=(*notes, *trajectory.notes))
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -389,26 +397,30 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     require_states(times, table.places)
     body = _body(document, case)
     table = observed_columns.in_unit_of_body(table, document.get("header"), said, body.centre)
+    notes: tuple[str, ...] = ()
+    if not body.weight and not any(body.centre) and {"position"} < set(table.values):
+        table = replace(table, values={name: rows for name, rows in table.values.items() if name != "position"})
+        notes = ("positions of a free body are left out: they do not follow from its rotation",)
     which = system_of(_system(document, case), body)
     require_system(which)
     if case is not None and isinstance(body, HeavyTop):
         require_case(case, body, case.start, which, None)
-    raw = _raw_start(document, table, not times[0], said, case)
+    raw = _raw_start(document, table, not times[0], said, case, not body.weight)
     precision = _precision(document, table.texts)
-    found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
-    top, start = found.posed.top, found.posed.start
+    quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
+    top, start = quantities.posed.top, quantities.posed.start
     require_physical(top, start)
-    about = _about(document, stem, case, None in rows) | {"observed": found}
+    about = _about(document, stem, case, None in rows) | {"observed": quantities, "notes": notes}
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
 
 
 def _times(document: dict[str, Any]) -> list[Fraction]:
     """The times, exact and in order; raises InputError where there is none but 0."""
     if "lines" in document:
-        given = observed_columns.times(document)
+        texts = observed_columns.times(document)
     else:
-        given = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
-    times = list(check_times(given))
+        texts = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+    times = list(check_times(texts))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     return times
@@ -430,29 +442,34 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 
 def _raw_start(
-    document: dict[str, Any], table: observed_columns.ColumnTable, at_start: bool, said: Any, case: Case | None
+    document: dict[str, Any],
+    table: observed_columns.ColumnTable,
+    at_start: bool,
+    said: Any,
+    case: Case | None,
+    free: bool,
 ) -> RawStart:
     """The start of the file, or of the case where the file says nothing of it."""
     if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
         return RawStart("gamma", case.start.gamma, case.start.omega)
-    return observed_columns.start(document, table, at_start, said)
+    return observed_columns.start(document, table, at_start, said, free)
 
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     """The body of a file of a robot, a body with its mass, or a top by its weight."""
     if "file" in document:
         return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
-    given = [key for key in ("mass", "gravity") if key in document]
-    if not given:
+    keys = [key for key in ("mass", "gravity") if key in document]
+    if not keys:
         return _top(document, case)
     if "weight" in document:
-        raise InputError(f"weight and {given[0]} are both given.", "Give the weight, or mass and gravity.")
+        raise InputError(f"weight and {keys[0]} are both given.", "Give the weight, or mass and gravity.")
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
             raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
-    flat = [each for row in inertia for each in (row if isinstance(row, list) else [row])]
+    flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
     return Body(mass, gravity, centre, flat, {"centre": CENTRE}.get(about, about or None), rotor)
 
@@ -498,8 +515,8 @@ def _row_of_start(document: dict[str, Any]) -> State | None:
     if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
         return None
     values = [written_numbers.component(value) for value in rows[0]]
-    found = [value for value in values if value is not None]
-    return State(found[:3], found[3:]) if len(found) == 6 else None
+    numbers = [value for value in values if value is not None]
+    return State(numbers[:3], numbers[3:]) if len(numbers) == 6 else None
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
