@@ -2,9 +2,9 @@
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
 from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
-line from the program (command_reference.py), of published numbers, engines and reports from `results/`.  Then every link inside
-the site is followed, the reference of Python is searched for names that are no part of the interface, and the words of
-pages, docstrings and messages are looked up among common misspellings.
+line from the program (command_reference.py), of published numbers, engines and reports from `results/`.  Then every
+link inside the site is followed, the reference of Python is searched for names that are no part of the interface, and
+the words of pages, docstrings and messages are looked up among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
