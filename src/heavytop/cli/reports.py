@@ -40,8 +40,8 @@ def compare(
     policy: Annotated[
         Path | None, typer.Option(help="TOML file of what counts as the same: `heavytop docs compare`.")
     ] = None,
-    floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps are all the same: 4.")] = None,
-    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by: 2; of truncation a tenth.")] = None,
+    floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps count as equal (4).")] = None,
+    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by (2; 10 % for truncation).")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,

@@ -22,7 +22,7 @@ from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUT
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
-from heavytop.report.document.document import clip, short
+from heavytop.report.document.document import clip, integral_text, short
 
 MOST, _LONGEST, _CLIPPED = 8, 300, 20
 """Sentences, characters of one, and those that say how long a clipped text is."""
@@ -542,7 +542,7 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
         return clip(name, 60)
     what = _WORDS.get(quantity.name, quantity.name.replace("_", " "))
     component = quantity.component
-    return f"{what} {_COMPONENTS.get(component, component.replace('_', ' '))}".strip()
+    return f"{what} {_COMPONENTS.get(component, integral_text(component))}".strip()
 
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
