@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from support.kills import TINY, kill_and_resume
+from kills import TINY, kill_and_resume
 
 
 @pytest.mark.slow
 def test_kills_change_nothing(tmp_path: Path) -> None:
-    """Two of them; ``python tests/support/kills.py PLAN KILLS`` makes as many as one likes."""
+    """Two of them; ``python validation/kills.py PLAN KILLS`` makes as many as one likes."""
     plan = tmp_path / "kills.toml"
     plan.write_text(TINY)
     runs = kill_and_resume(str(plan), 2)
