@@ -145,12 +145,6 @@ def sign(value: Fraction) -> int:
     return -1 if value < 0 else 1
 
 
-def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
-    """(cos, sin) of the angle with this tangent of its half: a rational point of the circle."""
-    square = Fraction(tangent) ** 2
-    return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
-
-
 def rotate(vector: Sequence[Balls], omega: Sequence[Fraction], time: Balls) -> list[Balls]:
     """The solution of v' = v × Ω for a constant Ω at ``time``, a number or series."""
     if not any(omega):
@@ -389,12 +383,6 @@ def state_and_attitude(
             return solution.method, whole
     enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
     return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
-
-
-def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
-    """How the attitude of ``solution`` is known, and ξ alone of :func:`state_and_attitude`."""
-    method, whole = state_and_attitude(solution, latest, bits)
-    return method, lambda time, bits: whole(time, bits)[6:]
 
 
 # Renaming of the principal axes, once for all cases.
