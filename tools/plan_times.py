@@ -26,8 +26,8 @@ PARTS = {
         "integrate.multiword.lanes:compiled_lanes",
     ),
     "integrating": (
-        "measure.integrator:ChosenIntegrator.propagate",
-        "measure.integrator:ChosenIntegrator.propagate_many",
+        "integrate.registry:Integrator.propagate",
+        "integrate.registry:Integrator.propagate_many",
         "integrate.heyoka.motions:propagate",
     ),
     "truth": (

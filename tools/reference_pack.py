@@ -63,8 +63,7 @@ _CONVENTIONS = {
 
 def motions() -> Iterator[tuple[Case, Fraction]]:
     """The motions of the pack, each with its last time."""
-    for case in named_bodies().values():
-        yield case, Fraction(case.horizon)
+    yield from ((case, Fraction(case.horizon)) for case in named_bodies().values() if case.horizon)
     tensor = [["0.5", "0.1", "-0.05"], ["0.1", "0.7", "0.02"], ["-0.05", "0.02", "0.9"]]
     body = Body(2, "9.81", ("0.1", "-0.2", "0.3"), tensor, PIVOT)
     start = State((1, 2, -3), attitude=Attitude.euler("ZYX", "30deg", "0.2", "1"))

@@ -17,7 +17,7 @@ from heavytop.features.survey import measured as records
 from heavytop.features.survey.measured import chunks, drawn
 from heavytop.harness.sweeps import Random
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.integrate.registry import described
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE
@@ -39,7 +39,7 @@ def main(count: int) -> None:
     for family in FAMILIES:
         sweep = Random(name="s", seed=11, count=count, family=family)
         motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
-        found = records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
+        found = records.measured(motions, described("heyoka"), TIMES, DOUBLE, {})
         runs = propagate_ensemble(motions.problems, TIMES, threads=1)
         apart: dict[str, float] = dict.fromkeys(RECORDED, 0.0)
         steps = skipped = 0

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from importlib import resources
+from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.exact.bodies import resolve
@@ -12,8 +15,7 @@ from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_mot
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
-from heavytop.top.attitude import Attitude
-from heavytop.top.bodies import CENTRE, PIVOT, Body
+from heavytop.top.bodies import PIVOT, Body, motion_of
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
@@ -204,117 +206,26 @@ CASES: dict[str, Case] = {
 }
 
 
-_UPRIGHT = Attitude.quaternion(1, 0, 0, 0)
-_SI = "kg, m, s"
+_FREE = {"mass": 1, "gravity": 0, "centre": (0, 0, 0), "about": PIVOT}
+_UPRIGHT = {"quaternion": (1, 0, 0, 0)}
+"""Data of a named body, and the attitude of its start, where bodies.toml has none."""
 
 
-def _named(name: str, about: str, source: str, units: str, horizon: int, body: Body, start: State) -> Case:
-    found = resolve(body, start)
-    case = Case(name, about, system_of(None, body), found.top, found.start, body=body, given_start=start)
+def _named(name: str, table: dict[str, Any]) -> Case:
+    summary, source, units = (table.pop(key) for key in ("summary", "source", "units"))
+    horizon = table.pop("horizon", 0)
+    body, start = motion_of(_FREE | ({} if {"matrix", "axis_angle"} & set(table) else _UPRIGHT) | table)
+    assert isinstance(body, Body)
+    resolved = resolve(body, start)
+    case = Case(name, summary, system_of(None, body), resolved.top, resolved.start, body=body, given_start=start)
     return replace(case, source=source, units=units, horizon=horizon)
 
 
 @cache
 def named_bodies() -> dict[str, Case]:
-    """The named bodies by name: standard tests of multibody codes and of integrators.
-
-    Their data are those printed or programmed in the source, in its units; nothing is rounded.
-    """
-    disc = Body(15, "9.81", (0, 1, 0), ("0.234375", "0.46875", "0.234375"), CENTRE)
-    spinning = State(("0", "150", "-4.61538"), attitude=_UPRIGHT)
-    found = (
-        _named(
-            "bruels-cardona-arnold",
-            "heavy top of Lie group integrators: a fast disc on a rod of 1 m, horizontal at t = 0",
-            "O. Brüls, A. Cardona, M. Arnold, Lie group generalized-alpha time integration of constrained flexible "
-            "multibody systems, Mechanism and Machine Theory 48 (2012) 121-137; data as in the test of Kynema-FMB",
-            _SI,
-            2,
-            disc,
-            spinning,
-        ),
-        _named(
-            "terze",
-            "the same top, as Exudyn tests it up to t = 0.2 s",
-            "Z. Terze, A. Müller, D. Zlatar, Singularity-free time integration of rotational quaternions using "
-            "non-redundant ordinary differential equations, Multibody System Dynamics 38 (2016) 201-225; data as in "
-            "Exudyn's TestModels/heavyTop.py",
-            _SI,
-            1,
-            disc,
-            spinning,
-        ),
-        _named(
-            "detest-b5",
-            "Euler's equations y' = (y2 y3, -y1 y3, -0.51 y1 y2), y(0) = (0, 1, 1), as a free body: Omega = "
-            "(33/32 y1, 141/160 y2, 5/4 y3)",
-            "T. E. Hull, W. H. Enright, B. M. Fellen, A. E. Sedgwick, Comparing numerical methods for ordinary "
-            "differential equations, SIAM J. Numer. Anal. 9 (1972) 603-637, problem B5",
-            "none",
-            20,
-            Body(1, 0, (0, 0, 0), (1, "25025/21761", "99/463"), PIVOT),
-            State((0, "141/160", "5/4"), attitude=_UPRIGHT),
-        ),
-        _named(
-            "simo-wong",
-            "heavy symmetrical top, tilted by 0.05 rad, spin 50",
-            "J. C. Simo, K. K. Wong, Unconditionally stable algorithms for rigid body dynamics that exactly preserve "
-            "energy and momentum, Int. J. Numer. Meth. Eng. 31 (1991) 19-52; data as restated in Parmes' validation",
-            "none",
-            10,
-            Body(20, 1, (0, 0, 1), (5, 5, 1), PIVOT),
-            State((0, 0, 50), attitude=Attitude.axis_angle((1, 0, 0), "0.05")),
-        ),
-        _named(
-            "hairer-vilmart",
-            "asymmetric body with the potential R33: the driver of DMV10, its external potential switched on",
-            "E. Hairer, G. Vilmart, Preprocessed discrete Moser-Veselov algorithm for the full dynamics of a rigid "
-            "body, J. Phys. A 39 (2006) 13225-13235; data of the driver of their program",
-            "none",
-            10,
-            Body(1, 1, (0, 0, 1), ("0.6", "0.8", 1), PIVOT),
-            State((3, "0.5", "-0.9"), attitude=_UPRIGHT),
-        ),
-        _named(
-            "drake-cylinder",
-            "free axisymmetric cylinder",
-            "Drake, multibody/benchmarks/free_body, after T. R. Kane, P. W. Likins, D. A. Levinson, Spacecraft "
-            "Dynamics, McGraw-Hill (1983), sections 1.13 and 3.1",
-            _SI,
-            10,
-            Body(1, "9.81", (0, 0, 0), ("0.04", "0.04", "0.02"), PIVOT),
-            State((2, 4, 6), attitude=_UPRIGHT),
-        ),
-        _named(
-            "kynema-precession",
-            "free axisymmetric body, regular precession",
-            "Kynema-FMB, tests/regression_tests/regression/test_precession.cpp",
-            "none",
-            5,
-            Body(1, 0, (0, 0, 0), (1, 1, "0.5"), PIVOT),
-            State(("0.5", "0.5", 1), attitude=_UPRIGHT),
-        ),
-        _named(
-            "t-handle",
-            "free T-handle turning about its middle axis (Dzhanibekov's effect); the unit of time is 10/pi s",
-            "V. Danchev, Intermediate_Axis, Code/Parameters_and_Constants.py and Test_Environment.py",
-            "kg, m, 10/pi s",
-            30,
-            Body(1, 0, (0, 0, 0), ("1.9", 2, "2.5"), PIVOT),
-            State((1, 5, 1), attitude=_UPRIGHT),
-        ),
-        _named(
-            "flywheel-gyroscope",
-            "spacecraft with a flywheel along its middle axis (dual spin); the unit of time is 30/pi s, Omega in rpm",
-            "dual_spin.m of a collection of simulations of torque-free bodies: I = diag(350, 300, 400), a wheel of "
-            "10 kg m^2 at 350 rpm, Omega = (61, 1, 1) rpm",
-            "kg, m, 30/pi s",
-            5,
-            Body(1, 0, (0, 0, 0), (350, 300, 400), PIVOT, rotor=(3500, 0, 0)),
-            State((61, 1, 1), attitude=_UPRIGHT),
-        ),
-    )
-    return {case.name: case for case in found}
+    """The named bodies by name, from bodies.toml: standard tests of multibody codes and of integrators."""
+    text = resources.files("heavytop").joinpath("bodies.toml").read_text("utf-8")
+    return {name: _named(name, table) for name, table in tomllib.loads(text).items()}
 
 
 def case(name: str, more: dict[str, Case] | None = None) -> Case:

@@ -37,12 +37,7 @@ def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> R
 
     Only of runs that reached their end, and whose error is known: each mistake is tried with runs of heyoka.
     """
-    if (
-        task.integrator.capabilities.own
-        or run.outcome is not Outcome.SUCCESS
-        or not len(run.states)
-        or scorer.error is None
-    ):
+    if task.integrator.own or run.outcome is not Outcome.SUCCESS or not len(run.states) or scorer.error is None:
         return row
     parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
     error = max((float(part) for part in parts if part.is_finite()), default=0.0)

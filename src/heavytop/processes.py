@@ -15,9 +15,8 @@ from contextlib import contextmanager, suppress
 from multiprocessing import current_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
-from pathlib import Path
 from threading import Lock, Thread
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any, ParamSpec, TypeVar
 from uuid import uuid4
 
@@ -35,30 +34,7 @@ SAFE_PATH = "PYTHONSAFEPATH"
 _POLL = 0.005
 _LAST_SECONDS = 5.0
 """That a process has to end once it has closed its pipe."""
-_LEAST_SHARE = 0.1
-"""Of wall time, which a clock shows at least."""
 _starting = Lock()
-
-
-def stopwatch(process: int | None = None) -> Callable[[], float]:
-    """Starts a clock: the seconds since then, less those that a process, or this thread, was ready to run and had no
-    processor, as far as the system counts them, which Linux does; a tenth remains at least.
-    """
-    file = Path(f"/proc/{process or 'thread-self'}/schedstat")
-
-    def waited() -> float:
-        try:
-            return int(file.read_bytes().split()[1]) / 1e9
-        except (OSError, ValueError, IndexError):
-            return 0.0
-
-    waiting, began = waited(), perf_counter()
-
-    def seconds() -> float:
-        wall = perf_counter() - began
-        return max(wall - max(waited() - waiting, 0.0), _LEAST_SHARE * wall)
-
-    return seconds
 
 
 class _Child(LokyProcess):  # type: ignore[misc]  # loky has no types

@@ -189,6 +189,7 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     name: of the claim or the integrator.  branch, form: of a formula.  tolerance, step: asked of an integrator, "" for
     what it does by itself.  high_accuracy: heyoka's.  bias: of a planted fault.  seed: of random starts.
+    version: of a program, as it says it; rows of two versions are one row in two reports.
     """
 
     what: Literal["claimed", "computed", "given"]
@@ -200,6 +201,7 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     high_accuracy: bool = False
     bias: str = ""
     seed: int = 1
+    version: str = ""
 
     @property
     def variant(self) -> str:
@@ -239,6 +241,12 @@ class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     precision: str = msgspec.field(default_factory=lambda: EXACT)
     direction: Direction = ""
     horizon: str = "0"
+
+    def of_version(self, version: str) -> RowKey:
+        """The key of what that version of its program computes."""
+        if version == self.subject.version:
+            return self
+        return msgspec.structs.replace(self, subject=msgspec.structs.replace(self.subject, version=version))
 
 
 class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -441,7 +449,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     @property
     def identity(self) -> Identity:
         """The identity of the row in another report, and what it is called there."""
-        return Identity(self.key, self.case, self.integrator)
+        return Identity(self.key.of_version(""), self.case, self.integrator)
 
     def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
         """The metric of that quantity, if it is there."""
@@ -449,11 +457,15 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
 
 class Identity(NamedTuple):
-    """A row's key, and the names under which other programs know it."""
+    """A row's key without a version, and the names under which other programs know it.
+
+    versions: of its program in two reports that are compared; empty where neither says one.
+    """
 
     key: RowKey
     case: str
     integrator: str
+    versions: tuple[str, ...] = ()
 
     @property
     def named(self) -> dict[str, str]:
@@ -461,6 +473,11 @@ class Identity(NamedTuple):
         key = self.key
         named = {"measure": key.kind, "case": self.case, "system": key.system, "integrator": self.integrator}
         return named | {"precision": key.precision, "horizon": key.horizon}
+
+    @property
+    def program(self) -> str:
+        """The integrator by name, with its version, or both where they differ."""
+        return f"{self.key.subject.name} {' → '.join(dict.fromkeys(self.versions))}".rstrip()
 
     @property
     def elsewhere(self) -> Identity:

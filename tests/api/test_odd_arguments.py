@@ -114,6 +114,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "attitude": False,
             "derivatives": None,
             "effort": None,
+            "finder": None,
         },
     ),
     "claim_library": (ht.claim_library, {"tag": "delone", "anew": False, "done": None}),
@@ -312,7 +313,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
             continue  # a plan that is there
         if name == "claim_library" and (odd is None or (isinstance(odd, str) and odd == "heavy_top")):
             continue  # most of it: tests/features/claims/test_library.py
-        if argument in ("observer", "reached", "done", "advance") and callable(odd):
+        if argument in ("observer", "reached", "done", "advance", "finder") and callable(odd):
             continue  # what the caller's own function raises is the caller's
         answered(function, arguments | {argument: odd})
 
@@ -327,7 +328,7 @@ def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
     random = Random(7)
     function, arguments = GOOD[name]
     for _ in range(60):
-        names = [each for each in arguments if each not in ("observer", "reached", "done")]
+        names = [each for each in arguments if each not in ("observer", "reached", "done", "finder")]
         changed = {each: random.choice(ODD) for each in random.sample(names, 2)}
         answered(function, arguments | changed)
 

@@ -13,7 +13,7 @@ import heavytop as ht
 from heavytop.features.kinds import KINDS
 from heavytop.harness import rows as suite_rows
 from heavytop.harness.checkpoint import Saved
-from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.integrate.registry import described
 from heavytop.precision import exact
 from heavytop.records import NOT_CARRIED, SCHEMA, Report, Row
 from heavytop.report.compare.noise import Policy
@@ -144,7 +144,7 @@ def test_who_carries_it_is_known_by_what_it_declares(tmp_path: Path) -> None:
     from heavytop.integrate.registry import named
 
     for name, known in carries.items():
-        assert ChosenIntegrator.of(named(name, tmp_path)).carries_attitude == known, name
+        assert described(named(name, tmp_path)).carries_attitude == known, name
     top, start = ht.HeavyTop((1, 2, 2), 1, (1, 0, 0)), ht.State((1, 1, 0), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
     for name in ("six", "nine"):
         run = ht.propagate(top, start, ["1/1024"], integrator=f"{tmp_path}/mine.py:{name}")

@@ -7,8 +7,9 @@ from heavytop.precision import exact
 from heavytop.records import Against, Explained, Law, Row, Subject
 from heavytop.report.compare.findings import MOST
 from heavytop.report.compare.noise import Policy, Timings
+from heavytop.report.render.history import cells
 from support.report_helpers import error
-from support.reports import compare, replace
+from support.reports import compare, history, replace
 from support.small_reports import report, row
 
 DIGITS = "solution_error_relative_max"
@@ -87,6 +88,20 @@ def test_the_order_of_refined_settings_shows_where_it_falls(errors: tuple[str, .
     assert first.startswith(said)
     assert first.endswith("(mine:rk5, double).")
     assert found(healthy, healthy)[0].startswith("Nothing changed")
+
+
+def test_rows_of_two_versions_are_one_row_and_both_versions_are_said() -> None:
+    plain = {"3.3": [work(10, "1e-4"), work(100, "1e-8")], "4.0": [work(10, "1e-4"), work(100, "1e-6")]}
+    old, new = ([replace(row, key=row.key.of_version(v)) for row in rows] for v, rows in plain.items())
+    assert "(mine:rk5 3.3 → 4.0, double)" in found(old, new)[0]
+    assert "on euler at T = 100 (mine:rk5 3.3 → 4.0, step 1/100, double)" in found(old, new)[1]
+    assert found(old, plain["4.0"]) == found(plain["3.3"], plain["4.0"])
+    over = history([report(*old), report(*new)], Policy())
+    assert {track.row.versions for track in over} == {("3.3", "4.0")}
+    assert len(over) == len(old)
+    assert "mine:rk5 double 3.3 → 4.0" in cells(over[0])[0]
+    findings = compare(report(*old), report(*new), Policy()).to_json()["rows"]
+    assert {each["versions"] for each in findings} == {("3.3", "4.0")}
 
 
 def test_other_steps_at_the_same_setting_are_said() -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack, cast
+from typing import Any, TypeAlias, TypedDict, Unpack, cast
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop import arguments
 from heavytop.arguments import Number, Numbers
@@ -18,12 +19,12 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import EFFORT
 from heavytop.integrate import registry
 from heavytop.integrate.dense import Dense, DenseOutput, dense
+from heavytop.integrate.frames import Setup
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
-from heavytop.integrate.registry import Setup, described, named, require_reach, seconds_of
+from heavytop.integrate.registry import described, named, require_reach, seconds_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.derivatives import which_derivatives
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.motion import Motion, compute
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
@@ -44,10 +45,6 @@ from heavytop.top.attitude import Output
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, NAMES, System, square_of_rate
 from heavytop.top.heavy_top import HeavyTop, State, TimeText, check_times
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
 EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
@@ -164,7 +161,7 @@ def _prepared(
     wanted = arguments.flag(attitude, "attitude")
     which = named(integrator)
     if wanted is None:
-        wanted = state.attitude is not None and ChosenIntegrator.of(which).carries_attitude
+        wanted = state.attitude is not None and described(which).carries_attitude
     beside = xi is None and wanted
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))
@@ -285,6 +282,7 @@ def reference(
     attitude: bool | None = None,
     derivatives: str | None = None,
     effort: Number | None = None,
+    finder: Finder | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -299,6 +297,7 @@ def reference(
         derivatives: "start" for ∂(Ω, γ)(t)/∂(Ω0, γ0) as well, γ0 as three independent variables; "data" for
             ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r; "all" for both.
         effort: seconds that an enclosure may take, by a model of its cost and no clock; 900 where None.
+        finder: in place of the catalogue's, so that progress may be watched: (top, start, system, effort) -> solution.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
@@ -310,24 +309,6 @@ def reference(
         InputError: for what is no motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
-    return watched_reference(
-        top, start, times, digits, find, system=system, attitude=attitude, derivatives=derivatives, effort=effort
-    )
-
-
-def watched_reference(
-    top: HeavyTop | Body,
-    start: State,
-    times: Numbers,
-    digits: int,
-    finder: Finder,
-    *,
-    system: System | str | None = None,
-    attitude: bool | None = None,
-    derivatives: str | None = None,
-    effort: Number | None = None,
-) -> Reference:
-    """:func:`reference` with the exact solution of ``finder``, whose progress may be watched."""
     body, state = arguments.motion(top, start, of_any_size=True)
     about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
     arguments.any_times(given)
@@ -335,7 +316,8 @@ def watched_reference(
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
     seconds = EFFORT if effort is None else seconds_of(effort, "effort")
-    return proven(body, state, given, as_integer(digits, "digits"), about, finder, told, which, seconds)
+    solution = arguments.callback(finder, "finder") or find
+    return proven(body, state, given, as_integer(digits, "digits"), about, solution, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from msgspec.structs import replace
 
 from heavytop import arguments
 from heavytop.display import printable
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
 from heavytop.harness import checkpoint
@@ -88,7 +89,14 @@ class PlannedRun:
         progress, begun: hear of each task that is finished, and that begins.
         Raises InputError where the folder is not fit or cannot be written; what is finished is kept for --resume.
         """
-        report = Report(SCHEMA, self.identity, environment() | _integrators(self.tasks), [])
+        greetings = _greetings(self.tasks)
+        said = {"integrators": {name: text for name, (text, _) in greetings.items()}} if greetings else {}
+        report = Report(SCHEMA, self.identity, environment() | said, [])
+        tasks = [_of_version(task, greetings) for task in self.tasks] if greetings else self.tasks
+        return dataclasses.replace(self, tasks=tasks)._measure(report, progress, begun)
+
+    def _measure(self, report: Report, progress: Progress, begun: Progress) -> FinishedRun:
+        """Measure, with the versions of programs in the keys."""
         fit = partial(require_fit, self.directory, self.resume)
         try:
             with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
@@ -188,11 +196,25 @@ def prepare(
     return run
 
 
-def _integrators(tasks: Sequence[Task]) -> dict[str, dict[str, str]]:
-    """The entry of the environment block for the programs that integrate: what each says of itself."""
+def _greetings(tasks: Sequence[Task]) -> dict[str, tuple[str, str]]:
+    """By the name of each program that integrates what it says of itself, and its version in that."""
     sources = {task.source for task in tasks if task.source is not None} if len(tasks) <= MOST_ON_A_PAGE else set()
-    said = {each.name: greeting(each) for each in sources if isinstance(each, Command)}
-    return {"integrators": dict(sorted(said.items()))} if said else {}
+    programs = sorted((each for each in sources if isinstance(each, Command)), key=lambda each: each.name)
+    return {each.name: _greeting(each) for each in programs}
+
+
+def _greeting(command: Command) -> tuple[str, str]:
+    try:
+        said = greeting(command)
+    except PeerFailed as error:
+        return f"not started: {error.cause}", ""
+    return said, said.partition(" ")[2]
+
+
+def _of_version(task: Task, greetings: dict[str, tuple[str, str]]) -> Task:
+    """The task with the version of its program in the key of its row."""
+    _, version = greetings.get(task.key.subject.name, ("", ""))
+    return dataclasses.replace(task, key=task.key.of_version(version))
 
 
 def is_written(name: str) -> bool:

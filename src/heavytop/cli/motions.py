@@ -309,14 +309,13 @@ def reference(
     up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
     with M = IΩ; γ points up.
     """
-    from heavytop.api.motions import watched_reference
+    from heavytop.api.motions import reference as proven
     from heavytop.report.render.motion import of_reference, reference_text
 
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        where = asked.top, asked.start, asked.times, digits, watch.find
         options = {"system": asked.system, "attitude": told, "derivatives": derivatives, "effort": effort}
-        found = watched_reference(*where, **options)
+        found = proven(asked.top, asked.start, asked.times, digits, finder=watch.find, **options)
         found.require_outputs(asked.outputs)
 
     beside = asked.beside(_REFERENCE_SECONDS, digits=digits)

@@ -22,9 +22,8 @@ from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import Command, ProgramRequest, Session, begin_row, close_all, session
 from heavytop.integrate.peers.contract import Declared, said
-from heavytop.integrate.registry import IntegratorSource
+from heavytop.integrate.registry import IntegratorSource, described
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, Precision, Vector, decimal_text, exact, parse, real, round_to, rounded, vector
 from heavytop.processes import GuardedProcess
 from heavytop.top.attitude import perpendicular
@@ -174,7 +173,7 @@ class _Contract:
     @cached_property
     def declared(self) -> Declared:
         """Its declaration; asked for where it runs, as that imports it."""
-        return ChosenIntegrator.of(self.which).declared
+        return described(self.which).declared
 
     @cached_property
     def axis(self) -> Vector:
@@ -383,7 +382,7 @@ class _Contract:
         )
 
     def _attitude(self) -> str:
-        if not ChosenIntegrator.of(self.which).carries_attitude:
+        if not described(self.which).carries_attitude:
             return (
                 "It carries Ω and γ alone: it does not declare that it carries the attitude, and is not asked for it."
             )

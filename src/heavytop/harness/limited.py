@@ -20,11 +20,12 @@ from itertools import islice, product
 from typing import Any
 
 from heavytop.errors import HeavyTopError, NotAsked, OutOfTime
+from heavytop.guard import stopwatch
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.rows import Kinds, MeasuredKind, Task, begin_worker, died, ended_its_process, failed, measure
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import said
-from heavytop.processes import GuardedProcess, stopwatch
+from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME, Row
 
 _BASE = 30.0

@@ -28,10 +28,10 @@ from heavytop.exact.bodies import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
-from heavytop.integrate.registry import IntegratorSource, is_third_party, name_of, require_reach
+from heavytop.integrate.registry import Integrator, IntegratorSource, described, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import AttitudeScorer
-from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.truth import seconds_a_step as words_seconds
@@ -115,11 +115,11 @@ class Task:
         return self.key.precision != EXACT
 
     @property
-    def integrator(self) -> ChosenIntegrator:
+    def integrator(self) -> Integrator:
         """The integrator that computes the motion."""
         step = self.key.subject.step
         control = ("step", exact(step)) if step not in ("", FINEST) else None
-        return ChosenIntegrator(self.key.subject.name, control, self.source)
+        return described(self.source or self.key.subject.name, control)
 
     @property
     def is_third_party(self) -> bool:

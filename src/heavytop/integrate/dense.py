@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy
 from flint import fmpq, fmpq_poly, fmpz_poly
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, Unsupported
 from heavytop.integrate.heyoka.engines import compiled as compile_heyoka
@@ -30,10 +32,6 @@ from heavytop.multiword.double_double.double_double_run import Floating
 from heavytop.multiword.problem import ResumableRun, Scaled, Status
 from heavytop.precision import DOUBLE, decimal_text, exact, number
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 _SPARE_BITS = 64
 MOST_STEPS = 10**8
 """Each is looked at, in some 0.1 ms in double: these take hours."""
@@ -48,10 +46,8 @@ def dyadic(value: Any) -> Dyadic:
     return number.numerator, 1 - number.denominator.bit_length()
 
 
-def _of_row(rows: NDArray[np.float64], index: int) -> list[Dyadic]:
+def _of_row(rows: NDArray[numpy.float64], index: int) -> list[Dyadic]:
     """Numbers of a format as m 2^e each."""
-    import numpy
-
     values = rows[index]
 
     if values.dtype == numpy.float64:
@@ -101,8 +97,6 @@ class Piece:
         """(middles, half widths) of intervals that hold the components over the step, but for roundings; or None."""
         if self.doubles is None:
             return None
-        import numpy
-
         sizes = abs(float(self.length)) ** numpy.arange(self.doubles.shape[1])
         sizes[0] = 0.0
         return self.doubles[:, 0].tolist(), (abs(self.doubles) @ sizes).tolist()

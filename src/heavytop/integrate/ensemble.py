@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from fractions import Fraction
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -17,19 +16,16 @@ from heavytop.guard import processors
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.lanes import Lanes, Work
 from heavytop.integrate.heyoka.motions import integrate_to_samples
-from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.integrate.trajectory import EnsembleObserver, Finished, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact, number
 from heavytop.top.heavy_top import check_times
-
-Observer = Callable[[int, Fraction, Any], None]
-Finished = Callable[[int, Trajectory], None]
 
 
 def propagate_ensemble(
     problems: Sequence[Problem],
     times: Sequence[OrderedRing],
     *,
-    observer: Observer | None = None,
+    observer: EnsembleObserver | None = None,
     finished: Finished | None = None,
     threads: int | None = None,
     lanes: int = 8,
@@ -72,7 +68,7 @@ def propagate_ensemble(
 
 
 def in_threads(
-    run: Callable[[], None], work: Work, threads: int, observer: Observer | None, finished: Finished | None
+    run: Callable[[], None], work: Work, threads: int, observer: EnsembleObserver | None, finished: Finished | None
 ) -> list[Trajectory]:
     """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``, or by this one.
 

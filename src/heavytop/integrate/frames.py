@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError
-from heavytop.integrate.trajectory import Trajectory
-from heavytop.precision import DOUBLE, Precision, exact, number
-from heavytop.top.attitude import rotated
-from heavytop.top.bodies import Frame
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from heavytop.exact.bodies import resolve
+from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.precision import DOUBLE, Precision, Vector, exact, number
+from heavytop.top.attitude import perpendicular, rotated, transposed
+from heavytop.top.bodies import Body, Frame
+from heavytop.top.equations import GYROSTAT, System
+from heavytop.top.heavy_top import HeavyTop, State
 
 _SPLIT = 134217729.0
 """2^27 + 1, by which Dekker splits a double."""
@@ -32,10 +34,8 @@ def framed(run: Trajectory, frame: Frame) -> Trajectory:
     return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
 
 
-def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) -> Any:
+def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision) -> Any:
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
-    import numpy
-
     if not len(values):
         return values
     found = numpy.array(values, copy=True)
@@ -54,15 +54,11 @@ def in_frame(values: NDArray[np.float64], frame: Frame, precision: Precision) ->
 
 def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
     """One state of an observer, as :func:`in_frame`."""
-    import numpy
-
     return in_frame(numpy.array([state]), frame, precision)[0]
 
 
-def _permuted(part: NDArray[np.float64], frame: Frame) -> Any:
+def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
     """Each component of the axes given is one of the others, or its negative."""
-    import numpy
-
     columns = []
     for row in frame.axes:
         axis = next(i for i in range(3) if row[i])
@@ -78,10 +74,8 @@ def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> 
     return [number(value, precision) for value in rotated(frame.axes, vector)]
 
 
-def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.float64]:
     """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
-    import numpy
-
     high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
     low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
     found = numpy.empty_like(part)
@@ -97,10 +91,88 @@ def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
     return found
 
 
-def _product(a: NDArray[np.float64], b: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _product(a: NDArray[numpy.float64], b: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
     """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
     product = a * b
     scaled, other = _SPLIT * a, _SPLIT * b
     a_high, b_high = scaled - (scaled - a), other - (other - b)
     a_low, b_low = a - a_high, b - b_high
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+# A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
+
+
+_SPARE_BITS = 160
+"""Irrational data of a run are rounded to so many bits more than its format has, of what it is told itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """A motion in principal axes.
+
+    top, start: exact, of irrational data to many bits more than the format has.
+    carried: ξ at t = 0, where the data say it.
+    frame: the axes given; None where they are the principal ones.
+    """
+
+    top: HeavyTop
+    start: State
+    carried: Vector | None
+    system: System
+    precision: Precision
+    frame: Frame | None
+
+    @property
+    def xi(self) -> Vector:
+        """ξ at t = 0: of the attitude, else :func:`heavytop.top.attitude.perpendicular` of γ."""
+        return perpendicular(self.start.gamma) if self.carried is None else self.carried
+
+    @classmethod
+    def of(cls, body: HeavyTop | Body, start: State, precision: Precision, system: System) -> Setup:
+        """The motion of a body from ``start``."""
+        if isinstance(body, HeavyTop) and start.attitude is None:
+            return cls(body, start, None, system, precision, None)
+        found = resolve(body, start, precision.bits + _SPARE_BITS)
+        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
+        if not found.is_rotated:
+            return cls(found.top, found.start, xi, system, precision, None)
+        if system is GYROSTAT:
+            raise InputError(
+                "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
+                "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
+            )
+        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
+        return cls(found.top, found.start, xi, system, precision, frame)
+
+    def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
+        """A vector of the axes given, in principal axes."""
+        if vector is None or self.frame is None:
+            return vector
+        return rotated(transposed(self.frame.axes), vector)
+
+    @property
+    def problem(self) -> Problem:
+        """The problem, as ensembles take it."""
+        return Problem.of(self.top, self.start, self.precision, self.system)
+
+    def in_body_axes(self, state: Any) -> Any:
+        """A state of an observer in the axes given."""
+        return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
+
+    def exactly_in_body_axes(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
+        """Vectors in principal axes, in the axes given, in exact rationals."""
+        if self.frame is None:
+            return state
+        axes = self.frame.axes
+        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
+
+    def watched(self, observer: Callable[[Fraction, Any], object] | None) -> Callable[[Fraction, Any], object] | None:
+        """An observer that is given the states in the axes given."""
+        if observer is None or self.frame is None or not callable(observer):
+            return observer
+        return lambda time, state: observer(time, self.in_body_axes(state))
+
+    def given(self, run: Trajectory) -> Trajectory:
+        """The run in the axes given."""
+        return run if self.frame is None else framed(run, self.frame)

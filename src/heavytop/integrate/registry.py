@@ -12,9 +12,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
@@ -25,20 +23,17 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, invalid, quoted
-from heavytop.exact.bodies import resolve
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted
 from heavytop.extras import extra_of, missing
-from heavytop.integrate.frames import framed, one_in_frame
 from heavytop.integrate.peers.command import Command, CommandIntegrator
-from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, said
+from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
 from heavytop.integrate.peers.source import PythonFile, PythonObject, place_of
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import EnsembleObserver, Finished, Observer, Outcome, Problem, Trajectory
 from heavytop.precision import (
     DOUBLE,
     FORMATS,
     OrderedRing,
     Precision,
-    Vector,
     cache_last_call,
     decimal_text,
     exact,
@@ -46,8 +41,6 @@ from heavytop.precision import (
     parse,
 )
 from heavytop.records import INTEGRATORS as FORMER
-from heavytop.top.attitude import perpendicular, rotated, transposed
-from heavytop.top.bodies import Body, Frame
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
 from heavytop.top.heavy_top import DoubleTimes, HeavyTop, State
 
@@ -67,6 +60,8 @@ _MOST_SECONDS = 10**7
 _EVERY = (*(form.name for form in FORMATS), "real")
 _SYSTEMS = tuple(system.name for system in SYSTEMS)
 _HERE = "heavytop.integrate"
+_AGAIN_SECONDS = 1.0
+"""A longer call of an integrator of another package is made once."""
 
 
 class IntegratorSource(Protocol):
@@ -84,9 +79,9 @@ class IntegratorSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
-    """An integrator and its capabilities; places are ``module:name``, or the functions themselves.
+    """An integrator, its capabilities, and how it is run; functions are ``module:name``, or themselves.
 
-    propagate: called as :func:`heavytop.integrate.heyoka.motions.propagate`, or as a peer
+    function: called as :func:`heavytop.integrate.heyoka.motions.propagate`, or as a peer
     (:mod:`heavytop.integrate.peers`).
     formats, systems: their names; None where nothing is declared.
     control: the option that sets its error, "tolerance" or "step"; "" where only its signature says.
@@ -96,10 +91,12 @@ class Integrator:
     streams: whether it calls an observer at each sample, takes a step limit and resumes.
     needs: modules of extras.
     own: whether it is this program's, and so believed.
+    source: where it is defined, if it is neither built in nor a package's.
+    set_to: ("tolerance", 1e-9) or ("step", 1/50); None for what it does by itself.
     """
 
     name: str
-    propagate: str | Callable[..., Any]
+    function: str | Callable[..., Any] = ""
     formats: tuple[str, ...] | None = ("double",)
     systems: tuple[str, ...] | None = _SYSTEMS
     control: str = "tolerance"
@@ -109,6 +106,13 @@ class Integrator:
     streams: bool = False
     needs: tuple[str, ...] = ()
     own: bool = True
+    source: IntegratorSource | None = None
+    set_to: tuple[str, Fraction] | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it is found, by its source or by its name."""
+        return self.source is not None or bool(self.function) or self.name in known()
 
     @property
     def lacks(self) -> str:
@@ -121,9 +125,43 @@ class Integrator:
         missing = [name for name in _EVERY if name not in (self.formats or ())]
         return "" if len(missing) > 1 else "every format" + (f" but {missing[0]}" if missing else "")
 
-    def load(self) -> Callable[..., Any]:
-        """The function that propagates, imported."""
-        return load(self.propagate)  # type: ignore[no-any-return]
+    def load(self) -> Peer:
+        """The function that propagates, imported; raises InputError for an unknown one and for one that cannot be."""
+        if self.source is not None:
+            return self.source.load()
+        if callable(self.function):
+            return self.function
+        entry = self if self.function else self._of_package()
+        if entry.lacks:
+            raise missing(extra_of(entry.lacks), f"The integrator {self.name}")
+        try:
+            with quiet():
+                found = load(entry.function)
+        except ImportError as error:
+            cause = f"is not available: {said(error)}."
+            raise InputError(f"The integrator {self.name} {cause}", entry.remedy) from error
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever another package's module does when it is imported
+            why = f"{type(error).__name__}: {said(error)}"
+            raise InputError(f"The integrator {self.name} is broken: {why}.", entry.remedy) from error
+        if not callable(found):
+            cause = f"is broken: {entry.function} is not callable."
+            raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
+        return found  # type: ignore[no-any-return]
+
+    def _of_package(self) -> Integrator:
+        """The entry of another package's; raises InputError where there is none."""
+        if self.name not in known():
+            _of_packages.cache_clear()  # it may have been installed since
+        if self.name not in known():
+            raise InputError(f"Unknown integrator {quoted(self.name)}.", f"Known: {', '.join(known())}. {_YOURS}")
+        return known()[self.name]
+
+    @property
+    def remedy(self) -> str:
+        """What to do where it cannot be imported."""
+        return "" if self.own else f"It comes from {self.function}: repair or remove that package."
 
     def capabilities(self) -> dict[str, Any]:
         """As `list --json` shows them; None for what is not declared."""
@@ -136,10 +174,130 @@ class Integrator:
             "attitude": self.attitude,
         }
 
+    @property
+    def carries_attitude(self) -> bool:
+        """Whether it declares that ξ rides along; not one that cannot be used."""
+        if isinstance(self.source, Command):
+            return bool(self.source.attitude)
+        if self.own:
+            return self.attitude
+        try:
+            peer: Any = ready(self)
+        except (InputError, PeerFailed):
+            return False
+        return bool(peer.carries_attitude)
 
-def foreign(name: str, place: str | Callable[..., Any] = "") -> Integrator:
+    @property
+    def declared(self) -> Declared:
+        """Its declaration; an empty one where it cannot be used."""
+        if isinstance(self.source, Command):
+            return self.source.declared
+        try:
+            return getattr(ready(self), "declared", None) or Declared()
+        except (InputError, PeerFailed):
+            return Declared()
+
+    @property
+    def one_step(self) -> bool:
+        """Whether a step depends on the state where it begins alone: unless it declares that it has a memory."""
+        return self.own or self.declared.one_step
+
+    def propagate(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[OrderedRing],
+        precision: Precision,
+        system: System,
+        observer: Observer | None = None,
+        *,
+        xi: Sequence[Fraction] | None = None,
+        again: bool = True,
+        **resume: Any,
+    ) -> Trajectory:
+        """The motion of an exact top and start; every state goes to ``observer``, where there is one.
+
+        xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
+        package is made twice, to see whether it is the same.  resume: place and mark as in
+        :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
+
+        Raises PeerFailed for whatever a third-party integrator does wrong.
+        """
+        if self.streams and self.set_to:
+            raise Unsupported(f"{self.name} has no {self.set_to[0]}.", "Name an integrator that has.")
+        if self.streams:
+            call = propagator(self, {})
+            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
+            return run
+        try:
+            peer = ready(self, self.set_to)
+            beside = {} if xi is None else {"xi": xi}
+            run = peer(top, start, times, precision, system=system, **beside)
+            if again and not self.own and run.seconds["run"] < _AGAIN_SECONDS:
+                require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
+        except Unsupported:
+            raise
+        except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
+            raise PeerFailed(error.cause.removesuffix(".")) from None
+        if observer is not None:
+            for time, state in zip(run.times, run.states, strict=True):
+                observer(time, state)
+        return run
+
+    def propagate_many(
+        self,
+        problems: Sequence[Problem],
+        times: Sequence[OrderedRing],
+        observer: EnsembleObserver | None = None,
+        finished: Finished | None = None,
+        threads: int | None = None,
+        **options: Any,
+    ) -> list[Trajectory]:
+        """The motions of ``problems``, as :func:`heavytop.integrate.ensemble.propagate_ensemble`; one after the other
+        where the integrator takes no more.  Raises PeerFailed for an option that it does not have: its row fails alone.
+        """
+        if self.ensemble:
+            try:
+                many = ensemble_propagator(self, options)
+            except InputError as error:
+                raise PeerFailed(error.cause.removesuffix(".")) from None
+            runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
+            return runs
+        if options.keys() == {"tolerance"}:
+            controlled = replace(self, set_to=("tolerance", options["tolerance"]))
+            return controlled.propagate_many(problems, times, observer, finished, threads)
+        if options:
+            raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
+        runs = []
+        for index, problem in enumerate(problems):
+            watch = None if observer is None else _watching(observer, index)
+            first = index == 0
+            arguments = *_given(problem), times, problem.precision, problem.system, watch
+            runs.append(self.propagate(*arguments, xi=problem.xi, again=first))
+            if finished is not None:
+                finished(index, runs[-1])
+        return runs
+
+
+def _given(problem: Problem) -> tuple[HeavyTop, State]:
+    """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
+    if problem.system is not GYROSTAT:
+        return problem.top, problem.start
+    if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
+        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
+    return problem.given
+
+
+def _watching(observer: EnsembleObserver, index: int) -> Callable[[Fraction, Any], None]:
+    def watch(time: Fraction, state: Any) -> None:
+        observer(index, time, state)
+
+    return watch
+
+
+def foreign(name: str, function: str = "", source: IntegratorSource | None = None) -> Integrator:
     """An integrator of another package, or of a source: nothing is known of what it can do."""
-    return Integrator(name, place, None, None, "", own=False)
+    return Integrator(name, function, None, None, "", own=False, source=source)
 
 
 def name_of(which: str | IntegratorSource) -> str:
@@ -147,11 +305,13 @@ def name_of(which: str | IntegratorSource) -> str:
     return which if isinstance(which, str) else which.name
 
 
-def described(which: str | IntegratorSource) -> Integrator:
-    """Capabilities, without a look at the integrator: a record's own; of another package's or a file's, nothing."""
+def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None = None) -> Integrator:
+    """The record, without a look at the integrator: of another package's or a file's it says nothing."""
     if isinstance(which, str):
-        return INTEGRATORS.get(which) or foreign(which)
-    return which if isinstance(which, Integrator) else foreign(which.name)
+        found = INTEGRATORS.get(which) or foreign(which)
+    else:
+        found = which if isinstance(which, Integrator) else foreign(which.name, source=which)
+    return found if set_to is None else replace(found, set_to=set_to)
 
 
 def load(place: str | Callable[..., Any]) -> Any:
@@ -326,30 +486,8 @@ def is_third_party(name: str) -> bool:
 
 
 def peer(which: str | IntegratorSource) -> Peer:
-    """The peer, imported; raises InputError for an unknown one and for one that cannot be imported."""
-    if not isinstance(which, str):
-        return which.load()
-    name = which
-    if name not in known():
-        _of_packages.cache_clear()  # it may have been installed since
-    entry = known().get(name)
-    if entry is None:
-        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}. {_YOURS}")
-    if entry.lacks:
-        raise missing(extra_of(entry.lacks), f"The integrator {name}")
-    try:
-        with quiet():
-            found = load(entry.propagate)
-    except ImportError as error:
-        raise InputError(f"The integrator {name} is not available: {said(error)}.", _remedy(entry)) from error
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # whatever another package's module does when it is imported
-        why = f"{type(error).__name__}: {said(error)}"
-        raise InputError(f"The integrator {name} is broken: {why}.", _remedy(entry)) from error
-    if not callable(found):
-        raise InputError(f"The integrator {name} is broken: {entry.propagate} is not callable.", _remedy(entry))
-    return found  # type: ignore[no-any-return]
+    """The peer, imported; raises InputError as :meth:`Integrator.load`."""
+    return described(which).load()
 
 
 def require(which: str | IntegratorSource) -> None:
@@ -357,10 +495,11 @@ def require(which: str | IntegratorSource) -> None:
 
     One of another package is not imported: how that goes is for the rows to say.  A Python file has to be there.
     """
-    if isinstance(which, PythonFile) and not Path(which.path).is_file():
-        raise InputError(f"There is no file {which.path}.", "Give FILE.py:FUNCTION.")
-    if isinstance(which, str) and (which not in known() or which in INTEGRATORS):
-        peer(which)
+    integrator = described(which)
+    if isinstance(integrator.source, PythonFile) and not Path(integrator.source.path).is_file():
+        raise InputError(f"There is no file {integrator.source.path}.", "Give FILE.py:FUNCTION.")
+    if not integrator.is_known or (integrator.own and isinstance(integrator.function, str)):
+        integrator.load()
 
 
 def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = None) -> Peer:
@@ -370,13 +509,14 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
     Raises InputError for an unknown integrator and for a control that one of this program's does not have; PeerFailed
     where another package's cannot be used.
     """
-    name, own = name_of(which), described(which).own
-    if isinstance(which, Command):
-        return _program(which, control)
+    integrator = described(which, control)
+    name, own, control = integrator.name, integrator.own, integrator.set_to
+    if isinstance(integrator.source, Command):
+        return _program(integrator.source, control)
     try:
-        chosen = peer(which)
+        chosen = integrator.load()
     except InputError as error:
-        if own or (isinstance(which, str) and which not in known()):
+        if own or not integrator.is_known:
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
     declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
@@ -414,13 +554,14 @@ def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
 
 def control_name(which: str | IntegratorSource) -> str:
     """The control of a peer: "step", "tolerance", or "" for neither, as for one that cannot be used."""
-    if isinstance(which, Command):
-        return which.control
-    if control := described(which).control:
-        return control
+    integrator = described(which)
+    if isinstance(integrator.source, Command):
+        return integrator.source.control
+    if integrator.control:
+        return integrator.control
     for each in ("step", "tolerance"):
         try:
-            ready(which, (each, Fraction(1, 100)))
+            ready(integrator, (each, Fraction(1, 100)))
         except (InputError, PeerFailed):
             continue
         return each
@@ -429,8 +570,11 @@ def control_name(which: str | IntegratorSource) -> str:
 
 def control_apart(which: str | IntegratorSource) -> str:
     """:func:`control_name`; a third-party one is looked at in a process of its own, which it may end or hold."""
-    if isinstance(which, Command) or described(which).own:
+    integrator = described(which)
+    if isinstance(integrator.source, Command) or integrator.own:
         return control_name(which)
+    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+
     from heavytop.processes import ChildContext
 
     context = ChildContext()
@@ -458,10 +602,6 @@ def available() -> dict[str, str | None]:
             except InputError as error:
                 found[name] = f"{error.cause} {error.remedy}"
     return found
-
-
-def _remedy(entry: Integrator) -> str:
-    return "" if entry.own else f"It comes from {entry.propagate}: repair or remove that package."
 
 
 # Which runs are tried at all: those of no more steps than anyone waits for, whatever the units of the data.
@@ -552,14 +692,13 @@ def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
 
 
 def _unguarded(which: str | IntegratorSource, options: dict[str, Any]) -> Callable[..., Any]:
-    name = name_of(which)
-    if isinstance(which, Command):
-        return _with(CommandIntegrator(which), name, options)
-    found = described(which)
-    if found.streams:
-        return _with(loaded(found.propagate), name, options)
-    _with(peer(which), name, options)
-    return _with(ready(which), name, options)
+    integrator = described(which)
+    if isinstance(integrator.source, Command):
+        return _with(CommandIntegrator(integrator.source), integrator.name, options)
+    if integrator.streams:
+        return _with(loaded(integrator.function), integrator.name, options)
+    _with(integrator.load(), integrator.name, options)
+    return _with(ready(integrator), integrator.name, options)
 
 
 def watched(
@@ -584,11 +723,11 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
 
     Its calls raise OutOfReach as those of :func:`propagator`.
     """
-    found, name = described(which), name_of(which)
-    if not found.ensemble:
-        require(which)
-        raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
-    run = _with(loaded(found.ensemble), name, options)
+    integrator = described(which)
+    if not integrator.ensemble:
+        require(integrator)
+        raise InputError(f"The integrator {integrator.name} runs one motion at a time.", "Call propagate for each.")
+    run = _with(loaded(integrator.ensemble), integrator.name, options)
 
     def call(problems: Sequence[Problem], times: Sequence[OrderedRing], **more: Any) -> Any:
         for problem in problems if len(times) else ():
@@ -619,83 +758,3 @@ def _with(function: Callable[..., Any], name: str, options: dict[str, Any]) -> C
         return function(*arguments, **more, **options)
 
     return call
-
-
-# A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
-
-
-_SPARE_BITS = 160
-"""Irrational data of a run are rounded to so many bits more than its format has, of what it is told itself."""
-
-Observer = Callable[[Fraction, Any], object]
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """A motion in principal axes.
-
-    top, start: exact, of irrational data to many bits more than the format has.
-    carried: ξ at t = 0, where the data say it.
-    frame: the axes given; None where they are the principal ones.
-    """
-
-    top: HeavyTop
-    start: State
-    carried: Vector | None
-    system: System
-    precision: Precision
-    frame: Frame | None
-
-    @property
-    def xi(self) -> Vector:
-        """ξ at t = 0: of the attitude, else :func:`heavytop.top.attitude.perpendicular` of γ."""
-        return perpendicular(self.start.gamma) if self.carried is None else self.carried
-
-    @classmethod
-    def of(cls, body: HeavyTop | Body, start: State, precision: Precision, system: System) -> Setup:
-        """The motion of a body from ``start``."""
-        if isinstance(body, HeavyTop) and start.attitude is None:
-            return cls(body, start, None, system, precision, None)
-        found = resolve(body, start, precision.bits + _SPARE_BITS)
-        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.is_rotated:
-            return cls(found.top, found.start, xi, system, precision, None)
-        if system is GYROSTAT:
-            raise InputError(
-                "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
-                "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
-            )
-        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
-        return cls(found.top, found.start, xi, system, precision, frame)
-
-    def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
-        """A vector of the axes given, in principal axes."""
-        if vector is None or self.frame is None:
-            return vector
-        return rotated(transposed(self.frame.axes), vector)
-
-    @property
-    def problem(self) -> Problem:
-        """The problem, as ensembles take it."""
-        return Problem.of(self.top, self.start, self.precision, self.system)
-
-    def in_body_axes(self, state: Any) -> Any:
-        """A state of an observer in the axes given."""
-        return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
-
-    def exactly_in_body_axes(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
-        """Vectors in principal axes, in the axes given, in exact rationals."""
-        if self.frame is None:
-            return state
-        axes = self.frame.axes
-        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
-
-    def watched(self, observer: Observer | None) -> Observer | None:
-        """An observer that is given the states in the axes given."""
-        if observer is None or self.frame is None or not callable(observer):
-            return observer
-        return lambda time, state: observer(time, self.in_body_axes(state))
-
-    def given(self, run: Trajectory) -> Trajectory:
-        """The run in the axes given."""
-        return run if self.frame is None else framed(run, self.frame)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,7 +11,10 @@ from fractions import Fraction
 from math import inf
 from time import perf_counter
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.display import LazyLines, Tabular, TitledTable, path_picture
 from heavytop.errors import InputError
@@ -43,8 +47,6 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, I
 from heavytop.top.heavy_top import HeavyTop, State
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from scipy.spatial.transform import Rotation
 
     from heavytop.top.stability import Stability
@@ -61,10 +63,8 @@ _SIGN_BITS = 8
 """A component of the quaternion at the start that is within so many bits of rounding counts as 0."""
 
 
-def in_double(run: Trajectory, output: Output) -> NDArray[np.float64]:
+def in_double(run: Trajectory, output: Output) -> NDArray[numpy.float64]:
     """The output at every sample, shape (n, 4), (n, 3, 3) or (n, 3); ``nan`` where an Euler angle is not defined."""
-    import numpy
-
     attitude, size = attitude_of(run), math.prod(output.shape)
     if run.problem.precision == DOUBLE:
         values = _columns(run, attitude, output)
@@ -81,8 +81,6 @@ def as_texts(run: Trajectory, output: Output) -> list[Any]:
     attitude, digits = attitude_of(run), run.problem.precision.digits
     lines = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
     if output.name == "quaternion" and lines:
-        import numpy
-
         turns = signs(_start(run), numpy.array([[float(value) for value in line] for line in lines]))
         lines = [[value * int(turn) for value in line] for line, turn in zip(lines, turns, strict=True)]
     return [shaped([_text(value, digits) for value in line], output.shape) for line in lines]
@@ -119,10 +117,8 @@ def _centre(run: Trajectory, output: Output) -> Vector:
     return run.problem.top.centre
 
 
-def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float64]:
+def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[numpy.float64]:
     """The output of doubles, all samples at once, shape (n, 4, 9 or 3); quaternions of either sign."""
-    import numpy
-
     lib = SimpleNamespace(sqrt=numpy.sqrt, atan2=numpy.arctan2)
     omega, gamma, xi = (
         tuple(part.astype(float).T) for part in (run.states[:, :3], run.states[:, 3:6], attitude[:, :3])
@@ -352,10 +348,10 @@ class InSpace:
 
     __slots__ = ()
 
-    def _in_double(self, what: Output) -> NDArray[np.float64]:
+    def _in_double(self, what: Output) -> NDArray[numpy.float64]:
         raise NotImplementedError
 
-    def quaternions(self) -> NDArray[np.float64]:
+    def quaternions(self) -> NDArray[numpy.float64]:
         """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
 
         The sign is continuous from one sample to the next, with w ≥ 0 at t = 0.
@@ -370,11 +366,11 @@ class InSpace:
             raise InputError("Rotations need SciPy.", "Install it with: pip install scipy") from None
         return Rotation.from_quat(self.quaternions()[:, [1, 2, 3, 0]])
 
-    def matrices(self) -> NDArray[np.float64]:
+    def matrices(self) -> NDArray[numpy.float64]:
         """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ."""
         return self._in_double(output("matrix"))
 
-    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[numpy.float64]:
         """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
 
         point: three exact numbers in body axes; None for the centre of mass.
@@ -382,11 +378,11 @@ class InSpace:
         """
         return self._in_double(output("position", point, pivot))
 
-    def omega_space(self) -> NDArray[np.float64]:
+    def omega_space(self) -> NDArray[numpy.float64]:
         """R Ω, the angular velocity in space axes, shape (n, 3)."""
         return self._in_double(output("omega-space"))
 
-    def euler(self, sequence: str) -> NDArray[np.float64]:
+    def euler(self, sequence: str) -> NDArray[numpy.float64]:
         """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
 
         a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
@@ -454,8 +450,6 @@ class Trajectory(LazyStates, Tabular, InSpace):
     joint_violation: float | None = None
 
     def __post_init__(self) -> None:
-        import numpy
-
         width = 6 if self.problem.xi is None or self.attitude is not None else 9
         given = self.states
         if callable(given):
@@ -490,19 +484,17 @@ class Trajectory(LazyStates, Tabular, InSpace):
             return as_texts(self, output(of, point, pivot))
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
 
-    def angles(self) -> NDArray[np.float64]:
+    def angles(self) -> NDArray[numpy.float64]:
         """φ, θ, ψ of (3.2) in radians, shape (n, 3), followed from t = 0 with all turns: ``euler("ZXZ")`` is ψ, θ, φ.
 
         Continuous but for jumps of φ and ψ by π where the axis goes through a pole; ``nan`` at one.
         Raises InputError for a run that was not asked for angles.
         """
-        import numpy
-
         if self.angle_texts is None:
             raise InputError("The angles were not followed.", "Propagate with angles=True; euler() needs no following.")
         return numpy.array(self.angle_texts, dtype=float).reshape(-1, 3)
 
-    def _in_double(self, what: Output) -> NDArray[np.float64]:
+    def _in_double(self, what: Output) -> NDArray[numpy.float64]:
         return in_double(self, what)
 
     def __call__(self, t: Any) -> Any:
@@ -511,8 +503,6 @@ class Trajectory(LazyStates, Tabular, InSpace):
         By the polynomials of the integrator's own steps, which are taken again at the first call.
         Raises InputError for a time outside of the run, Unsupported for an integrator that hands over no polynomials.
         """
-        import numpy
-
         if self.dense is None:
             raise InputError("This run has no dense output.", "Take that of heavytop.propagate.")
         several = numpy.ndim(t) > 0
@@ -524,10 +514,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
         object.__setattr__(self, "dense", function)
         return self
 
-    def to_numpy(self) -> NDArray[np.float64]:
+    def to_numpy(self) -> NDArray[numpy.float64]:
         """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""
-        import numpy
-
         return numpy.array([[float(value) for value in state] for state in self.states]).reshape(self.states.shape)
 
     @property
@@ -621,36 +609,64 @@ def _shown(value: Any, digits: int) -> str:
 
 
 Observer = Callable[[Fraction, Any], None]
-
+EnsembleObserver = Callable[[int, Fraction, Any], None]
+"""Given the index of a motion, the time and the state."""
 
 Ended = tuple[Sequence[Fraction], Any, "Outcome", float]
 """The times that a run reached, the states there, its outcome and its seconds."""
 
 
-class SampledRun(Protocol):
-    """A run that is advanced to wherever its next sample lies."""
+class SampledRun(ABC):
+    """A run that is advanced to wherever its next sample lies.
+
+    between: called between chunks of steps; it may raise to give the run up.
+    """
+
+    step_limit: int | None
+    between: Callable[[], None] | None
 
     @property
+    @abstractmethod
     def steps(self) -> int:
         """Taken so far."""
-        ...
 
     @property
+    @abstractmethod
     def time(self) -> Any:
         """Where the last step ended, exactly or as a native number."""
-        ...
 
+    def reach(self, target: Any) -> Outcome:
+        """Step until the last step covers ``target``."""
+        while not self.covers(target):
+            left = None if self.step_limit is None else self.step_limit - self.steps
+            if left is not None and left <= 0:
+                return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
+            outcome = self.advance(target, left)
+            if outcome is not Outcome.SUCCESS:
+                return outcome
+        return Outcome.SUCCESS
+
+    @abstractmethod
+    def covers(self, target: Any) -> bool:
+        """Whether there is a state at ``target`` without another step."""
+
+    @abstractmethod
+    def advance(self, target: Any, most: int | None) -> Outcome:
+        """Some steps towards ``target``, at most so many."""
+
+    @abstractmethod
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """How it came to the time, given as the native number and exactly, and the native state there."""
-        ...
 
+    @abstractmethod
     def take_up(self, place: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
-        ...
 
+    @abstractmethod
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""
-        ...
 
 
 def sampled(
@@ -704,6 +720,10 @@ def trajectory_of(
     reached = times[-1] if outcome is Outcome.SUCCESS and times else exact(run.time)
     spent = {"compile": compiling, "run": seconds}
     return Trajectory(problem, integrator, times, states, outcome, reached, run.steps, order, spent, flags)
+
+
+Finished = Callable[[int, Trajectory], None]
+"""Given the index of a motion of an ensemble and the motion, when it ends."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
+import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.bodies import Resolved, resolve
@@ -19,10 +21,6 @@ from heavytop.precision import exact, shown
 from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 WHICH = ("start", "data", "all")
 STARTS = tuple(f"{name}(0)" for name in NAMES)
@@ -68,10 +66,8 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
     data: list[list[list[Ball]]] | None = None
     lyapunov: list[Ball | None] | None = None
 
-    def numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+    def numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
         """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
-        import numpy
-
         arrays = {
             name: numpy.array([[[float(ball.value) for ball in row] for row in rows] for rows in part])
             for name, part in (("start", self.start), ("data", self.data))

@@ -14,181 +14,22 @@ import msgspec
 import numpy
 from flint import arb
 
-from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
-from heavytop.integrate import registry
-from heavytop.integrate.ensemble import Finished
-from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.errors import HeavyTopError, PeerFailed
 from heavytop.integrate.heyoka import motions
-from heavytop.integrate.peers.command import NOT_COUNTED, Command
-from heavytop.integrate.peers.contract import Declared, require_equal
-from heavytop.integrate.registry import Integrator, IntegratorSource, described, name_of
-from heavytop.integrate.trajectory import Observer, Outcome, Problem, Trajectory
+from heavytop.integrate.peers.command import NOT_COUNTED
+from heavytop.integrate.peers.contract import require_equal
+from heavytop.integrate.registry import Integrator
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.growth import Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.measure.scorer import SOLUTION_ERROR, Scorer, TimeText
 from heavytop.measure.truth import EnsembleReference
-from heavytop.precision import Array, OrderedRing, Precision, decimal_text, exact
+from heavytop.precision import Array, decimal_text, exact
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
-from heavytop.top.equations import GYROSTAT, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import State
 
 HEYOKA, MULTIWORD = "heyoka", "multiword"
-_AGAIN_SECONDS = 1.0
-"""A longer call of an integrator of another package is made once."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChosenIntegrator:
-    """The integrator of that name.
-
-    control: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
-    source: where the integrator is defined, if it is neither built in nor a package's.
-    """
-
-    name: str = HEYOKA
-    control: tuple[str, Fraction] | None = None
-    source: IntegratorSource | None = None
-
-    @classmethod
-    def of(cls, which: str | IntegratorSource) -> ChosenIntegrator:
-        """The integrator that is named, or defined by its source."""
-        return cls(name_of(which), source=None if isinstance(which, str) else which)
-
-    @property
-    def which(self) -> str | IntegratorSource:
-        """The name or the source by which it is looked up."""
-        return self.source or self.name
-
-    @property
-    def capabilities(self) -> Integrator:
-        """Its capabilities."""
-        return described(self.which)
-
-    @property
-    def supports_ensemble(self) -> bool:
-        """Whether many motions go side by side, which makes each cheap."""
-        return bool(self.capabilities.ensemble)
-
-    @property
-    def carries_attitude(self) -> bool:
-        """Whether it declares that ξ rides along; not one that cannot be used."""
-        if isinstance(self.source, Command):
-            return bool(self.source.attitude)
-        if self.capabilities.own:
-            return self.capabilities.attitude
-        try:
-            peer: Any = registry.ready(self.which)
-        except (InputError, PeerFailed):
-            return False
-        return bool(peer.carries_attitude)
-
-    @property
-    def declared(self) -> Declared:
-        """Its declaration; an empty one where it cannot be used."""
-        if isinstance(self.source, Command):
-            return self.source.declared
-        try:
-            return getattr(registry.ready(self.which), "declared", None) or Declared()
-        except (InputError, PeerFailed):
-            return Declared()
-
-    @property
-    def one_step(self) -> bool:
-        """Whether a step depends on the state where it begins alone: unless it declares that it has a memory."""
-        return self.capabilities.own or self.declared.one_step
-
-    def propagate(
-        self,
-        top: HeavyTop,
-        start: State,
-        times: Sequence[OrderedRing],
-        precision: Precision,
-        system: System,
-        observer: Observer | None = None,
-        *,
-        xi: Sequence[Fraction] | None = None,
-        again: bool = True,
-        **resume: Any,
-    ) -> Trajectory:
-        """The motion of an exact top and start; every state goes to ``observer``, where there is one.
-
-        xi: of an integrator that :attr:`carries_attitude`.  again: whether a quick call of an integrator of another
-        package is made twice, to see whether it is the same.  resume: place and mark as in
-        :func:`heavytop.integrate.heyoka.motions.propagate`, of no use to an integrator that knows no places.
-
-        Raises PeerFailed for whatever a third-party integrator does wrong.
-        """
-        if self.capabilities.streams and self.control:
-            raise Unsupported(f"{self.name} has no {self.control[0]}.", "Name an integrator that has.")
-        if self.capabilities.streams:
-            call = registry.propagator(self.which, {})
-            run: Trajectory = call(top, start, times, precision, system=system, xi=xi, observer=observer, **resume)
-            return run
-        try:
-            peer = registry.ready(self.which, self.control)
-            beside = {} if xi is None else {"xi": xi}
-            run = peer(top, start, times, precision, system=system, **beside)
-            if again and not self.capabilities.own and run.seconds["run"] < _AGAIN_SECONDS:
-                require_equal(self.name, run, peer(top, start, times, precision, system=system, **beside))
-        except Unsupported:
-            raise
-        except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
-            raise PeerFailed(error.cause.removesuffix(".")) from None
-        if observer is not None:
-            for time, state in zip(run.times, run.states, strict=True):
-                observer(time, state)
-        return run
-
-    def propagate_many(
-        self,
-        problems: Sequence[Problem],
-        times: Sequence[OrderedRing],
-        observer: EnsembleObserver | None = None,
-        finished: Finished | None = None,
-        threads: int | None = None,
-        **options: Any,
-    ) -> list[Trajectory]:
-        """The motions of ``problems``, as :func:`heavytop.integrate.ensemble.propagate_ensemble`; one after the other
-        where the integrator takes no more.  Raises PeerFailed for an option that it does not have: its row fails alone.
-        """
-        if self.supports_ensemble:
-            try:
-                many = registry.ensemble_propagator(self.name, options)
-            except InputError as error:
-                raise PeerFailed(error.cause.removesuffix(".")) from None
-            runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
-            return runs
-        if options.keys() == {"tolerance"}:
-            controlled = replace(self, control=("tolerance", options["tolerance"]))
-            return controlled.propagate_many(problems, times, observer, finished, threads)
-        if options:
-            raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
-        runs = []
-        for index, problem in enumerate(problems):
-            watch = None if observer is None else _watching(observer, index)
-            first = index == 0
-            arguments = *_given(problem), times, problem.precision, problem.system, watch
-            runs.append(self.propagate(*arguments, xi=problem.xi, again=first))
-            if finished is not None:
-                finished(index, runs[-1])
-        return runs
-
-
-def _given(problem: Problem) -> tuple[HeavyTop, State]:
-    """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
-    if problem.system is not GYROSTAT:
-        return problem.top, problem.start
-    if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
-        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
-    return problem.given
-
-
-def _watching(observer: EnsembleObserver, index: int) -> Callable[[Fraction, Any], None]:
-    def watch(time: Fraction, state: Any) -> None:
-        observer(index, time, state)
-
-    return watch
 
 
 # The seconds that an integrator takes, and whether what one of another package says of its runs can be.
@@ -471,7 +312,7 @@ def complete(
     times: Sequence[Fraction],
     scorers: Sequence[Scorer],
     save: Callable[[], None],
-    integrator: ChosenIntegrator,
+    integrator: Integrator,
     options: Mapping[str, Any],
 ) -> None:
     """Compute those of the motions that are missing, all side by side; save after each.  options: the integrator's."""

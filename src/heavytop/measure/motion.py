@@ -13,7 +13,8 @@ from flint import arb
 
 from heavytop.exact.flint.balls import FUNCTIONS, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.registry import IntegratorSource, Setup, described, expected_steps
+from heavytop.integrate.frames import Setup
+from heavytop.integrate.registry import IntegratorSource, described, expected_steps
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import GUARD_BITS, text, to_balls
 from heavytop.measure.scorer import Drift

@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast, overload
+from typing import Any, cast, overload
 
 import msgspec
+import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.display import Tabular, TitledTable, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
@@ -39,11 +41,6 @@ from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, TimeText
 from heavytop.top.stability import Stability, stability
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 
 # What a reference tells of the attitude, as balls: each to the digits asked, from a state of some more bits.
 
@@ -111,8 +108,6 @@ class KnownMotion:
     def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:
         """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and from it backwards."""
         if self._signs is None:
-            import numpy
-
             start, found = self._start(), [1] * len(self.times)
             floats = numpy.array([[float(part) for part in q] for q in quaternions])
             for side in (1, -1):
@@ -336,9 +331,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         for what in outputs:
             self._known().balls(what)
 
-    def _in_double(self, what: Output) -> NDArray[np.float64]:
-        import numpy
-
+    def _in_double(self, what: Output) -> NDArray[numpy.float64]:
         values = numpy.array(self._outputs(what, nearest), dtype=float)
         return values.reshape(-1, *what.shape)
 
@@ -361,16 +354,12 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
             self.__dict__["_motion"] = motion
         return motion
 
-    def to_numpy(self) -> NDArray[np.float64]:
+    def to_numpy(self) -> NDArray[numpy.float64]:
         """The values rounded to double, shape (n, 6)."""
-        import numpy
-
         return numpy.array([[float(ball.value) for ball in state] for state in self.states])
 
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> NDArray[numpy.float64]:
         """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
-        import numpy
-
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
 
     def _repr_html_(self) -> str:
@@ -378,7 +367,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         picture = path_picture(len(states), lambda place: [ball.value for ball in states[place][3:6]], caption)
         return self._table().html() + picture
 
-    def derivatives_numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+    def derivatives_numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
         """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
 
         Raises InputError where none were asked for.

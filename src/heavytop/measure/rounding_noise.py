@@ -17,8 +17,8 @@ from operator import mul
 import numpy
 from msgspec.structs import replace as replace_struct
 
+from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import Truth, closed_form, uncertified
 from heavytop.precision import DOUBLE, exact, number, round_to
@@ -123,13 +123,13 @@ class Reruns:
     """How a run is computed again: in double, from the exact data ``problem``, with the roundings of ``seed``."""
 
     problem: Problem
-    integrator: ChosenIntegrator
+    integrator: Integrator
     seed: int
 
     @property
     def possible(self) -> bool:
         """Whether the integrator can be given the same motion with other roundings."""
-        return self.problem.system is not GYROSTAT or self.integrator.supports_ensemble
+        return self.problem.system is not GYROSTAT or bool(self.integrator.ensemble)
 
     def drift_bands(self, run: Trajectory, asked: Sequence[Fraction], metrics: Metrics, true: Truth | str) -> Metrics:
         """``metrics`` of a run with their bands; as they are where it failed, or cannot be computed again.
@@ -138,7 +138,7 @@ class Reruns:
         """
         if run.outcome is not Outcome.SUCCESS or not self.possible:
             return metrics
-        most = _STEPS if self.integrator.supports_ensemble else _STEPS_SINGLY
+        most = _STEPS if self.integrator.ensemble else _STEPS_SINGLY
         end = asked[-1] if run.steps <= most else asked[-1] * most / run.steps
         if not isinstance(true, str) and not true.covers(end):
             end = true.ends or end

@@ -16,17 +16,18 @@ from fractions import Fraction
 from functools import lru_cache
 from operator import itemgetter
 from threading import Lock
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.top.equations import Parameters, System
 
 if TYPE_CHECKING:
-    import numpy
     from gmpy2 import mpq
-    from numpy.typing import NDArray
 
 
-Doubles: TypeAlias = "NDArray[numpy.float64]"
+Doubles = NDArray[numpy.float64]
 _ORDER = 20
 _TOLERANCE = 2.0**-52
 _STEPS = 1000
@@ -118,7 +119,6 @@ def _units(scale: Fraction) -> list[Fraction]:
 
 def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Doubles, Doubles]:
     """L, shape (6, 6), and symmetric B, shape (6, 6, 6), of the field L y + B(y, y) in units of ``scale``."""
-    import numpy
     from gmpy2 import mpq
 
     units = [mpq(unit) for unit in _units(scale)]
@@ -146,8 +146,6 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[Double
 
 def _nearest(value: mpq | Fraction) -> numpy.longdouble:
     """The nearest longdouble; raises OverflowError beyond doubles."""
-    import numpy
-
     exactly = Fraction(int(value.numerator), int(value.denominator))
     first = float(exactly)
     return numpy.longdouble(first) + numpy.longdouble(float(exactly - Fraction(first)))
@@ -161,8 +159,6 @@ class _Path:
     """
 
     def __init__(self, linear: Doubles, products: Doubles, start: Doubles) -> None:
-        import numpy
-
         self._linear, self._twice = linear if linear.any() else None, 2 * products.reshape(36, 6)
         self._steps = [(0.0, 1.0, 1.0)]
         kind = start.dtype
@@ -187,8 +183,6 @@ class _Path:
 
     def _advance(self) -> bool:
         """One step; whether another may follow: not where Φ is beyond double, time stands still or all is lost."""
-        import numpy
-
         time, largest, lost = self._steps[-1]
         series = _series(self._linear, self._twice, self._state)
         last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
@@ -214,8 +208,6 @@ class _Path:
 @lru_cache(maxsize=64)
 def _path(system: System, parameters: Parameters, start: tuple[Fraction, ...], forwards: bool, wide: bool) -> _Path:
     """The path of a motion, in longdouble if wide; backwards in time is forwards with the field reversed."""
-    import numpy
-
     scale = rate(system, parameters, start)
     linear, products = _taken_apart(system, parameters, scale if forwards else -scale)
     state = numpy.array([_nearest(value / unit) for value, unit in zip(start, _units(scale), strict=True)])
@@ -230,8 +222,6 @@ def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
 
     linear: L; None where it is 0.  twice: 2 B, shape (36, 6).
     """
-    import numpy
-
     kind = state.dtype
     found, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
     found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)

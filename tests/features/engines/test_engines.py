@@ -179,6 +179,7 @@ runs = [{ precision = "double", horizon = "1", samples = 4 }]
         assert 0 < float(fine.metrics[name]) < 1e-5
         assert float(drift.metrics[name]) == pytest.approx(float(fine.metrics[name]), rel=0.1)
     assert drift.key.subject.step == "1/100"
+    assert drift.key.subject.version == "1"
 
 
 @pytest.mark.slow

@@ -18,9 +18,9 @@ from heavytop.harness.case_text import ensemble_of
 from heavytop.harness.checkpoint import Saved
 from heavytop.integrate import registry
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure import truth
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.truth import reference
 from heavytop.precision import DOUBLE, cross
 from heavytop.records import Report
@@ -277,7 +277,7 @@ def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypat
     def watched_too(self, problems, times, observer=None, finished=None, **options):
         return watched(problems, times, observer=observer, finished=finished, **options)
 
-    monkeypatch.setattr(ChosenIntegrator, "propagate_many", watched_too)
+    monkeypatch.setattr(Integrator, "propagate_many", watched_too)
     path = tmp_path / "row-0.partial"
     deaths = 0
     while True:
@@ -303,7 +303,7 @@ def _with_a_nan(_, problems, times, observer, finished, **options):
 @pytest.mark.slow
 def test_a_start_that_is_not_finite_is_kept_as_it_is(tmp_path: Path, monkeypatch) -> None:
     (task,) = tasks(tmp_path, '"euler"', 'precision = "double", horizon = "20", starts = 9, samples = 4')
-    monkeypatch.setattr(ChosenIntegrator, "propagate_many", _with_a_nan)
+    monkeypatch.setattr(Integrator, "propagate_many", _with_a_nan)
     saved = Saved(tmp_path / "row-0.partial", "this plan", every=0)
     one = measure(task, saved)
     again = measure(task, saved)

@@ -12,8 +12,7 @@ from heavytop.features.hunt.search import digits, keep, kept
 from heavytop.features.kinds import KINDS
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import expand, load
-from heavytop.integrate.registry import INTEGRATORS, Integrator
-from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.integrate.registry import INTEGRATORS, Integrator, described
 from heavytop.precision import exact
 from support.in_process import heavytop
 
@@ -122,7 +121,7 @@ def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equ
     from heavytop.top.amplification import amplification
     from heavytop.top.equations import HEAVY_TOP
 
-    meter = Meter(ChosenIntegrator("heyoka"), ht.DOUBLE, Fraction(10), None)
+    meter = Meter(described("heyoka"), ht.DOUBLE, Fraction(10), None)
     motions = [drawn(1, index, "any", Fraction(10)) for index in (0, 2, 4)]
     for found in meter.measure(motions):
         top, start = found.motion
@@ -163,7 +162,7 @@ def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the
     # a hunt of heyoka once found this motion, near the separatrix of a pendulum, and blamed heyoka
     top = ht.HeavyTop(("199/1000000000", "239/1000000000", "134337/1000000000000"), 56, ("7/10000000", 0, 0))
     start = ht.State(("1/50", 0, "-3/100"), (0, 0, 1))
-    meter = Meter(ChosenIntegrator("heyoka"), ht.DOUBLE, Fraction(3), None)
+    meter = Meter(described("heyoka"), ht.DOUBLE, Fraction(3), None)
     (found,) = meter.measure([(top, start)])
     assert meter.sharper(found).amplification > 2 * found.amplification
     assert found.error < 100 * meter.sharper(found).explained(2.0**-52)

@@ -12,8 +12,8 @@ from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
 from heavytop.features.local_error.measurement import LocalError, single_calls
 from heavytop.integrate.heyoka.motions import first_steps, propagate
+from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -94,7 +94,7 @@ def test_an_equilibrium_has_no_steps() -> None:
 @pytest.mark.parametrize(("name", "order"), [("splitting:2", 2), ("splitting:8", 8)])
 def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -> None:
     case = CASES["generic"]
-    run, calls = single_calls(ChosenIntegrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+    run, calls = single_calls(described(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
     found = examined(run, calls)
     assert found["observed_order"].value == str(order)
     assert all(call.length == Fraction(1 / 100) for _, call in calls)
@@ -104,7 +104,7 @@ def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -
 @pytest.mark.slow
 def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
     case = CASES["euler"]
-    run, calls = single_calls(ChosenIntegrator("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
+    run, calls = single_calls(described("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
     size, worst = Fraction(0), Fraction(0)
     for _, call in calls:
         begin = State(*(tuple(map(exact, call.start[i : i + 3])) for i in (0, 3)))
@@ -118,7 +118,7 @@ def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
 @pytest.mark.slow
 def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
     case = CASES["lagrange"]
-    run, calls = single_calls(ChosenIntegrator("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
+    run, calls = single_calls(described("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
     found = examined(run, calls)
     assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
     assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
@@ -130,16 +130,16 @@ def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_n
 def test_a_count_of_steps_makes_no_step_of_a_given_length_shorter_and_none_at_all_is_refused(
     name, times, monkeypatch
 ) -> None:
-    propagate = ChosenIntegrator.propagate
+    propagate = Integrator.propagate
     case = CASES["lagrange"]
-    asked = ChosenIntegrator(name), case.top, case.start, Fraction(1), DOUBLE, case.system
+    asked = described(name), case.top, case.start, Fraction(1), DOUBLE, case.system
     _, honest = single_calls(*asked)
 
     def miscounted(self, *given, **options):
         run = propagate(self, *given, **options)
         return replace(run, steps=run.steps * times)
 
-    monkeypatch.setattr(ChosenIntegrator, "propagate", miscounted)
+    monkeypatch.setattr(Integrator, "propagate", miscounted)
     if not times:
         with pytest.raises(PeerFailed, match=f"{name} moved, and says that it took no step"):
             single_calls(*asked)
@@ -156,7 +156,7 @@ def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
     for scale in (Fraction(1), Fraction(10) ** 30, Fraction(3, 10**20)):
         top = HeavyTop(case.top.inertia, scale**2 * case.top.weight, case.top.centre)
         start = State([scale * omega for omega in case.start.omega], case.start.gamma)
-        integrator = ChosenIntegrator("splitting:4", control=("step", Fraction(1, 10) / scale))
+        integrator = described("splitting:4", ("step", Fraction(1, 10) / scale))
         _, calls = single_calls(integrator, top, start, 2 / scale, DOUBLE, case.system)
         asked.append([tuple(call.further) for _, call in calls])
     assert asked == [[(2, 4, 8, 16)] * 16] * 3

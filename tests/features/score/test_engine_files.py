@@ -36,7 +36,7 @@ def test_a_method_of_first_order_is_not_accused(tmp_path: Path) -> None:
     assert (kinds(found), found.digits_right < 4) == ([], True)
 
 
-@pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "tensor about the other point"])
+@pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "free", "tensor about the other point"])
 def test_a_mistake_in_a_file_of_first_order_is_named(mistake: str, tmp_path: Path) -> None:
     named, build = engine_files.MISTAKES[mistake]
     assert set(kinds(scored(*build(COARSE), tmp_path))) & set(named)

@@ -25,8 +25,8 @@ from heavytop.harness.rows import failed
 from heavytop.harness.sweeps import Random, SweepGrid
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.multiword.lanes import Pairs
+from heavytop.integrate.registry import described
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
@@ -62,7 +62,7 @@ def plan(folder: Path, count: int = 5, more: str = "") -> Path:
 def test_records_equal_the_scorers(family: str) -> None:
     sweep = Random(name="s", seed=7, count=4, family=family)  # type: ignore[arg-type]
     motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
-    found = records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
+    found = records.measured(motions, described("heyoka"), TIMES, DOUBLE, {})
     runs = propagate_ensemble(motions.problems, TIMES, threads=1)
     for place, (case, run) in enumerate(zip(sweep.cases(), runs, strict=True)):
         problem = Problem.of(case.top, case.start, DOUBLE)
@@ -121,7 +121,7 @@ def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(records, "_truth", off)
     with pytest.raises(Contradiction, match="off the proven one"):
-        records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
+        records.measured(motions, described("heyoka"), TIMES, DOUBLE, {})
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest
 def test_an_integrator_without_lanes_is_surveyed_too() -> None:
     sweep = Random(name="s", seed=7, count=2)
     motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
-    found = records.measured(motions, ChosenIntegrator("scipy:DOP853"), TIMES, DOUBLE, {})
+    found = records.measured(motions, described("scipy:DOP853"), TIMES, DOUBLE, {})
     assert found["outcome"] == ["success"] * 2
     assert all(found["error_max"] > 0)
 

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import DeloneHomoclinic
@@ -25,10 +26,6 @@ from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Array, Precision, Real, decimal_text, exact, number, shown
 from heavytop.top.attitude import Library, attitude_from_angles, euler_angles, perpendicular, rotation_angle, unwrap
 from heavytop.top.equations import GYROSTAT, gyrostat_energy
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MODEL_BITS = 160
 
@@ -349,8 +346,8 @@ class Curves:
     """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
 
     times: Array
-    states: NDArray[np.float64]
-    angles: NDArray[np.float64]
+    states: NDArray[numpy.float64]
+    angles: NDArray[numpy.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,7 +356,7 @@ class PaperCurve:
 
     figure: PaperFigure
     times: Array
-    values: NDArray[np.float64]
+    values: NDArray[numpy.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -479,7 +476,7 @@ def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
 
 
-def _continuous(angles: NDArray[np.float64], states: NDArray[np.float64]) -> Any:
+def _continuous(angles: NDArray[numpy.float64], states: NDArray[numpy.float64]) -> Any:
     """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
 
     Whole turns are taken off until φ and ψ lie within a turn of 0 there.

@@ -114,7 +114,7 @@ class DriftKind(Kind):
                 saved.save({"run": place.content(precision), "measures": scorer.content()})
 
         resume: dict[str, Any] = {}
-        if task.integrator.supports_ensemble:
+        if task.integrator.ensemble:
             resume = {"place": None if before is None else ResumePoint.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **resume)
         return _row(task, run, scorer)

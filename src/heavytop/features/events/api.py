@@ -26,7 +26,8 @@ from heavytop.features.events.functions import (
 from heavytop.features.events.located import locate
 from heavytop.features.events.proven import proven_events
 from heavytop.integrate.dense import dense
-from heavytop.integrate.registry import Setup, named
+from heavytop.integrate.frames import Setup
+from heavytop.integrate.registry import named
 from heavytop.measure.reference import DIGITS, Ball
 from heavytop.precision import DOUBLE, Precision, as_integer, exact, exact_text, physical
 from heavytop.top.amplification import amplification

@@ -13,10 +13,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
+import numpy
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpq_series
+from numpy.typing import NDArray
 
 from heavytop.display import LazyLines, Tabular, TitledTable
 from heavytop.errors import InputError, quoted
@@ -25,11 +27,6 @@ from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
 from heavytop.precision import Array, decimal_text, exact, native_text
 from heavytop.top.equations import NAMES, VARIABLES, Parameters, System, component
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 
 _GREEK = {f"{greek}{axis}": f"{name}{axis}" for greek, name in (("Ω", "omega"), ("γ", "gamma")) for axis in (1, 2, 3)}
 _GREEK |= {f"\N{OHM SIGN}{axis}": f"omega{axis}" for axis in (1, 2, 3)}
@@ -227,8 +224,6 @@ def _without_square(polynomial: Any) -> tuple[Any, Any]:
 
 def _tried(given: Callable[[Any, Any], Any]) -> Ratio | None:
     """The rational function that a callable is; None where it wants numbers."""
-    import numpy
-
     y = numpy.array(_variables(), dtype=object)
     try:
         value = given(y[:3], y[3:])
@@ -447,10 +442,8 @@ class Events(Tabular):
         """The times as full-precision decimal strings."""
         return [native_text(time, self.problem.precision) for time in self.times]
 
-    def to_numpy(self) -> NDArray[np.float64]:
+    def to_numpy(self) -> NDArray[numpy.float64]:
         """The states rounded to double, shape (n, 6)."""
-        import numpy
-
         return numpy.array([[float(value) for value in state] for state in self.states]).reshape(-1, 6)
 
     def to_json(self) -> dict[str, Any]:
@@ -516,22 +509,16 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
         """The values of the times as decimal text."""
         return [ball.value for ball in self.times]
 
-    def to_numpy(self) -> NDArray[np.float64]:
+    def to_numpy(self) -> NDArray[numpy.float64]:
         """The values of the states rounded to double, shape (n, 6)."""
-        import numpy
-
         return numpy.array([[float(ball.value) for ball in state] for state in self.states]).reshape(-1, 6)
 
-    def times_numpy(self) -> NDArray[np.float64]:
+    def times_numpy(self) -> NDArray[numpy.float64]:
         """The values of the times rounded to double, shape (n,)."""
-        import numpy
-
         return numpy.array([float(ball.value) for ball in self.times], dtype=numpy.float64)
 
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> NDArray[numpy.float64]:
         """The radii of the states rounded up to double, shape (n, 6)."""
-        import numpy
-
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states]).reshape(-1, 6)
 
     def _table(self) -> TitledTable:
@@ -562,7 +549,7 @@ class Section(Tabular):
     def __len__(self) -> int:
         return len(self.events)
 
-    def points(self, x: str = "gamma1", y: str = "gamma2") -> list[NDArray[np.float64]]:
+    def points(self, x: str = "gamma1", y: str = "gamma2") -> list[NDArray[numpy.float64]]:
         """Two components of the states of each start, arrays of shape (n, 2)."""
         columns = [component(name) for name in (x, y)]
         return [each.to_numpy()[:, columns] for each in self.events]
@@ -596,8 +583,6 @@ def _arrow(direction: Any) -> str:
 
 def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int]) -> tuple[Array, Array, Array]:
     """Times (n,), states (n, 6) and directions (n,) as arrays, also where there are none."""
-    import numpy
-
     return (
         numpy.array(times) if len(times) else numpy.empty(0),
         numpy.array(states) if len(states) else numpy.empty((0, 6)),

@@ -245,7 +245,7 @@ def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict
         return metrics
     times = tuple(time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits))
     # another package's integrator may not do the same again
-    again = _again if reruns.integrator.supports_ensemble else _again.__wrapped__
+    again = _again if reruns.integrator.ensemble else _again.__wrapped__
     found, escaped = again(case, reruns, times)
     metrics = banded(run, metrics, found)
     escapes = [abs(each) for each in escaped if each is not None]

@@ -17,8 +17,7 @@ from heavytop.features.hunt.search import hunt as search
 from heavytop.features.hunt.text import hunt_text
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import close_all
-from heavytop.integrate.registry import named
-from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.integrate.registry import described, named
 from heavytop.precision import DOUBLE_DOUBLE, Precision, as_integer, exact, physical, time_text
 
 _MOST = 1_000_000
@@ -100,7 +99,7 @@ def hunt(
         raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
     if other is not None and other == which:
         raise InputError("An integrator is not hunted against itself.", "Give another with --against, or none.")
-    pair = ChosenIntegrator.of(which), None if other is None else ChosenIntegrator.of(other)
+    pair = described(which), None if other is None else described(other)
     asked = Asked(pair[0], form, time, family, pair[1], beyond, motions, seconds, _seed(seed))
     try:
         hunted = search(asked, arguments.callback(advance, "advance"))

@@ -13,8 +13,9 @@ from heavytop.features.hunt.search import Asked, Hunted, command_of, hunt, keep,
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, failed
+from heavytop.integrate.registry import described
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, exact_text, parse, time_text
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
@@ -107,7 +108,7 @@ def _asked(task: Task) -> Asked:
         task.precision,
         Fraction(exact(horizon)),
         family,
-        ChosenIntegrator(against) if against else None,
+        described(against) if against else None,
         float(exact(limit)) if limit else None,
         budget,
         seed=seed + task.seed,

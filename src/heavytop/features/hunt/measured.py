@@ -25,9 +25,8 @@ from heavytop.harness.sweeps import Random
 from heavytop.integrate import registry
 from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
 from heavytop.integrate.peers.command import Command, begin_row
-from heavytop.integrate.registry import is_third_party
+from heavytop.integrate.registry import Integrator, is_third_party
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, Vector, dot, exact, number, real, round_to
 from heavytop.processes import GuardedProcess
 from heavytop.records import FAILED, OUT_OF_TIME
@@ -52,15 +51,14 @@ class IntegratedRun(NamedTuple):
 
 
 def follow(
-    integrator: ChosenIntegrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
+    integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
 ) -> IntegratedRun:
     """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
     try:
-        if integrator.supports_ensemble or isinstance(integrator.source, Command):
+        if integrator.ensemble or isinstance(integrator.source, Command):
             run = integrator.propagate(top, start, times, precision, system_of(None, top), again=False)
         else:
-            which: Any = integrator.which
-            run = _ready(which)(top, start, times, precision, system=system_of(None, top))
+            run = _ready(integrator)(top, start, times, precision, system=system_of(None, top))
     except InputError:
         raise
     except HeavyTopError as error:
@@ -70,9 +68,9 @@ def follow(
 
 
 @lru_cache(maxsize=4)
-def _ready(which: Any) -> registry.Peer:
+def _ready(integrator: Integrator) -> registry.Peer:
     """The integrator, looked up once."""
-    return registry.ready(which)
+    return registry.ready(integrator)
 
 
 class Apart:
@@ -81,7 +79,7 @@ class Apart:
     What the integrator started ends with its process.
     """
 
-    def __init__(self, integrator: ChosenIntegrator, seconds: float = SECONDS) -> None:
+    def __init__(self, integrator: Integrator, seconds: float = SECONDS) -> None:
         self._integrator, self._seconds = integrator, seconds
         self._process: GuardedProcess | None = None
 
@@ -118,7 +116,7 @@ class Apart:
             process.end()
 
 
-def _hello(integrator: ChosenIntegrator) -> int:
+def _hello(integrator: Integrator) -> int:
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
     with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
@@ -447,7 +445,7 @@ class Meter:
     """Measures motions with one integrator, and with the one that it is compared with."""
 
     def __init__(
-        self, integrator: ChosenIntegrator, precision: Precision, horizon: Fraction, against: ChosenIntegrator | None
+        self, integrator: Integrator, precision: Precision, horizon: Fraction, against: Integrator | None
     ) -> None:
         self.integrator, self.precision, self.horizon, self.against = integrator, precision, horizon, against
         self.times = [exact(number(horizon * i / SAMPLES, precision)) for i in range(1, SAMPLES + 1)]
@@ -482,7 +480,7 @@ class Meter:
                 measured.append(MeasuredMotion(motion, outcome, error, grown, turns, other, run.said))
         return measured
 
-    def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> IntegratedRun:
+    def run_of(self, integrator: Integrator, motion: Motion) -> IntegratedRun:
         """One run of the integrator that is hunted, or of another."""
         if integrator == self.integrator and self._apart is not None:
             return self._apart.follow(*motion, self.times, self.precision)
@@ -495,9 +493,9 @@ class Meter:
         return replace(found, amplification=max(largest, found.amplification))
 
     def _runs(
-        self, integrator: ChosenIntegrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
+        self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
     ) -> list[IntegratedRun]:
-        if integrator.supports_ensemble:
+        if integrator.ensemble:
             runs = integrator.propagate_many(problems, self.times, threads=1)
             return [IntegratedRun(run.outcome.value, run.states) for run in runs]
         if apart is not None:

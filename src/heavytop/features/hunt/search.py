@@ -39,8 +39,9 @@ from heavytop.features.hunt.measured import (
 from heavytop.files import replace
 from heavytop.harness.case_text import forms
 from heavytop.harness.plan import Top, document_of
+from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import Precision, decimal_text, shown, time_text
@@ -246,7 +247,7 @@ class Proof:
     proven: bool
 
 
-def proof(meter: Meter, found: MeasuredMotion, other: ChosenIntegrator) -> Proof:
+def proof(meter: Meter, found: MeasuredMotion, other: Integrator) -> Proof:
     """The error of a found motion and of ``other`` on it, against the best that is known of it.
 
     Raises Contradiction where two proofs exclude each other.
@@ -310,11 +311,11 @@ class Asked:
     for two decades beyond what is explained.  first: motions that are measured before all others.
     """
 
-    integrator: ChosenIntegrator
+    integrator: Integrator
     precision: Precision
     horizon: Fraction
     family: Family = "any"
-    against: ChosenIntegrator | None = None
+    against: Integrator | None = None
     limit: float | None = None
     budget: int | None = None
     seconds: float | None = None
@@ -327,12 +328,12 @@ class Asked:
         return float(self.precision.eps) * math.pow(max(float(abs(self.horizon)), 1e-3), 1.5)
 
     @property
-    def other(self) -> ChosenIntegrator:
+    def other(self) -> Integrator:
         """The integrator shown beside: heyoka, or multiword where heyoka is hunted or lacks the format."""
         if self.against is not None:
             return self.against
         own = self.integrator.name == HEYOKA or self.precision.name == "double-double"
-        return ChosenIntegrator(MULTIWORD if own else HEYOKA)
+        return described(MULTIWORD if own else HEYOKA)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 from heavytop.features.hunt.measured import MeasuredMotion, class_of, special
 from heavytop.features.hunt.search import DECADES, Hunted, Proof, digits_lost, ratio
-from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.integrate.registry import Integrator
 from heavytop.precision import time_text
 
 _WIDTH = 80
@@ -100,7 +100,7 @@ def _right(error: float, eps: float) -> str:
     return f"{-math.log10(eps) - digits_lost(error, eps):.1f}"
 
 
-def _beside(other: ChosenIntegrator, p: Proof, eps: float) -> str:
+def _beside(other: Integrator, p: Proof, eps: float) -> str:
     if p.other is None:
         return f"How many digits of {other.name} are right here is not known."
     if math.isinf(p.other):

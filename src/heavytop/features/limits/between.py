@@ -14,7 +14,8 @@ from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError
-from heavytop.integrate.registry import Setup, propagator
+from heavytop.integrate.frames import Setup
+from heavytop.integrate.registry import propagator
 from heavytop.precision import Array, decimal_text, exact, exact_text
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System

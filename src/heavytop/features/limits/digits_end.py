@@ -19,7 +19,8 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint, radius, whole_evaluation, working_precision
-from heavytop.integrate.registry import Setup, propagator
+from heavytop.integrate.frames import Setup
+from heavytop.integrate.registry import propagator
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, real
 from heavytop.top.bodies import Body

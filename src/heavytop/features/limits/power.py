@@ -19,7 +19,8 @@ from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
-from heavytop.integrate.registry import Setup, named, propagator
+from heavytop.integrate.frames import Setup
+from heavytop.integrate.registry import named, propagator
 from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact, exact_text, real
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, System

@@ -21,10 +21,10 @@ from heavytop.features.local_error.measurement import (
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
-from heavytop.integrate.registry import is_third_party, load
+from heavytop.integrate.registry import Integrator, is_third_party, load
 from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import OBSERVED_ORDER, ORDER_OF_RUNS
 from heavytop.precision import decimal_text, exact, parse
@@ -79,8 +79,8 @@ class LocalErrorKind(Kind):
         if not task.integrator.one_step:
             return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
-        if task.integrator.capabilities.steps:
-            run, taken = load(task.integrator.capabilities.steps)(*given, system=case.system)
+        if task.integrator.steps:
+            run, taken = load(task.integrator.steps)(*given, system=case.system)
             steps = zip(run.times, taken, strict=True)
         else:
             run, steps = single_calls(task.integrator, *given, case.system)
@@ -91,7 +91,7 @@ class LocalErrorKind(Kind):
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         row = msgspec.structs.replace(row, samples=error.running.count)
-        if task.integrator.capabilities.own:
+        if task.integrator.own:
             return row
         if run.outcome is Outcome.SUCCESS:
             row = msgspec.structs.replace(row, metrics=row.metrics | _order_of_runs(task, run))
@@ -114,9 +114,9 @@ class LocalErrorKind(Kind):
         yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
 
 
-def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
+def _of_runs(task: Task, integrator: Integrator) -> Row:
     """The row of a method with a memory: the error at the end, and the order that whole runs show."""
-    if integrator.control is None:
+    if integrator.set_to is None:
         raise Unsupported(
             f"{integrator.name} declares that it keeps a memory, and is set by a tolerance: there is no order, and no "
             "single step.",
@@ -133,7 +133,7 @@ def _of_runs(task: Task, integrator: ChosenIntegrator) -> Row:
 def _order_of_runs(task: Task, run: Trajectory) -> dict[str, Metric]:
     """The order that whole runs show, of a method with fixed steps; none where they do not agree on one."""
     integrator = stepped(task.integrator)
-    order = None if integrator.control is None else order_of_runs(integrator, run)
+    order = None if integrator.set_to is None else order_of_runs(integrator, run)
     return {} if order is None else by_name({ORDER_OF_RUNS: of_fraction(Fraction(max(round(order), 0)), "value")})
 
 

@@ -26,8 +26,8 @@ from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation,
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.peers.contract import DEFAULT_STEP
+from heavytop.integrate.registry import Integrator
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
-from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
 from heavytop.measure.scorer import OBSERVED_ORDER, Running, Sums
 from heavytop.precision import Precision, decimal_text, exact, number
@@ -147,7 +147,7 @@ _UNSEEN = 10
 
 
 def single_calls(
-    integrator: ChosenIntegrator, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
+    integrator: Integrator, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
 ) -> tuple[Trajectory, list[tuple[Fraction, Call]]]:
     """A run to ``until`` > 0, and 16 calls, each with the time at which it ends; none where a run failed.
 
@@ -162,12 +162,12 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = integrator.control is not None
-    length = integrator.control[1] if integrator.control else until / max(whole.steps, 1)
+    fixed = integrator.set_to is not None
+    length = integrator.set_to[1] if integrator.set_to else until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
         tau = exact(number(n * length, precision))
-        asked = replace(integrator, control=("step", tau)) if fixed else integrator
+        asked = replace(integrator, set_to=("step", tau)) if fixed else integrator
         return asked.propagate_many(problems, [tau])
 
     own = over(1)
@@ -188,14 +188,14 @@ def single_calls(
     return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
 
 
-def stepped(integrator: ChosenIntegrator) -> ChosenIntegrator:
+def stepped(integrator: Integrator) -> Integrator:
     """With the step 1/100 where it has fixed steps and none is given."""
-    if integrator.control is not None or registry.control_name(integrator.which) != "step":
+    if integrator.set_to is not None or registry.control_name(integrator) != "step":
         return integrator
-    return replace(integrator, control=("step", DEFAULT_STEP))
+    return replace(integrator, set_to=("step", DEFAULT_STEP))
 
 
-def _require_count(integrator: ChosenIntegrator, run: Trajectory) -> None:
+def _require_count(integrator: Integrator, run: Trajectory) -> None:
     """Raises Unsupported where the steps of a run are not counted, PeerFailed where it moved in none."""
     if NOT_COUNTED.items() <= run.flags.items():
         raise Unsupported(f"{integrator.name} does not say how many steps it takes.", "Say it: `done steps N`.")
@@ -244,21 +244,21 @@ _COARSENED = (1, 2, 3, 4, 5, 6)
 _AGREE = 0.3
 
 
-def order_of_runs(integrator: ChosenIntegrator, whole: Trajectory) -> float | None:
+def order_of_runs(integrator: Integrator, whole: Trajectory) -> float | None:
     """The order that the ends of whole runs at h, h/2, h/4 show, and of finer ones where they do not agree on one.
 
     integrator: with the step h of the run ``whole``.  Where the errors at these steps are of rounding, coarser ones are
     taken.  None where no two orders in succession agree.
     """
-    assert integrator.control is not None
-    step, p, until = integrator.control[1], whole.problem, whole.times[-1]
+    assert integrator.set_to is not None
+    step, p, until = integrator.set_to[1], whole.problem, whole.times[-1]
     top, start = p.given or (p.top, p.start)
     size: Fraction = max(map(abs, p.start.flat))
 
     def error(place: int) -> Fraction | None:
         """At the step h 2^place; None where the run fails, or rounding may have made it."""
         taken = step * Fraction(2) ** place
-        refined = replace(integrator, control=("step", taken))
+        refined = replace(integrator, set_to=("step", taken))
         try:
             run = refined.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
         except PeerFailed:

@@ -7,10 +7,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.cases import Case
 from heavytop.features.survey.measured import Chunk
@@ -21,10 +22,6 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
 from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, RowKey, Spread, Worst, by_name
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # The file of a survey: one Parquet row group a chunk, one row a motion.
 
@@ -99,7 +96,7 @@ _MOST_BINS = 2000
 _FIRST = ("omega", "gamma", "inertia", "moment", "rotor")
 
 
-def histogram(values: NDArray[np.float64]) -> Histogram | None:
+def histogram(values: NDArray[numpy.float64]) -> Histogram | None:
     """The histogram of the values above 0; None without any."""
     positive = values[values > 0]
     if not len(positive):
@@ -117,7 +114,7 @@ def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def cell_map(
-    x: tuple[str, NDArray[np.float64]], y: tuple[str, NDArray[np.float64]], lost: NDArray[np.float64]
+    x: tuple[str, NDArray[numpy.float64]], y: tuple[str, NDArray[numpy.float64]], lost: NDArray[numpy.float64]
 ) -> CellMap | None:
     """Medians over at most 24 by 24 cells; cells of single values where there are no more of them.  NaN is left out."""
     kept = numpy.isfinite(lost) & numpy.isfinite(x[1]) & numpy.isfinite(y[1])
@@ -141,7 +138,7 @@ def cell_map(
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
 
-def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _edges(values: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     single = numpy.unique(values)
     if len(single) > _CELLS:
         return numpy.linspace(single[0], single[-1], _CELLS + 1)
@@ -248,7 +245,7 @@ class Gathered:
         return cell_map(x, y, lost)
 
 
-def _quantiles(quantity: Quantity, values: NDArray[np.float64]) -> dict[Quantity, Metric]:
+def _quantiles(quantity: Quantity, values: NDArray[numpy.float64]) -> dict[Quantity, Metric]:
     """Order statistics of sorted values, with half the width in decades of the 95 % interval of each by its ranks."""
     quantiles: dict[Quantity, Metric] = {}
     n = len(values)

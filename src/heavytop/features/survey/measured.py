@@ -12,9 +12,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.cases import Case
 from heavytop.errors import Contradiction, PeerFailed
@@ -22,17 +23,14 @@ from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Lazy, Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
 from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
+from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # A chunk of a sweep as arrays: the tops and starts that the sweep's cases have, rounded to the format.
 
@@ -146,7 +144,7 @@ def _integrals(case: Case) -> tuple[Integral, ...]:
     return holding(case.top, case.start, case.system)
 
 
-def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rounded(numbers: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
 
     All of them are below 2^53, so that each quotient is the exact number rounded once.
@@ -156,7 +154,7 @@ def _rounded(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     return numpy.hstack([thousandths, moment, numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
 
 
-def _problem(numbers: NDArray[np.float64]) -> Problem:
+def _problem(numbers: NDArray[numpy.float64]) -> Problem:
     i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
     given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
     return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)
@@ -191,7 +189,7 @@ Columns = dict[str, Any]
 
 
 def measured(
-    drawn: Drawn, integrator: ChosenIntegrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+    drawn: Drawn, integrator: Integrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
 ) -> Columns:
     """Each quantity over the motions.  Errors of Ω are in 1/time unit, drifts in units of the integral; NaN where a run
     or its reference did not reach the horizon.
@@ -217,13 +215,13 @@ def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> boo
 
 
 def _runs(
-    integrator: ChosenIntegrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+    integrator: Integrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
 ) -> tuple[Any, Pairs, Any]:
     """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
     count = len(drawn.problems)
     outcomes, steps = numpy.full(count, Outcome.SUCCESS.value, object), numpy.zeros(count, int)
     states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
-    if integrator == ChosenIntegrator(HEYOKA) and _usual(drawn, times, precision):
+    if integrator == described(HEYOKA) and _usual(drawn, times, precision):
         given = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
         found, steps, good = states_on_a_grid(drawn.system, *given, times, **options)
         states = Pairs(found, numpy.zeros_like(found))
@@ -239,10 +237,10 @@ def _runs(
 
 
 def _one_by_one(
-    integrator: ChosenIntegrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
+    integrator: Integrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
 ) -> list[tuple[str, Sequence[Any], int]]:
     """Outcome, states and steps of each, by the integrator's own ensembles where it has them."""
-    if integrator.supports_ensemble:
+    if integrator.ensemble:
         many = integrator.propagate_many(problems, times, threads=1, **options)
         return [(run.outcome.value, run.states, run.steps) for run in many]
     runs = [_alone(integrator, problem, times, options) for problem in problems]
@@ -253,7 +251,7 @@ def _one_by_one(
 
 
 def _alone(
-    integrator: ChosenIntegrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
+    integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
 ) -> tuple[str, Sequence[Any], int] | PeerFailed:
     """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
     try:

@@ -158,7 +158,7 @@ class WorkPrecision(Kind):
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # found before the runs: looking through the installed packages empties the caches of the processor
-        peer = registry.ready(task.integrator.which, _setting(task.key.subject))
+        peer = registry.ready(task.integrator, _setting(task.key.subject))
 
         def integrate(times: Any, start: State = case.start) -> Trajectory:
             top = problem.top if case.system is GYROSTAT and start is not case.start else case.top
@@ -184,7 +184,7 @@ class WorkPrecision(Kind):
             run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
         row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
-        if done and not task.integrator.capabilities.own and (text := doubtful_counts(run, error)):
+        if done and not task.integrator.own and (text := doubtful_counts(run, error)):
             return msgspec.structs.replace(row, explained=Explained("steps", text))
         return with_explanation(row, task, run, scorer)
 
@@ -195,7 +195,7 @@ class WorkPrecision(Kind):
         # more of them where seconds are to be compared
         end, how = task.times[-1:], _FOR_COMPARISON if task.options.timings else _USUAL
         name = task.integrator.name
-        if not task.integrator.capabilities.own and sampled.outcome is Outcome.SUCCESS:
+        if not task.integrator.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
             counted = replace(alone, times=sampled.times, states=sampled.states)
             require_counts(name, counted, _setting(task.key.subject))

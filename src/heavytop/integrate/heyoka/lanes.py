@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from threading import Event, Semaphore
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.extras import import_heyoka
 from heavytop.integrate.heyoka.engines import arrays, compiled, not_finite
@@ -23,10 +24,6 @@ from heavytop.integrate.heyoka.motions import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, OrderedRing, exact
 from heavytop.top.equations import System
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # steps between two looks near a sample; a look costs as much as about ten
 _WINDOW = 64
@@ -140,9 +137,9 @@ class _Run(LaneRun):
 class _Ends(NamedTuple):
     """The last step ends of all lanes: states (n, lanes), both words of the times, steps taken."""
 
-    states: NDArray[np.float64]
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
+    states: NDArray[numpy.float64]
+    high: NDArray[numpy.float64]
+    low: NDArray[numpy.float64]
     steps: Any
 
 
@@ -335,8 +332,8 @@ LANES = 8
 
 def states_on_a_grid(
     system: System,
-    parameters: NDArray[np.float64],
-    starts: NDArray[np.float64],
+    parameters: NDArray[numpy.float64],
+    starts: NDArray[numpy.float64],
     times: Sequence[Fraction],
     **options: Any,
 ) -> tuple[Any, Any, Any]:

@@ -18,6 +18,7 @@ from heavytop.integrate.trajectory import (
     Outcome,
     Problem,
     ResumePoint,
+    SampledRun,
     TaylorStep,
     Trajectory,
     sampled,
@@ -45,11 +46,8 @@ _SLOWEST, _FASTEST = Fraction(1, 2**48), Fraction(2) ** 55
 
 
 @dataclass(slots=True)
-class Stepper:
-    """One run of a compiled integrator, advanced step by step to wherever the next sample lies.
-
-    between: called between chunks; it may raise to give the run up.
-    """
+class Stepper(SampledRun):
+    """One run of a compiled integrator, advanced step by step to wherever the next sample lies."""
 
     engine: Any
     forwards: bool
@@ -66,18 +64,14 @@ class Stepper:
     _before: Any = None
     _not_finite: Any = field(default_factory=not_finite)
 
-    def reach(self, target: OrderedRing) -> Outcome:
-        """Step until the polynomial of the last step covers ``target``."""
-        while self.rest is None and not (self._covers and self._beyond(target)):
-            if self.step_limit is not None and self.steps >= self.step_limit:
-                return Outcome.STEP_LIMIT
-            if self.between is not None:
-                self.between()
-            count = self._steps_short_of(target)
-            outcome = self.single() if count < 2 else self._several(count, target)
-            if outcome is not Outcome.SUCCESS:
-                return outcome
-        return Outcome.SUCCESS
+    def covers(self, target: OrderedRing) -> bool:
+        """Whether the polynomial of the last step covers ``target``, or the motion is at rest."""
+        return self.rest is not None or (self._covers and self._beyond(target))
+
+    def advance(self, target: OrderedRing, most: int | None) -> Outcome:
+        """One step, or as many as lie before ``target`` in a quarter of a second."""
+        count = self._steps_short_of(target) if most is None else min(self._steps_short_of(target), most)
+        return self.single() if count < 2 else self._several(count, target)
 
     def at(self, target: Any, time: Fraction | None = None) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach` and, where that is success, the state there."""
@@ -90,15 +84,13 @@ class Stepper:
         return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
 
     def _steps_short_of(self, target: OrderedRing) -> int:
-        """How many steps as long as the longest lie before the target, the step limit and a quarter of a second."""
+        """How many steps as long as the longest lie before the target and a quarter of a second."""
         distance = float(target - self.engine.time)
         if not self.forwards:
             distance = -distance
         if self._one_by_one or not self._largest_step or distance < 2 * self._largest_step:
             return 1
         count = min(distance / self._largest_step, CHUNK_SECONDS / self._seconds_per_step, _GROWTH * max(self.steps, 1))
-        if self.step_limit is not None:
-            count = min(count, self.step_limit - self.steps)
         return int(count)
 
     def single(self) -> Outcome:

@@ -14,13 +14,14 @@ from functools import partial
 from itertools import permutations
 from math import ceil
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError
 from heavytop.guard import processors
-from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind
+from heavytop.integrate.ensemble import in_threads, one_kind
 from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (
@@ -30,7 +31,7 @@ from heavytop.integrate.multiword.motions import (
     native_state,
     sums_of_two,
 )
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
@@ -40,10 +41,6 @@ from heavytop.multiword.problem import Scaled
 from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import check_times
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 _FIRST_CHUNK = 64
 _RISE = 2
@@ -220,7 +217,7 @@ def propagate_multiword_ensemble(
     problems: Sequence[Problem],
     times: Sequence[Any],
     *,
-    observer: Observer | None = None,
+    observer: EnsembleObserver | None = None,
     finished: Finished | None = None,
     threads: int | None = None,
     step_limit: int | None = None,
@@ -288,8 +285,8 @@ _SPLIT = 134217729.0
 class Pairs:
     """high + low, arrays of one shape with |low| <= ulp(high)/2."""
 
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
+    high: NDArray[numpy.float64]
+    low: NDArray[numpy.float64]
 
     @classmethod
     def of(cls, value: Pairs | Doubles | float) -> Pairs:
@@ -394,8 +391,8 @@ _UNITS = numpy.eye(6).tolist()
 
 
 def double_double_states(
-    parameters: NDArray[np.float64],
-    starts: NDArray[np.float64],
+    parameters: NDArray[numpy.float64],
+    starts: NDArray[numpy.float64],
     times: Sequence[Fraction],
     tolerance: Fraction,
     step_limit: int,
@@ -421,7 +418,7 @@ class _Grid:
     states.
     """
 
-    def __init__(self, parameters: NDArray[np.float64], starts: NDArray[np.float64], times: Any) -> None:
+    def __init__(self, parameters: NDArray[numpy.float64], starts: NDArray[numpy.float64], times: Any) -> None:
         constants = _constants(parameters)
         gamma = _power_above(numpy.abs(starts[:, 3:]).max(axis=1))
         torque = numpy.abs(constants[3:, 0]).max(axis=0) * 2.0**gamma
@@ -442,7 +439,7 @@ class _Grid:
         """Motions of which double-double keeps every component, that do not rest."""
         state, constants = numpy.abs(self.begin), numpy.abs(self.constants[:, 0].T)
 
-        def above(values: NDArray[np.float64], bits: int) -> Any:
+        def above(values: NDArray[numpy.float64], bits: int) -> Any:
             return ((values == 0) | (values > 2.0**-bits)).all(axis=1)
 
         clear = above(state, TINY_BITS // 2 - 1) & above(constants, TINY_BITS // 2 - 1)
@@ -485,7 +482,7 @@ class _Grid:
         return Pairs(total, low - (total - high))
 
 
-def _constants(parameters: NDArray[np.float64]) -> Doubles:
+def _constants(parameters: NDArray[numpy.float64]) -> Doubles:
     """The coefficients of Ω × Ω and of the linear part, read off the field, three words each: (k, 3, motions)."""
     numbers = [Numerators(column, numpy.zeros(1)) for column in parameters.T]
     given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
@@ -498,7 +495,7 @@ def _constants(parameters: NDArray[np.float64]) -> Doubles:
     return numpy.array([*products, *(rate(component, source) for _, component, source in terms(HEAVY_TOP))])
 
 
-def _power_above(values: NDArray[np.float64]) -> Any:
+def _power_above(values: NDArray[numpy.float64]) -> Any:
     """log2 of the least powers of two that are not less; 0 for 0."""
     part, exponent = numpy.frexp(values)
     return exponent - (part == 0.5)

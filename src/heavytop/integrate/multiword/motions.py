@@ -9,6 +9,8 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
+import numpy
+
 from heavytop.errors import InputError, OutOfReach
 from heavytop.extras import import_heyoka
 from heavytop.integrate.multiword.engines import choose, compiled
@@ -18,6 +20,7 @@ from heavytop.integrate.trajectory import (
     Outcome,
     Problem,
     ResumePoint,
+    SampledRun,
     Trajectory,
     sampled,
     trajectory_of,
@@ -156,8 +159,6 @@ def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
 
     What is too small for the format becomes 0, as in the format's own arithmetic.
     """
-    import numpy
-
     values = []
     for value in state:
         try:
@@ -205,8 +206,6 @@ def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precisi
 
 def _outside(values: Doubles, least: float, most: float) -> Any:
     """The rows in which some number is neither 0 nor of a size between the two."""
-    import numpy
-
     sizes = abs(values)
     if sizes.min(initial=most) > least and sizes.max(initial=0) < most:
         return numpy.zeros(len(sizes), bool)
@@ -227,8 +226,6 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
     Those on the grid that fit into ``bits`` bits add up exactly; where the others do too, only their sum is rounded.
     """
     heyoka = import_heyoka()
-    import numpy
-
     zero, first = heyoka.real(0, bits), min(grid.words - 1, (bits - _SLACK) // grid.bits)
     # a double has 53 bits: of a larger one none is lost behind what the others begin with
     least = 2.0 ** max(-1000, DOUBLE.bits + _SLACK - grid.bits * first - bits)
@@ -256,8 +253,6 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     only exact numbers tell.
     """
     heyoka = import_heyoka()
-    import numpy
-
     each = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
         return _reals(each, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
@@ -286,13 +281,11 @@ def _widening(precision: Precision) -> Callable[[float], Any]:
         heyoka = import_heyoka()
 
         return lambda value: heyoka.real(value, precision.bits)
-    import numpy
-
     return numpy.longdouble if precision.family == "extended" else numpy.float64
 
 
 @dataclass(slots=True)
-class _Pace:
+class _Pace(SampledRun):
     """A run advanced in chunks, in the units of the problem."""
 
     run: ResumableRun
@@ -312,31 +305,24 @@ class _Pace:
         """Where the last step ended."""
         return self.run.time / self.scaled.rate * (1 if self.run.forwards else -1)
 
-    def reach(self, target: Fraction) -> Outcome:
-        """Step until the last step covers ``target``; there are no steps at an equilibrium."""
-        goal = abs(target) * self.scaled.rate
-        while not self.scaled.rest and self.run.time < goal:
-            most = self._chunk
-            if self.step_limit is not None:
-                most = min(most, self.step_limit - self.run.steps)
-            if most <= 0:
-                return Outcome.STEP_LIMIT
-            if self.between is not None:
-                self.between()
-            began, before = perf_counter(), self.run.steps
-            status = self.run.advance(goal, most)
-            if status is not Status.OK:
-                return OUTCOMES[status]
+    def covers(self, target: Fraction) -> bool:
+        """Whether the last step covers ``target``; there are no steps at an equilibrium."""
+        return self.scaled.rest or self.run.time >= abs(target) * self.scaled.rate
+
+    def advance(self, target: Fraction, most: int | None) -> Outcome:
+        """A chunk of steps of a quarter of a second, or fewer."""
+        chunk = self._chunk if most is None else min(self._chunk, most)
+        began, before = perf_counter(), self.run.steps
+        status = self.run.advance(abs(target) * self.scaled.rate, chunk)
+        if status is Status.OK:
             a_step = (perf_counter() - began) / max(1, self.run.steps - before)
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
-        return Outcome.SUCCESS
+        return OUTCOMES[status]
 
     def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, int, Callable[[], Array]]:
         """The outcome, how many of many times are reached, and what makes the states there, as from :meth:`reach` and
         :meth:`sample`, in few calls.
         """
-        import numpy
-
         if targets[0] == 0:
             outcome, count, make = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
@@ -364,8 +350,6 @@ class _Pace:
         """How it ended, how many times are reached, by their rows the states that only exact numbers tell, and what
         makes all others: to make reals takes longer than to sample.
         """
-        import numpy
-
         assert isinstance(self.run, Floating)
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
@@ -394,8 +378,6 @@ class _Pace:
         return self.run.status, count, others, make
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
-        import numpy
-
         assert isinstance(self.run, Fixed)
         given, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
         times: Doubles = given.astype(float)
@@ -415,8 +397,6 @@ class _Pace:
 
     def at(self, target: Any, time: Fraction) -> tuple[Outcome, Any]:
         """The outcome of :meth:`reach`, and the state at ``time``, rounded; None where it cannot be given."""
-        import numpy
-
         outcome, precision = self.reach(time), self.precision
         if outcome is not Outcome.SUCCESS:
             return outcome, None

@@ -28,11 +28,10 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.guard import Guard, how_it_ended
+from heavytop.guard import Guard, how_it_ended, stopwatch
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
-from heavytop.processes import stopwatch
 from heavytop.records import UNRESOLVED_SECONDS
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -714,11 +713,7 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them within 20 s, or why it cannot be started."""
-    seconds = str(min(command.seconds, _GREETING))
-    try:
-        program = Session(msgspec.structs.replace(command, timeout=seconds))
-    except PeerFailed as error:
-        return f"not started: {error.cause}"
+    """Name and version as the program says them; raises PeerFailed where it does not within 20 s."""
+    program = Session(msgspec.structs.replace(command, timeout=str(min(command.seconds, _GREETING))))
     program.close(_FAREWELL)
     return program.greeting

@@ -27,9 +27,9 @@ from typing import Any, Literal
 import numpy
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
+from heavytop.guard import stopwatch
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, Vector, cross, decimal_text, dot, exact, number
-from heavytop.processes import stopwatch
 from heavytop.top.attitude import near_quaternion, perpendicular, rotation_of, rows_of
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State

@@ -341,7 +341,7 @@ def _curve(row: Identity) -> tuple[str, str, str]:
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
-    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, key.precision) if part)
+    inside = ", ".join(part for part in (clip(row.program, 40), key.subject.asked, key.precision) if part)
     end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
     return f"{_case(row)}{end} ({inside})"
 
@@ -397,7 +397,8 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                 before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
                     steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
-                    where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
+                    first = next(iter(rows))
+                    where = f"{_case(first)} from {steps} steps ({clip(first.program, 40)}, {precision})"
                     text = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
                     yield name, after - before, Sentence(text, frozenset(rows))
 

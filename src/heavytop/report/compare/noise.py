@@ -137,30 +137,22 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Lookup:
-    """The limits of each metric of a policy, each worked out once."""
+    """The limits of each metric of a policy, each looked up once.  usual: of what no rule is about."""
 
     def __init__(self, policy: Policy) -> None:
-        self._policy = policy
-        self._patterns = [(glob(r.measure), glob(r.case), glob(r.metric)) for r in policy.rule]
-        self._of_rule = [_limits(rule, policy) for rule in policy.rule]
-        self._of_rest = _limits(Rule(), policy)
-        self._found: dict[tuple[tuple[int, ...], str], Limits] = {}
+        self.usual = _limits(Rule(), policy)
+        self._rules = [(glob(r.measure), glob(r.case), glob(r.metric), _limits(r, policy)) for r in policy.rule]
+        self._known: dict[tuple[str, str, str], Limits] = {}
 
-    def row(self, measure: str, case: str) -> tuple[int, ...]:
-        """The rules that are about a row."""
-        return tuple(
-            index for index, (m, c, _) in enumerate(self._patterns) if m.fullmatch(measure) and c.fullmatch(case)
-        )
-
-    def metric(self, rules: tuple[int, ...], name: str) -> Limits:
-        """The limits of a metric in a row that these rules are about."""
-        if not rules:
-            return self._of_rest
-        key = rules, name
-        if key not in self._found:
-            first = next((i for i in rules if self._patterns[i][2].fullmatch(name)), None)
-            self._found[key] = self._of_rest if first is None else self._of_rule[first]
-        return self._found[key]
+    def __call__(self, measure: str, case: str, metric: str) -> Limits:
+        """The limits of a metric: those of the first rule that is about it."""
+        if not self._rules:
+            return self.usual
+        key = measure, case, metric
+        if key not in self._known:
+            about = (each for *patterns, each in self._rules if all(map(re.Pattern.fullmatch, patterns, key)))
+            self._known[key] = next(about, self.usual)
+        return self._known[key]
 
 
 def load(path: Path) -> Policy:

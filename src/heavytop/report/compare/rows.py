@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from fractions import Fraction
 from statistics import median
 from typing import Any, Literal
@@ -273,15 +274,18 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
     def to_json(self) -> dict[str, Any]:
         """The row of `compare --json`."""
+        versions = {"versions": self.row.versions} if self.row.versions else {}
         return self.row.named | {
             "metric": self.metric,
             "verdict": self.verdict.value,
             "baseline": self.baseline,
             "candidate": self.candidate,
             "reason": self.reason,
+            **versions,
         }
 
 
+@dataclass
 class RowComparison:
     """Compares rows under one policy.
 
@@ -291,37 +295,30 @@ class RowComparison:
     checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
-    def __init__(
-        self,
-        policy: Policy,
-        kinds: Kinds,
-        timed: bool,
-        list_same: bool,
-        checked: tuple[bool, bool] = (False, False),
-        repeated: bool = False,
-    ) -> None:
-        self.policy = policy
-        self.kinds = kinds
-        self.list_same = list_same
-        self.checked = checked
-        self.same = 0
-        self.failed: list[Row] = []
-        self.lookup = Lookup(policy)
-        self.timed = timed
-        self.repeated = repeated
+    policy: Policy
+    kinds: Kinds
+    timed: bool
+    list_same: bool
+    checked: tuple[bool, bool] = (False, False)
+    repeated: bool = False
+    same: int = field(default=0, init=False)
+    failed: list[Row] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        self.lookup = Lookup(self.policy)
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
-        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.key.kind, row.case), "").ignore
+        return self.limits(row, "").ignore
 
     def limits(self, row: Row, metric: str) -> Limits:
         """The limits of a metric of a row."""
-        rules = self.lookup.row(row.key.kind, row.case) if self.policy.rule else ()
-        return self.lookup.metric(rules, metric)
+        return self.lookup(row.key.kind, row.case, metric)
 
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
-        key = old.identity
+        versions = old.key.subject.version, new.key.subject.version
+        key = old.identity._replace(versions=versions) if all(versions) else old.identity
         if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
             return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
         if (judged := self._outcomes(old, new)) is not None:
@@ -332,18 +329,17 @@ class RowComparison:
             return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
         if new.outcome != SUCCESS and not self.ignores(old):
             self.failed.append(new)
-        rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
-        findings = self._metrics(key, rules, old, new)
+        findings = self._metrics(key, old, new)
         if old.laws or new.laws:
-            findings += self._laws(key, rules, old, new)
+            findings += self._laws(key, old, new)
         if old.series:
-            findings += self._series(key, rules, old, new)
+            findings += self._series(key, old, new)
         if not self.ignores(old):
             findings += self._row(key, old, new)
         if self.repeated and BAND in old.seconds:
-            findings += self._repeated(key, rules, old, new)
+            findings += self._repeated(key, old, new)
         elif self.timed:
-            findings += self._seconds(key, rules, old, new)
+            findings += self._seconds(key, old, new)
         return findings
 
     def _whole(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
@@ -361,26 +357,25 @@ class RowComparison:
             return None
         if other_request(old, new) or (None not in (old.data, new.data) and other_data(old.data, new.data)):
             return None
-        judged = judge_outcomes(old, new, self.lookup.metric((), "").duration)
+        judged = judge_outcomes(old, new, self.lookup.usual.duration)
         return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
 
     def _limits(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """Findings of metrics beyond their limits in a row that has no numbers in the baseline."""
         if new.outcome == SUCCESS and self.policy.rule:
-            rules = self.lookup.row(old.key.kind, old.case)
             for name, metric in new.metrics.items():
-                limits = self.lookup.metric(rules, name)
+                limits = self.limits(old, name)
                 if not limits.ignore and (judged := beyond_limit(metric, limits)) is not None:
                     yield Finding(key, name, judged[0], None, metric.value, judged[1])
 
-    def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
-        loss = self.lookup.metric((), "").truncation
+    def _metrics(self, key: Identity, old: Row, new: Row) -> list[Finding]:
+        loss = self.lookup.usual.truncation
         findings = []
         for name, metric in old.metrics.items():
-            match = new.metrics.get(name)
+            match, limits = new.metrics.get(name), self.limits(old, name)
             if (
                 # most metrics of most reports: two numbers that differ by less than they may under every rule
-                not rules
+                limits is self.lookup.usual
                 and match is not None
                 and metric.log10 is not None
                 and match.log10 is not None
@@ -393,7 +388,7 @@ class RowComparison:
                     findings.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
                 else:
                     self.same += 1
-            elif not (limits := self.lookup.metric(rules, name)).ignore:
+            elif not limits.ignore:
                 if match is None:
                     findings.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
@@ -404,7 +399,7 @@ class RowComparison:
             findings += [
                 Finding(key, name, Verdict.NEW, None, metric.value)
                 for name, metric in new.metrics.items()
-                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
+                if name not in old.metrics and not self.limits(old, name).ignore
             ]
         return findings
 
@@ -440,9 +435,9 @@ class RowComparison:
             return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
         return judged
 
-    def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+    def _laws(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         for name in dict.fromkeys((*old.laws, *new.laws)):
-            limits = self.lookup.metric(rules, f"growth {name}")
+            limits = self.limits(old, f"growth {name}")
             if limits.ignore:
                 continue
             a, b = old.laws.get(name), new.laws.get(name)
@@ -458,10 +453,10 @@ class RowComparison:
             before, after = (None if law is None else law_text(law) for law in (a, b))
             yield Finding(key, name, judged[0], before, after, judged[1], "growth")
 
-    def _series(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+    def _series(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """Findings of series that changed: an equal one is no finding."""
         for name, series in old.series.items():
-            limits = self.lookup.metric(rules, f"series {name}")
+            limits = self.limits(old, f"series {name}")
             match = new.series.get(name)
             if limits.ignore or match == series:
                 continue
@@ -484,17 +479,14 @@ class RowComparison:
         """Findings beside the numbers themselves that make these incomparable."""
         if old.finite and not new.finite:
             yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
-        if old.steps != new.steps and self.policy.flags != "ignore":
-            few, many = sorted((old.steps, new.steps))
-            if few * _STEPS < many:
-                yield Finding(key, "", Verdict.INCOMPARABLE, str(old.steps), str(new.steps), "other steps")
-        if old.evaluations is not None and self.policy.flags != "ignore":
-            counts = [row.evaluations or 0 for row in (old, new)]
-            if min(counts) * _STEPS < max(counts):
-                before, after = (str(row.evaluations) for row in (old, new))
-                yield Finding(key, "", Verdict.INCOMPARABLE, before, after, "other evaluations of the field")
-        if old.order != new.order and self.policy.flags != "ignore":
-            yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
+        if self.policy.flags != "ignore":
+            method = [("other steps", old.steps, new.steps, _STEPS), ("another order", old.order, new.order, 1)]
+            if old.evaluations is not None:
+                method.insert(1, ("other evaluations of the field", old.evaluations, new.evaluations, _STEPS))
+            for why, before, after, factor in method:
+                few, many = sorted(-1 if count is None else count for count in (before, after))
+                if few * factor < many:
+                    yield Finding(key, "", Verdict.INCOMPARABLE, str(before), str(after), why)
         fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
         needed, taken = -(-_samples(old) // fewer), _samples(new)
         if taken < needed:
@@ -507,21 +499,21 @@ class RowComparison:
                 why = "the data were rounded by more"
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
 
-    def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+    def _seconds(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """The seconds of the fastest of several runs, since other work only adds; those of a single run say nothing.
 
         What compiling took, which caches decide, and a reference, counts and what a program says are not judged.
         """
         both = "least" in old.seconds and "least" in new.seconds
-        if both and not self.lookup.metric(rules, "seconds run").ignore:
+        if both and not self.limits(old, "seconds run").ignore:
             spent = [max(row.seconds["least"], row.seconds.get(UNRESOLVED_SECONDS, 0.0)) for row in (old, new)]
             verdict, why = judge_seconds(spent[0], spent[1], self.policy.timings)
             before, after = (f"{seconds:.3g} s" for seconds in spent)
             yield Finding(key, "run", verdict, before, after, why, "seconds")
 
-    def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+    def _repeated(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
-        limits = self.lookup.metric(rules, "seconds run")
+        limits = self.limits(old, "seconds run")
         if not limits.ignore:
             for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
                 before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))

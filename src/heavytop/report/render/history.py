@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -51,22 +52,26 @@ def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[
         return tracks.setdefault((row, metric), Track(row, metric, [None] * len(reports), {}))
 
     outcomes: list[dict[Identity, str]] = [{} for _ in reports]
+    versions: dict[Identity, list[str]] = {}
     for number, report in enumerate(reports):
         for row in report.rows:
             outcomes[number][row.identity] = row.outcome
+            if version := row.key.subject.version:
+                versions.setdefault(row.identity, [""] * len(reports))[number] = version
             for name, metric in row.metrics.items():
                 track(row.identity, name).values[number] = metric.value
             for name, law in row.laws.items():
                 track(row.identity, f"growth {name}").values[number] = law_text(law)
     for number in range(1, len(reports)):
         for finding in compare(reports[number - 1], reports[number], policy, kinds).changed:
-            found = track(finding.row, finding.metric)
+            identity = finding.row._replace(versions=())
+            found = track(identity, finding.metric)
             found.steps[number] = finding.verdict, finding.reason
             if not finding.metric:
-                found.values[:] = [outcome.get(finding.row) for outcome in outcomes]
+                found.values[:] = [outcome.get(identity) for outcome in outcomes]
             elif finding.timing:
                 found.values[number - 1], found.values[number] = finding.baseline, finding.candidate
-    return list(tracks.values())
+    return [replace(t, row=t.row._replace(versions=tuple(versions.get(t.row, ())))) for t in tracks.values()]
 
 
 def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any]:
@@ -76,6 +81,7 @@ def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any
         "tracks": [
             {
                 **track.row.named,
+                **({"versions": track.row.versions} if track.row.versions else {}),
                 "metric": track.metric,
                 "values": track.values,
                 "steps": [
@@ -105,7 +111,12 @@ def cells(track: Track) -> list[str]:
     """A line of the table: row, metric, the value and the mark of each report."""
     marks = [MARK[track.steps[number][0]] if number in track.steps else " " for number in range(len(track.values))]
     values = [f"{short(value or '-')} {mark}" for value, mark in zip(track.values, marks, strict=True)]
-    return [row_name(track.row), track.metric or "whole row", *values]
+    return [_row(track), track.metric or "whole row", *values]
+
+
+def _row(track: Track) -> str:
+    """The row by name, with the versions of its program, each once."""
+    return f"{row_name(track.row)} {' → '.join(dict.fromkeys(filter(None, track.row.versions)))}".rstrip()
 
 
 # A history as a page: one chart for each row over the reports, every step beyond noise marked.
@@ -168,7 +179,7 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
     found: tuple[list[Section], list[Section]] = [], []
     rows: dict[str, list[Track]] = {}
     for track in tracks:
-        rows.setdefault(row_name(track.row), []).append(track)
+        rows.setdefault(_row(track), []).append(track)
     drawn = sorted(rows, key=lambda name: not any(track.steps for track in rows[name]))[:MOST_PICTURES]
     for number, (name, own) in enumerate(rows.items()):
         section = Section(f"row-{number}", clip(name, 120), [])

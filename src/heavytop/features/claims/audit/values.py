@@ -103,7 +103,7 @@ class PrintedNumber:
         return self.unit / 2
 
 
-SIZES = {"omega": 3, "gamma": 3, "quaternion": 4, "position": 3}
+SIZES = {"omega": 3, "gamma": 3, "omega_space": 3, "quaternion": 4, "position": 3}
 """Components of each quantity; a first integral has one."""
 _FIRST_BITS, _FEWEST_BITS, _MOST_BITS = 64, 20, 66_500
 """Absolute bits of the balls: what is tried first, what is tried where that is out of reach, and where it ends."""
@@ -452,7 +452,8 @@ class _KnownNumbers:
                     f"quantity = {figure.quantity[:40]!r} is none of this motion.",
                     f"Use {known}: the first integrals are those that are constant along it.",
                 )
-            turned = figure.quantity == "quaternion" or (figure.quantity == "position" and figure.component < 3)
+            turned = figure.quantity in ("quaternion", "omega_space")
+            turned |= figure.quantity == "position" and figure.component < 3
             if turned and self.start.attitude is None:
                 raise InputError(
                     f"gamma does not fix {figure.quantity} {figure.component}.",
@@ -481,7 +482,7 @@ class _KnownNumbers:
             return state[:3] if quantity == "omega" else state[3:6]
         if self.start.attitude is None:
             return self._height(self.motion.state(time, bits), bits)
-        return self._output(Output(quantity), self.motion.whole(time, bits)[1](time, bits), bits)
+        return self._output(Output(quantity.replace("_", "-")), self.motion.whole(time, bits)[1](time, bits), bits)
 
     @whole_evaluation
     def _height(self, state: Sequence[arb], bits: int) -> list[arb]:

@@ -614,8 +614,9 @@ def _fitted(given: Examined) -> Iterator[Hypothesis]:
         if abs(factor - 1) >= _NEAR_ONE or _is_short(factor):
             yield Hypothesis("time_unit", _unit_numbers(factor), error, FITTED_DROP)
     for kind in ("times_shifted", "time_unit"):
-        # a shift is the same for every sample; a unit shows best at the earliest sample away from 0
-        tried = []
+        # a shift is the same for every sample, and of a periodic motion the smallest; a unit shows best at the earliest
+        # sample away from 0
+        tried = [(-1.0, 0.0)] if kind == "times_shifted" else []
         for place in _near(orbit / sizes, given.states[0] / sizes):
             number = grid[place] - times[0] if kind == "times_shifted" else grid[place] / times[0] if times[0] else 1.0
             supposed = numpy.interp(_moved(kind, number, times), grid, numpy.arange(_GRID))
