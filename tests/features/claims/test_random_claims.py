@@ -1,4 +1,7 @@
-"""Claims at random against an evaluation of their own: no false ``holds``, no false ``refuted``, few left undecided."""
+"""Claims at random against an evaluation of their own: no false ``holds``, no false ``refuted``, few left undecided.
+
+A few of each; hundreds are in `validation/random_claims.py`.
+"""
 
 import random
 
@@ -10,7 +13,7 @@ import random_claims
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "count"), [("integral_claim", 40), ("motion_claim", 12), ("elliptic_claim", 6), ("gyrostat_claim", 20)]
+    ("kind", "count"), [("integral_claim", 12), ("motion_claim", 4), ("elliptic_claim", 2), ("gyrostat_claim", 6)]
 )
 def test_no_verdict_is_false_and_what_is_true_by_construction_holds(kind, count, monkeypatch):
     monkeypatch.setattr(random_claims, "random_claim", getattr(random_claims, kind))
@@ -25,7 +28,7 @@ def test_no_verdict_is_false_and_what_is_true_by_construction_holds(kind, count,
 
 @pytest.mark.slow
 def test_no_family_of_traps_gets_a_false_verdict():
-    found = list(random_claims.trap_outcomes(28, 4))
+    found = list(random_claims.trap_outcomes(14, 4))
     assert [(o.fault, o.reason, o.claim.table) for o in found if o.fault] == []
     assert len({o.claim.family for o in found}) == 14
     refused = [o for o in found if o.claim.truth == "refused"]
