@@ -132,9 +132,9 @@ if not TYPE_CHECKING:  # it would tell a type checker that every name is there
             return version()
         if name == "plot":
             return import_module("heavytop.api.plot")
-        found = getattr(_module(name), name)
-        globals()[name] = found
-        return found
+        value = getattr(_module(name), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

@@ -96,33 +96,38 @@ def precision(value: Precision | str) -> Precision:
     """The format, or the one of that name; raises InputError for one that is not there, on this platform or at all."""
     if not isinstance(value, Precision):
         return require(parse(value))
-    found = require(parse(value.name))
-    if found != value:
+    precision_of_name = require(parse(value.name))
+    if precision_of_name != value:
         raise InputError(f"Unknown precision {quoted(value)}.", "Use DOUBLE, EXTENDED, QUAD or real(BITS).")
-    return found
+    return precision_of_name
 
 
 def any_times(values: Numbers) -> list[Fraction]:
     """Exact times in any order, at least one."""
-    found = [physical(exact(value), "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")]
-    if not found:
+    instants = [
+        physical(exact(value), "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")
+    ]
+    if not instants:
         raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
-    return found
+    return instants
 
 
 def attitude(xi: Numbers | None, start: State, form: Precision) -> tuple[Fraction, ...] | None:
     """ξ: a unit vector ⟂ γ but for rounding; raises InputError for any other."""
     if xi is None:
         return None
-    found = vector(xi, "xi")
+    attitude_vector = vector(xi, "xi")
     slack = slack_of(form)
-    for value, what in ((dot(found, found) - 1, "|xi|^2 - 1"), (dot(found, start.gamma), "xi·gamma")):
+    for value, what in (
+        (dot(attitude_vector, attitude_vector) - 1, "|xi|^2 - 1"),
+        (dot(attitude_vector, start.gamma), "xi·gamma"),
+    ):
         if abs(value) > slack:
             size = float(value) if abs(value) < 10**300 else float("inf")
             raise InputError(
                 f"{what} = {size:.6g}.", "Give a unit vector perpendicular to gamma: xi is the space axis x."
             )
-    return found
+    return attitude_vector
 
 
 def tolerance(value: Number | None, form: Precision) -> Fraction | None:
@@ -134,26 +139,26 @@ def count(value: int | None, what: str) -> int | None:
     """A positive integer, or None."""
     if value is None:
         return None
-    found = as_integer(value, what)
-    if found < 1:
-        raise InputError(f"{what} = {quoted(found)} allows nothing.", "Give 1 or more, or None for no limit.")
-    return min(found, _MOST)
+    number = as_integer(value, what)
+    if number < 1:
+        raise InputError(f"{what} = {quoted(number)} allows nothing.", "Give 1 or more, or None for no limit.")
+    return min(number, _MOST)
 
 
 def steps(value: int | None) -> int | None:
     """A limit of steps, or None."""
-    found = None if value is None else as_integer(value, "step_limit")
-    if found is not None and found < 1:
-        raise InputError(f"step_limit = {quoted(found)} allows no step.", "Give 1 or more.")
-    return None if found is None else min(found, _MOST)
+    number = None if value is None else as_integer(value, "step_limit")
+    if number is not None and number < 1:
+        raise InputError(f"step_limit = {quoted(number)} allows no step.", "Give 1 or more.")
+    return None if number is None else min(number, _MOST)
 
 
 def limit(value: Number | None, what: str) -> str | None:
     """A number of a policy as text, or None."""
     if value is None:
         return None
-    found = physical(exact(value), what)
-    return shown(found) if found == 0 or abs(found) > Fraction(1, 10**150) else "0"
+    number = physical(exact(value), what)
+    return shown(number) if number == 0 or abs(number) > Fraction(1, 10**150) else "0"
 
 
 def flag(value: bool | None, what: str) -> bool | None:
@@ -176,13 +181,13 @@ def callback(value: _Call | None, what: str) -> _Call | None:
 def path(value: str | os.PathLike[str], what: str) -> Path:
     """A path."""
     try:
-        found = Path(value)
-        found.exists()
-        if "\0" in str(found):
+        checked = Path(value)
+        checked.exists()
+        if "\0" in str(checked):
             raise ValueError
     except (OSError, TypeError, ValueError):  # no path, or one that no file can have
         raise InputError(f"{what} = {quoted(value)} is not a path.", "Give text or a pathlib.Path.") from None
-    return found
+    return checked
 
 
 def text(value: object, what: str) -> str:

@@ -47,9 +47,9 @@ class LazyLines(Sequence[Sequence[str]]):
     def __len__(self) -> int:
         return len(self.places)
 
-    def __getitem__(self, place: Any) -> Any:
-        found = self.places[place]
-        return self.line(found) if isinstance(found, int) else [self.line(each) for each in found]
+    def __getitem__(self, index: Any) -> Any:
+        selected = self.places[index]
+        return self.line(selected) if isinstance(selected, int) else [self.line(item) for item in selected]
 
     def __iter__(self) -> Iterator[Sequence[str]]:
         return map(self.line, self.places)
@@ -80,8 +80,8 @@ class TitledTable:
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         body = [
             "  ".join(
-                cell.rjust(width) if place else cell.ljust(width)
-                for place, (cell, width) in enumerate(zip(line, widths, strict=True))
+                cell.rjust(width) if index else cell.ljust(width)
+                for index, (cell, width) in enumerate(zip(line, widths, strict=True))
             ).rstrip()
             for line in lines
         ]
@@ -115,12 +115,12 @@ def path_picture(count: int, point: Callable[[int], Sequence[Any]], caption: str
         return ""
     steps = min(count, _MOST_POINTS) - 1
     try:
-        found = [[float(v) for v in point(round(n * (count - 1) / steps))] for n in range(steps + 1)]
+        points = [[float(v) for v in point(round(n * (count - 1) / steps))] for n in range(steps + 1)]
     except (OverflowError, TypeError, ValueError):
         return ""
-    if not all(math.isfinite(v) and abs(v) < _EDGE for each in found for v in each):
+    if not all(math.isfinite(v) and abs(v) < _EDGE for point in points for v in point):
         return ""
-    seen = [_projected(each) for each in found]
+    seen = [_projected(point) for point in points]
     size = 2 * (_RADIUS + _EDGE)
     middle = _RADIUS + _EDGE
     begin = f'<circle cx="{seen[0][0]:.1f}" cy="{seen[0][1]:.1f}" r="2.5" fill="#0072b2"/>'
@@ -147,11 +147,11 @@ def _lines(seen: Sequence[tuple[float, float, bool]]) -> str:
     """The parts of the path on the front and, faint, on the back."""
     parts: dict[bool, list[str]] = {True: [], False: []}
     last: bool | None = None
-    for place, (x, y, front) in enumerate(seen):
-        if front is not last and place:
-            before = seen[place - 1]
+    for index, (x, y, front) in enumerate(seen):
+        if front is not last and index:
+            before = seen[index - 1]
             parts[front].append(f"M{before[0]:.1f} {before[1]:.1f}")
-        parts[front].append(f"{'L' if place else 'M'}{x:.1f} {y:.1f}")
+        parts[front].append(f"{'L' if index else 'M'}{x:.1f} {y:.1f}")
         last = front
     style = 'fill="none" stroke="#0072b2" stroke-width="1.3"'
     return "".join(

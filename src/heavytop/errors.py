@@ -39,20 +39,20 @@ def quoted(value: object, most: int = 60) -> str:
 
 def invalid(error: Exception) -> str:
     """The fault of a value in a table of TOML: where it stands, what it has to be, and what it is."""
-    text, _, place = str(error).partition(" - at `$")
-    place = place.strip("`.") or "the file"
+    text, _, path = str(error).partition(" - at `$")
+    path = path.strip("`.") or "the file"
     if match := re.fullmatch(r"Expected `([^`]*)`, got `(\w+)`", text):
         wanted = " or ".join(_TYPES.get(name, name) for name in match[1].split(" | ") if name != "null")
         # a plan has its decimals as text
         is_number = match[2] == "str" and match[1].startswith(("int", "float"))
-        return f"{place} has to be {wanted}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
+        return f"{path} has to be {wanted}" + ("" if is_number else f", and is {_TYPES.get(match[2], match[2])}")
     if match := re.fullmatch(r"Expected `([^`]*)` (?:of length )?([<>=]+) (\d+)", text):
         what = "of length " if match[1] in ("array", "str") else ""
-        return f"{place} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
+        return f"{path} has to be {_TYPES.get(match[1], match[1])} {what}{match[2]} {match[3]}"
     if match := re.fullmatch(r"Object missing required field `(.*)`", text):
-        return f"{place} lacks the key {match[1]}"
+        return f"{path} lacks the key {match[1]}"
     if match := re.fullmatch(r"Object contains (unknown field `.*`)", text):
-        return f"{match[1]} in {place}"
+        return f"{match[1]} in {path}"
     return str(error)
 
 

@@ -33,5 +33,5 @@ class Feature:
     def load(self, name: str) -> Any:
         """The module ``MODULE``, or what it calls ``NAME``."""
         module, _, attribute = name.partition(":")
-        found = import_module(f"{self.package}.{module}")
-        return getattr(found, attribute) if attribute else found
+        part = import_module(f"{self.package}.{module}")
+        return getattr(part, attribute) if attribute else part

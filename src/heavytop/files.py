@@ -18,11 +18,11 @@ def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
     JSON readers differ in which of the two they take.
     """
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    table = dict(pairs)
+    if len(table) < len(pairs):
         twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
         raise InputError(f"The key {quoted(twice)} stands twice in one object.", "Give each key once.")
-    return found
+    return table
 
 
 def read_whole(path: Path) -> bytes:

@@ -275,16 +275,16 @@ _from_short_text = lru_cache(maxsize=4096)(_from_text)
 """Scripts call with the same text again and again, as times or as data."""
 
 
-def _from_decimal(text: str, given: str) -> Fraction:
+def _from_decimal(text: str, original: str) -> Fraction:
     text = text.strip()
     if len(text) > _MAX_TEXT:
         raise InputError(f"A number of {len(text)} characters is too long.", f"At most {_MAX_TEXT} are read.")
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
-        raise InputError(f"{quoted(given)} is not a finite number.", _REMEDY)
+        raise InputError(f"{quoted(original)} is not a finite number.", _REMEDY)
     exponent = match[3].lstrip("eE+-").lstrip("0") if match[3] else ""
     if len(exponent) > len(str(_MAX_TEXT)) or int(exponent or 0) > _MAX_TEXT:
-        raise _too_large(given)
+        raise _too_large(original)
     return Fraction(*Decimal(text).as_integer_ratio())
 
 
@@ -381,11 +381,11 @@ def _long_doubles(values: Sequence[Fraction], doubles: Array) -> Any:
 
     lows = numpy.array([_rest(*pair) for pair in zip(values, doubles.tolist(), strict=True)])
     highs = doubles.astype(numpy.longdouble)
-    found = highs + lows
-    error = lows - (found - highs)
-    for place in map(int, numpy.flatnonzero(found + error * (1 + 2.0**-38) != found)):  # about as near to two of them
-        found[place] = number(values[place], EXTENDED)
-    return found
+    sums = highs + lows
+    error = lows - (sums - highs)
+    for k in map(int, numpy.flatnonzero(sums + error * (1 + 2.0**-38) != sums)):  # about as near to two of them
+        sums[k] = number(values[k], EXTENDED)
+    return sums
 
 
 def _rest(value: Fraction, high: float) -> float:
@@ -484,11 +484,11 @@ def cache_last_call(function: Callable[..., Found]) -> Callable[..., Found]:
         nonlocal kept
         before = kept
         if before is not None and len(before[0]) == len(arguments) and all(map(is_, before[0], arguments)):
-            found: Found = before[1]
-            return found
-        found = function(*arguments)
-        kept = arguments, found
-        return found
+            value: Found = before[1]
+            return value
+        value = function(*arguments)
+        kept = arguments, value
+        return value
 
     return look_up
 
@@ -545,10 +545,10 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
-            found = list(islice(values, MOST_MEMBERS + 1))
-            if len(found) > MOST_MEMBERS:
+            members = list(islice(values, MOST_MEMBERS + 1))
+            if len(members) > MOST_MEMBERS:
                 raise InputError(f"{what} has more than {MOST_MEMBERS} members.", remedy)
-            return found
+            return members
         except HeavyTopError:
             raise
         except Exception:  # what is no iterable, an array without dimensions, a generator that fails

@@ -78,23 +78,23 @@ def gate(
     from heavytop.errors import InputError
 
     known = case_named(case)
-    given = integrator_or_states
-    if isinstance(given, str) or (callable(given) and not isinstance(given, ht.Trajectory)):
+    trajectory = integrator_or_states
+    if isinstance(trajectory, str) or (callable(trajectory) and not isinstance(trajectory, ht.Trajectory)):
         wanted = list(range(1, 11)) if times is None else times
-        given = ht.propagate(
-            known.top, known.start, wanted, precision, integrator=given, system=known.system, **options
+        trajectory = ht.propagate(
+            known.top, known.start, wanted, precision, integrator=trajectory, system=known.system, **options
         )
     name = "given"
-    if isinstance(given, ht.Trajectory):
-        if given.outcome is not ht.Outcome.SUCCESS:
-            pytest.fail(f"{case}: {given!r}", pytrace=False)
-        times, given, name = given.times, given.states, given.integrator
+    if isinstance(trajectory, ht.Trajectory):
+        if trajectory.outcome is not ht.Outcome.SUCCESS:
+            pytest.fail(f"{case}: {trajectory!r}", pytrace=False)
+        times, trajectory, name = trajectory.times, trajectory.states, trajectory.integrator
     if times is None:
         raise InputError("States come without their times.", "Give heavytop_gate(states, times=[...]).")
     return Gated(
         ht.score(
             times,
-            given,
+            trajectory,
             top=known.top,
             start=known.start,
             precision=precision,

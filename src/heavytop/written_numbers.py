@@ -36,20 +36,20 @@ def number(value: Any, what: str) -> Fraction | None:
     hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
     if hexadecimal is not None:
         sign, whole, part, power = hexadecimal.groups()
-        found = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
+        fraction = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
     else:
-        found = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
-    if found and abs(found.numerator.bit_length() - found.denominator.bit_length()) > _WIDEST:
+        fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
+    if fraction and abs(fraction.numerator.bit_length() - fraction.denominator.bit_length()) > _WIDEST:
         raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
-    return found
+    return fraction
 
 
 def finite(value: Any, what: str) -> Fraction:
     """A finite number; raises InputError also for NaN and infinities."""
-    found = number(value, what)
-    if found is None:
+    parsed = number(value, what)
+    if parsed is None:
         raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")
-    return found
+    return parsed
 
 
 def format_of(texts: Iterable[str]) -> Precision:

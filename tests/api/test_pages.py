@@ -61,6 +61,17 @@ def test_a_page_is_what_its_file_says_and_has_nothing_that_only_the_site_can_sho
     assert caught.value.remedy == "Did you mean compare?  `heavytop docs` lists the topics."
 
 
+def test_a_page_has_formulas_as_text() -> None:
+    for name in pages.topics():
+        prose = re.sub(r"^(```|~~~)(?!text).*?^\1$", "", pages.page(name), flags=re.MULTILINE | re.DOTALL)
+        assert not re.findall(r"\$\$|\\[A-Za-z]+|[\^_]\{", prose), name
+    assert "q = tanh²(α t/√2),\nsin θ = q/(2 − q)," in pages.page("claim")
+    assert "Ω = (α/2 sin φ, α sin θ, 2α cos θ)," in pages.page("claim")
+    assert "ε = 2^(1 − bits)" in pages.page("choose")
+    assert "ξ(0) = e₁ − 2 (v·e₁/(v·v)) v\n= (1 − γ₁²/(1 − γ₃), −γ₁γ₂/(1 − γ₃), γ₁)" in pages.page("outputs")
+    assert "Sₖ₊₁ += l" in pages.page("multiword")
+
+
 def test_without_pages_the_cause_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "_INSTALLED", tmp_path)
     with pytest.raises(InputError, match="not installed"):

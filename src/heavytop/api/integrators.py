@@ -109,8 +109,8 @@ def new_integrator(
             raise InputError(f"{folder} already holds other content.", "Give a new folder.")
         if workflow.exists():
             raise InputError(f"{workflow} exists already.", "Move it away, or give another --into.")
-        place = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
-        files = _adapter(engine, place) if engine else _program(language, method, place)
+        home = "." if into is None else folder.resolve().relative_to(into.resolve()).as_posix()
+        files = _adapter(engine, home) if engine else _program(language, method, home)
         for name, text in sorted(files.items()):
             path = workflow if name == _WORKFLOW else folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,7 +122,7 @@ def new_integrator(
     return sorted(files)
 
 
-def _program(language: str, method: str, place: str) -> dict[str, str]:
+def _program(language: str, method: str, folder: str) -> dict[str, str]:
     """The files of a program by their names."""
     about, chosen = LANGUAGES[language], METHODS[method]
     files = _texts("common") | _texts(language)
@@ -132,14 +132,14 @@ def _program(language: str, method: str, place: str) -> dict[str, str]:
     words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
     words |= {"TITLE": chosen.title, "KEYS": chosen.keys, "CONTROL": chosen.control, "POINTS": chosen.points}
     return {
-        name: text if name in (".gitignore", "Makefile", "policy.toml") else _filled(text, words, place)
+        name: text if name in (".gitignore", "Makefile", "policy.toml") else _filled(text, words, folder)
         for name, text in files.items()
     }
 
 
-def _filled(text: str, words: dict[str, str], place: str) -> str:
+def _filled(text: str, words: dict[str, str], folder: str) -> str:
     """A text with its words in capitals replaced.  place: the folder of the program in the repository."""
-    words = words | {"MADE_FROM": (commit() or "HEAD").removesuffix("-dirty"), "WHERE": place}
+    words = words | {"MADE_FROM": (commit() or "HEAD").removesuffix("-dirty"), "WHERE": folder}
     return re.sub(rf"(?<![A-Za-z])({'|'.join(words)})(?![A-Za-z])", lambda match: words[match[1]], text)
 
 
@@ -152,24 +152,26 @@ def engines() -> list[str]:
 
 
 def _adapters() -> list[Traversable]:
-    folders = (resources.files(each.package) / each.starters for each in FEATURES if each.starters)
+    folders = (resources.files(feature.package) / feature.starters for feature in FEATURES if feature.starters)
     return [path for folder in folders for path in folder.iterdir() if path.is_file()]
 
 
-def _adapter(engine: str, place: str) -> dict[str, str]:
+def _adapter(engine: str, folder: str) -> dict[str, str]:
     """The files of an engine: the gate measures each of its integrators."""
     own = {"engine.toml": f"{engine}.toml", **{name: name for name in (f"{engine}_top.py", "heavytop_engine.py")}}
     texts = {path.name: path.read_text("utf-8") for path in _adapters()}
     files = {name: texts[source] for name, source in own.items()}
     tables = tomllib.loads(files["engine.toml"])["integrator"]
     line = '    {{ integrator = "{name}", {setting}s = {points} }},'
-    curves = (line.format(**each, points=json.dumps(_POINTS[each["setting"]])) for each in tables)
-    runs = "\n".join(_DRIFT.format(name=each["name"]) for each in tables)
+    curves = (line.format(**table, points=json.dumps(_POINTS[table["setting"]])) for table in tables)
+    runs = "\n".join(_DRIFT.format(name=table["name"]) for table in tables)
     words = {"ENGINE": engine, "LADDERS": "\n".join(curves), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
     words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
     words |= {"BUILD": words["INSTALL"].replace("pip", "python -m pip"), "mine.toml": f"engine.toml:{words['FIRST']}"}
     texts[f"{_WORKFLOW}.txt"] = _texts("common")["workflow.yml"]
-    return files | {name: _filled(texts[f"{name}.txt"], words, place) for name in ("gate.toml", "README.md", _WORKFLOW)}
+    return files | {
+        name: _filled(texts[f"{name}.txt"], words, folder) for name in ("gate.toml", "README.md", _WORKFLOW)
+    }
 
 
 _POINTS = {"step": ["1/50", "1/100", "1/200", "1/400"], "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"]}
@@ -185,8 +187,8 @@ runs = [{{ precision = "double", horizon = "10", samples = 50 }}]"""
 
 def _texts(part: str) -> dict[str, str]:
     """The files of that part, by name."""
-    place = resources.files("heavytop.api") / "starters" / part
-    return {each.name.removesuffix(".txt"): each.read_text("utf-8") for each in place.iterdir() if each.is_file()}
+    folder = resources.files("heavytop.api") / "starters" / part
+    return {file.name.removesuffix(".txt"): file.read_text("utf-8") for file in folder.iterdir() if file.is_file()}
 
 
 # What there is to choose from.
@@ -203,8 +205,8 @@ def listing() -> dict[str, Any]:
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
     known, reasons = registry.known(), registry.available()
     integrators = {
-        name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
-        for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
+        name: reasons[name] or (entry.formats_text if entry.streams else "") or "installed"
+        for name, entry in sorted(known.items(), key=lambda item: not item[1].streams)
     }
     return {
         "cases": [_listed(case) for case in CASES.values()],
@@ -216,7 +218,7 @@ def listing() -> dict[str, Any]:
             for name, reason in available().items()
         },
         "integrators": integrators,
-        "capabilities": {name: each.capabilities() for name, each in known.items()},
+        "capabilities": {name: entry.capabilities() for name, entry in known.items()},
     }
 
 
@@ -233,5 +235,5 @@ def case_document(name: str) -> dict[str, Any]:
     from heavytop.cases import case
     from heavytop.harness.case_text import case_data, forms
 
-    found = case(name)
-    return case_data(found) | {"about": found.about, "source": found.source, "units": found.units} | forms(found)
+    named = case(name)
+    return case_data(named) | {"about": named.about, "source": named.source, "units": named.units} | forms(named)

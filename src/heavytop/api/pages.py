@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from pathlib import Path
 
+from heavytop.api.formulas import plain_formula
 from heavytop.errors import InputError, quoted
 
 _INSTALLED = Path(__file__).parents[1] / "docs"
 """Where hatch_build.py puts the pages of a wheel."""
 _CHECKOUT = Path(__file__).parents[3] / "docs"
-_OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index"})
+_OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index", "public"})
 """Pages that are made when the site is built."""
 
 
@@ -20,23 +22,28 @@ def topics() -> dict[str, str]:
 
 
 def page(topic: str) -> str:
-    """The page as it was written, in Markdown; raises InputError for a topic without a page."""
+    """The page in Markdown, its formulas as text; raises InputError for a topic without a page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
         near = get_close_matches(name.lower(), files, 1)
         remedy = f"Did you mean {near[0]}?  " if near else ""
         raise InputError(f"There is no page {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
-    return files[name].read_text("utf-8")
+    return re.sub(
+        r"\$\$\n(.*?)\$\$",
+        lambda formula: f"```text\n{plain_formula(formula[1])}\n```",
+        files[name].read_text("utf-8"),
+        flags=re.DOTALL,
+    )
 
 
 def _files() -> dict[str, Path]:
     folder = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT
-    found = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
-    if not found:
+    paths = {path.stem: path for part in (folder, folder / "tutorials") for path in part.glob("*.md")}
+    if not paths:
         raise InputError(
             "The pages of the documentation are not installed.", "Install heavytop from a wheel or from its checkout."
         )
-    return {name: path for name, path in found.items() if name not in _OF_THE_SITE}
+    return {name: path for name, path in paths.items() if name not in _OF_THE_SITE}
 
 
 def _title(text: str) -> str:

@@ -178,12 +178,12 @@ def herpolhode(
     Raises:
         InputError: as :func:`sphere`.
     """
-    found = samples(run)
-    rows = found.rows()
-    omega = np.einsum("nij,nj->ni", rows, found.omega)
+    curves = samples(run)
+    rows = curves.rows()
+    omega = np.einsum("nij,nj->ni", rows, curves.omega)
     free, across = _free(run, top), np.eye(3)[:2]
     if free is not None:
-        own = principal(run, found.omega[:1])[0] * np.array([float(value) for value in free.inertia])
+        own = principal(run, curves.omega[:1])[0] * np.array([float(value) for value in free.inertia])
         turn = axes_of(run)
         momentum = rows[0] @ (own if turn is None else turn @ own)
         if (size := np.linalg.norm(momentum)) > 0:
@@ -220,9 +220,9 @@ def phase(
     Raises:
         InputError: for another name, and as :func:`sphere`.
     """
-    found = samples(run)
+    curves = samples(run)
     drawn = _flat(axes)
-    values = [_column(found, name) for name in (x, y)]
+    values = [_column(curves, name) for name in (x, y)]
     drawn.plot(*values, color=colour, lw=_WIDTH, label=label)
     drawn.plot(*(value[:1] for value in values), "o", color=colour, ms=4)
     drawn.set(xlabel=_named(x), ylabel=_named(y))
@@ -255,10 +255,10 @@ def poincare(
         listed: list[Crossings] = list(section.events)
     else:
         listed = [section] if isinstance(section, Crossings) else list(section)
-    for each in listed:
-        if not isinstance(each, Crossings):
+    for start in listed:
+        if not isinstance(start, Crossings):
             raise InputError(
-                f"{quoted(each)} is no section.", "Give what heavytop.poincare or heavytop.events returns."
+                f"{quoted(start)} is no section.", "Give what heavytop.poincare or heavytop.events returns."
             )
     total = sum(map(len, listed))
     if not total:
@@ -266,9 +266,9 @@ def poincare(
     drawn = _flat(axes)
     diameter = size if size is not None else float(np.clip(90 / np.sqrt(total), 2, 5))
     columns = [component(name) for name in (x, y)]
-    for place, each in enumerate(listed):
-        points = each.to_numpy()[:, columns]
-        drawn.plot(*points.T, ".", color=colours[place % len(colours)], ms=diameter, mew=0)
+    for index, start in enumerate(listed):
+        points = start.to_numpy()[:, columns]
+        drawn.plot(*points.T, ".", color=colours[index % len(colours)], ms=diameter, mew=0)
     drawn.set(xlabel=_named(x), ylabel=_named(y))
     drawn.set_title(f"section {listed[0].function}", fontsize="medium")
     return drawn
@@ -291,8 +291,8 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
         raise InputError(f"{quoted(run)} is no computed motion.", "Give what heavytop.propagate returns.")
     samples(run)
     places = every(len(run.states))
-    drawn, times = _flat(axes), np.array([float(exact(run.times[place])) for place in places])
-    curves = sample_drifts(run.problem, [exact(run.times[place]) for place in places], exact_states(run, places))
+    drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in places])
+    curves = sample_drifts(run.problem, [exact(run.times[index]) for index in places], exact_states(run, places))
     _logarithmic(drawn, times, {name.replace("_", " "): logs for name, logs in curves.items()})
     drawn.set_ylabel("|I(t) − I(0)|")
     drawn.set_title(f"drift in {run.problem.precision.name}, {run.integrator}", fontsize="medium")
@@ -339,9 +339,9 @@ def error(run: Trajectory, known: Motion, axes: Axes | None = None) -> Axes:
         InputError: where the times differ, and as :func:`sphere`.
     """
     problem, times, states, truth = compared(run, known)
-    found = sample_errors(problem, times, states, truth)
+    errors = sample_errors(problem, times, states, truth)
     drawn = _flat(axes)
-    _logarithmic(drawn, np.array([float(time) for time in times]), {name: found[name] for name in ("along", "across")})
+    _logarithmic(drawn, np.array([float(time) for time in times]), {name: errors[name] for name in ("along", "across")})
     drawn.set_ylabel("error along and across the flow")
     drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
     return drawn
@@ -376,8 +376,8 @@ def animate(
     count, rate = arguments.count(frames, "frames"), arguments.count(fps, "fps")
     file = None if path is None else arguments.path(path, "path")
     writer = None if file is None else _writer(file.suffix.lower(), rate or 1)
-    name, found, line = path_in_space(run, "axis3" if of == "vertical" else of, top)
-    rows, drawn = found.rows(), _solid(None)
+    name, locus, line = path_in_space(run, "axis3" if of == "vertical" else of, top)
+    rows, drawn = locus.rows(), _solid(None)
     _globe(drawn)
     drawn.set(xlabel="x", ylabel="y", zlabel="z, up")
     arms = [drawn.plot([], [], [], color=COLOURS[i + 1], lw=2.2, label=f"axis {i + 1}")[0] for i in range(3)]
@@ -388,12 +388,12 @@ def animate(
     places = every(len(line), count or 1)
 
     def show(frame: int) -> list[Artist]:
-        place = places[frame]
+        index = places[frame]
         for axis, arm in enumerate(arms):
-            arm.set_data_3d(*np.stack([np.zeros(3), rows[place][:, axis]]).T)
-        rod.set_data_3d(*np.stack([np.zeros(3), line[place]]).T)
-        trace.set_data_3d(*line[: place + 1].T)
-        clock.set_text(f"t = {found.times[place]:.2f}")
+            arm.set_data_3d(*np.stack([np.zeros(3), rows[index][:, axis]]).T)
+        rod.set_data_3d(*np.stack([np.zeros(3), line[index]]).T)
+        trace.set_data_3d(*line[: index + 1].T)
+        clock.set_text(f"t = {locus.times[index]:.2f}")
         return [*arms, rod, trace, clock]
 
     film = FuncAnimation(drawn.figure, show, frames=len(places), interval=1000 / (rate or 1), blit=False)
@@ -509,19 +509,19 @@ def _plane_across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _column(found: Samples, name: str) -> NDArray[np.float64]:
+def _column(drawn: Samples, name: str) -> NDArray[np.float64]:
     if name == "t":
-        return found.times
-    place = component(name)
-    values: NDArray[np.float64] = (found.omega if place < 3 else found.gamma)[:, place % 3]
+        return drawn.times
+    index = component(name)
+    values: NDArray[np.float64] = (drawn.omega if index < 3 else drawn.gamma)[:, index % 3]
     return values
 
 
 def _named(name: str) -> str:
     if name == "t":
         return _TIME
-    place = component(name)
-    return f"{NAMES[place]} ({_RATE})" if place < 3 else NAMES[place]
+    index = component(name)
+    return f"{NAMES[index]} ({_RATE})" if index < 3 else NAMES[index]
 
 
 def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
@@ -535,10 +535,10 @@ def _time_axis(axes: Axes, times: NDArray[np.float64]) -> None:
 def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
     """Curves over time by their decimal logarithms, which may be those of numbers that no double is."""
     backwards = bool((times < 0).any())
-    for place, (name, logs) in enumerate(curves.items()):
+    for index, (name, logs) in enumerate(curves.items()):
         values = np.array([np.nan if log is None else log for log in logs])
         exact_zero = bool(np.isnan(values).all())
-        colour, dash = COLOURS[place % len(COLOURS)], _DASHES[place % len(_DASHES)]
+        colour, dash = COLOURS[index % len(COLOURS)], _DASHES[index % len(_DASHES)]
         label, marker = f"{name}: exactly 0" if exact_zero else name, "." if np.isnan(values).any() else ""
         axes.plot(abs(times), values, marker=marker, ms=3, color=colour, lw=_WIDTH, ls=dash, label=label)
     _time_axis(axes, abs(times))
@@ -567,14 +567,16 @@ def stability(top: HeavyTop, axes: Axes3D | None = None, *, speed: float = 1.0) 
     _globe(drawn)
     for axis in range(3):
         for sign in (1, -1):
-            place = [sign * (axis == k) for k in range(3)]
-            start = State([exact(speed) * value for value in place], place)
+            direction = [sign * (axis == k) for k in range(3)]
+            start = State([exact(speed) * value for value in direction], direction)
             steady = steady_motion(system, system.parameters(body, start), start.flat)
             unstable = steady is not None and steady.verdict == "unstable"
             colour = _GREY if steady is None else COLOURS[1] if unstable else COLOURS[0]
-            drawn.plot(*([value] for value in place), "o", color=colour)
+            drawn.plot(*([value] for value in direction), "o", color=colour)
             words = "not steady" if steady is None else steady.verdict + (f" {steady.rate:.3g}" if unstable else "")
-            drawn.text(*(1.2 * value for value in place), f"{'−' if sign < 0 else ''}{axis + 1}: {words}", fontsize=7)
+            drawn.text(
+                *(1.2 * value for value in direction), f"{'−' if sign < 0 else ''}{axis + 1}: {words}", fontsize=7
+            )
     drawn.set(xlabel="axis 1", ylabel="axis 2", zlabel="axis 3")
     drawn.set_title("rotations about principal axes", fontsize="medium")
     return drawn
@@ -592,10 +594,10 @@ def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
     """
     drawn = _flat(axes)
     times = np.array([float(time) for time in test.times])
-    for place, fault in enumerate(test.faults):
-        dashes = _DASHES[place // len(COLOURS) % len(_DASHES)]
+    for index, fault in enumerate(test.faults):
+        dashes = _DASHES[index // len(COLOURS) % len(_DASHES)]
         largest = np.maximum.accumulate(np.maximum(fault.errors, 1e-17))
-        drawn.plot(times, largest, dashes, color=COLOURS[place % len(COLOURS)], lw=_WIDTH, label=fault.name)
+        drawn.plot(times, largest, dashes, color=COLOURS[index % len(COLOURS)], lw=_WIDTH, label=fault.name)
     drawn.axhline(test.tolerance, color=_GREY, lw=_WIDTH, ls="--")
     drawn.set(xlabel=_TIME, ylabel="largest error so far", yscale="log")
     drawn.legend(fontsize="x-small")

@@ -144,10 +144,10 @@ def _integrated_xi(run: Motion) -> NDArray[np.float64]:
             f"The attitude could not be integrated: {again.outcome.message}.",
             "Give the run with xi=, as propagate takes.",
         )
-    found = samples(again).xi
-    assert found is not None
+    xi = samples(again).xi
+    assert xi is not None
     turn = axes_of(run)
-    return (found if turn is None else found @ turn.T)[: len(run.states)]
+    return (xi if turn is None else xi @ turn.T)[: len(run.states)]
 
 
 def axes_of(run: Motion) -> NDArray[np.float64] | None:
@@ -194,11 +194,11 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 
     "vertical" is γ, the vertical in body axes.
     """
-    found = samples(run)
+    drawn = samples(run)
     if of == "vertical":
-        return of, found, found.gamma
+        return of, drawn, drawn.gamma
     name, vector = direction(run, of, top)
-    return name, found, found.rows() @ vector
+    return name, drawn, drawn.rows() @ vector
 
 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
@@ -211,13 +211,13 @@ def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[F
     if count != len(known.states):
         raise InputError(f"The run has {count} samples and the other {len(known.states)}.", "Give the same times.")
     places = every(count)
-    times = [exact(run.times[place]) for place in places]
+    times = [exact(run.times[index]) for index in places]
     slack = 4 * run.problem.precision.eps
-    for time, place in zip(times, places, strict=True):
-        other = exact(known.times[place])
+    for time, index in zip(times, places, strict=True):
+        other = exact(known.times[index])
         if abs(time - other) > slack * abs(time):
             raise InputError(
-                f"Sample {place} is at t = {float(time)!r} of one and {float(other)!r} of the other.",
+                f"Sample {index} is at t = {float(time)!r} of one and {float(other)!r} of the other.",
                 "Give the same times.",
             )
     return run.problem, times, exact_states(run, places), exact_states(known, places, run)
@@ -229,17 +229,17 @@ def every(count: int, most: int = MOST_EXACT) -> list[int]:
         return list(range(count))
     if most == 1:
         return [count - 1]
-    return [round(place * (count - 1) / (most - 1)) for place in range(most)]
+    return [round(n * (count - 1) / (most - 1)) for n in range(most)]
 
 
 def exact_states(run: Motion, places: Sequence[int], beside: Motion | None = None) -> list[list[Fraction]]:
     """(Ω, γ) at these samples, exactly as they are written, in the principal axes of the run, or of that ``beside``."""
     if isinstance(run, Reference):
-        found = [[exact(ball.value) for ball in run.states[place]][:6] for place in places]
+        exact_values = [[exact(ball.value) for ball in run.states[index]][:6] for index in places]
     else:
-        found = [[exact(value) for value in run.states[place][:6]] for place in places]
+        exact_values = [[exact(value) for value in run.states[index][:6]] for index in places]
     frame = getattr(beside or run, "frame", None)
     if frame is None:
-        return found
+        return exact_values
     back = transposed(frame.axes)
-    return [[*rotated(back, state[:3]), *rotated(back, state[3:])] for state in found]
+    return [[*rotated(back, state[:3]), *rotated(back, state[3:])] for state in exact_values]

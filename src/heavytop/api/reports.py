@@ -83,8 +83,8 @@ class Report(Tabular, records.Report, frozen=True):
         body = []
         for row in self.rows:
             kept = digits_kept(row)
-            found = [metric for _, metric in drifts(row)]
-            worst = max(found, key=lambda m: m.log10 or -1e9).value if found else ""
+            metrics = [metric for _, metric in drifts(row)]
+            worst = max(metrics, key=lambda m: m.log10 or -1e9).value if metrics else ""
             cells = (row_name(row.identity), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
             body.append(list(map(printable, cells)))
         return TitledTable(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
@@ -123,7 +123,7 @@ class Comparison(Tabular, comparing.Differences):
             for f in self.changed
         ]
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
-        notes += [printable(each.sentence) for each in self.motions if each.sentence]
+        notes += [printable(motion.sentence) for motion in self.motions if motion.sentence]
         return TitledTable(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
 
 
@@ -209,10 +209,10 @@ def run(
     return read_report(asked.directory)
 
 
-def _integrator(given: str | Callable[..., Any] | None) -> str | Callable[..., Any]:
-    if given is None:
+def _integrator(integrator: str | Callable[..., Any] | None) -> str | Callable[..., Any]:
+    if integrator is None:
         return ""
-    return given if callable(given) else arguments.text(given, "integrator")
+    return integrator if callable(integrator) else arguments.text(integrator, "integrator")
 
 
 def read_report(path: PathLike) -> Report:
@@ -228,8 +228,8 @@ def read_report(path: PathLike) -> Report:
         InputError: for a file that is missing, cut short, of another program or schema, changed since it was written,
             or inconsistent in itself.
     """
-    found = store.read(arguments.path(path, "path"), KINDS)
-    return Report(found.schema, found.plan, found.environment, found.rows, found.beside)
+    report = store.read(arguments.path(path, "path"), KINDS)
+    return Report(report.schema, report.plan, report.environment, report.rows, report.beside)
 
 
 def compare(
@@ -274,9 +274,10 @@ def compared(
     folders = None
     if not isinstance(baseline, records.Report) and not isinstance(candidate, records.Report):
         folders = _folder(arguments.path(baseline, "baseline")), _folder(arguments.path(candidate, "candidate"))
-    found = comparing.compare(old, new, rules, KINDS, list_same=list_same, folders=folders)
+    comparison = comparing.compare(old, new, rules, KINDS, list_same=list_same, folders=folders)
     return Comparison(
-        **{each.name: getattr(found, each.name) for each in fields(found) if each.init}, reports=(old, new)
+        **{field.name: getattr(comparison, field.name) for field in fields(comparison) if field.init},
+        reports=(old, new),
     )
 
 
@@ -311,29 +312,29 @@ def history(
 
 def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, read: Callable[[], None]) -> History:
     """As :func:`history`; ``read`` is called after each report."""
-    given = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
-    if len(given) < 2:
+    folders = ordered(reports, "reports", "Give a list of reports or of their folders, the oldest first.")
+    if len(folders) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     cases, metrics = policies.glob(arguments.text(case, "case")), policies.glob(arguments.text(metric, "metric") or "*")
-    names, found = [], []
-    for number, each in enumerate(given, 1):
-        ready = isinstance(each, records.Report)
-        names.append(f"report {number}" if ready else str(arguments.path(each, "reports")))
-        found.append(_report(each, "reports", read))
-    tracks = over.history(found, rules, KINDS)
+    names, report = [], []
+    for number, source in enumerate(folders, 1):
+        ready = isinstance(source, records.Report)
+        names.append(f"report {number}" if ready else str(arguments.path(source, "reports")))
+        report.append(_report(source, "reports", read))
+    tracks = over.history(report, rules, KINDS)
     tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
-    return History(names, [track for track in tracks if metric or track.steps], found)
+    return History(names, [track for track in tracks if metric or track.steps], report)
 
 
-def _report(given: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
+def _report(source: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
     """A report, or that of a path, whose rows are read as they are gone through; then ``read`` is called."""
-    if not isinstance(given, records.Report | str | os.PathLike):
-        raise InputError(f"{what} = {quoted(given)} is no report.", "Give a Report, or the path of one.")
-    if isinstance(given, records.Report):
-        check_keys(what, given.rows)
-        found: store.AnyReport = given
+    if not isinstance(source, records.Report | str | os.PathLike):
+        raise InputError(f"{what} = {quoted(source)} is no report.", "Give a Report, or the path of one.")
+    if isinstance(source, records.Report):
+        check_keys(what, source.rows)
+        report: store.AnyReport = source
     else:
-        found = store.read_brief(arguments.path(given, what), KINDS)
+        report = store.read_brief(arguments.path(source, what), KINDS)
     read()
-    return found
+    return report

@@ -114,13 +114,13 @@ def tasks(plan: str = "selftest") -> list[Task]:
 
 def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]) -> list[Trial]:
     """The trials that :func:`tasks` make: one for the control and one for each fault."""
-    found: dict[int, Row] = {}
+    rows_by_index: dict[int, Row] = {}
     for index, row in rows(tasks, KINDS, workers, None):
-        found[index] = row
+        rows_by_index[index] = row
         progress(tasks[index])
     names = (CONTROL, *FAULTS)
     size = len(tasks) // (1 + len(names))
-    healthy, *others = ([found[i] for i in range(at, at + size)] for at in range(0, len(tasks), size))
+    healthy, *others = ([rows_by_index[i] for i in range(at, at + size)] for at in range(0, len(tasks), size))
     compared = (compare(_report(healthy), _report(other), Policy(), KINDS) for other in others)
     return [trial(name, comparison) for name, comparison in zip(names, compared, strict=True)]
 

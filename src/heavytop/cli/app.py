@@ -140,13 +140,13 @@ def require_new(folder: Path) -> None:
 def require_apart(files: Iterable[Path | None], *read: Path | None) -> None:
     """Raises InputError where a file to be written is named twice, or is one that is read, or a report in a folder."""
     written = [path for path in files if path is not None]
-    sources = [place for path in read if path and written for place in (path, path / "report.json")]
-    taken = {absolute(place).resolve() for place in sources if place.is_file()}
+    sources = [candidate for path in read if path and written for candidate in (path, path / "report.json")]
+    taken = {absolute(source).resolve() for source in sources if source.is_file()}
     for path in written:
-        place = absolute(path).resolve()
-        if place in taken:
+        target = absolute(path).resolve()
+        if target in taken:
             raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
-        taken.add(place)
+        taken.add(target)
 
 
 def absolute(path: Path) -> Path:

@@ -25,7 +25,7 @@ def docs(
 ) -> int:
     """Print a page of the documentation, or its topics.
 
-    On a terminal the page is laid out; elsewhere it is Markdown, as it was written.
+    On a terminal the page is laid out; elsewhere it is Markdown.  Formulas are plain text.
     """
     from heavytop.api.pages import page, topics
 
@@ -35,9 +35,9 @@ def docs(
         for name, title in titles.items():
             print(f"{name:{width}}  {title}")
     elif sys.stdout.isatty():
-        from rich.markdown import Markdown
+        from heavytop.cli.markdown import Page
 
-        show_on_terminal(Markdown(page(topic)))
+        show_on_terminal(Page(page(topic)))
     else:
         print(page(topic), end="")
     return ExitCode.GOOD

@@ -35,19 +35,19 @@ def check_integrator(
 
     say_former([integrator])
     with waiting("each part of the contract", 60):
-        found = check(integrator)
-    violated = [each for each in found if each.verdict == "violated"]
+        results = check(integrator)
+    violated = [check for check in results if check.verdict == "violated"]
     if json:
         verdict = "violated" if violated else "kept"
-        checks = [asdict(each) for each in found]
+        checks = [asdict(check) for check in results]
         about = {"integrator": current(integrator), "verdict": verdict, "not_tried": NOT_TRIED}
         print_json(about | {"checks": checks})
     else:
-        width = max(len(each.check) for each in found)
-        for each in found:
-            head = f"{each.verdict:8}  {each.check:{width}}  "
-            print(fill(each.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
-        print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
+        width = max(len(check.check) for check in results)
+        for result in results:
+            head = f"{result.verdict:8}  {result.check:{width}}  "
+            print(fill(result.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
+        print(f"\n{len(violated)} of {len(results)} violated." if violated else "\nNothing is violated.")
         print(fill(NOT_TRIED, 80, **_WHOLE_WORDS))
     return ExitCode.FINDING if violated else ExitCode.GOOD
 
@@ -108,9 +108,9 @@ def list_(
         print_json(listed)
         return ExitCode.GOOD
     print("Cases (--case NAME shows the data)")
-    _lines({each["name"]: _about(each) for each in listed["cases"]}, indent=15)
+    _lines({entry["name"]: _about(entry) for entry in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
-    _lines({each["name"]: _about(each) for each in listed["bodies"]}, indent=15)
+    _lines({entry["name"]: _about(entry) for entry in listed["bodies"]}, indent=15)
     plans = f"{', '.join(listed['plans'])}, or a TOML file"
     print("Plans")
     print(fill(plans, 80, initial_indent="  ", subsequent_indent="  "))
@@ -136,16 +136,16 @@ def _lines(notes: dict[str, str], indent: int = 0) -> None:
 def _one_case(name: str, json: bool) -> int:
     from heavytop.api.integrators import case_document
 
-    found = case_document(name)
+    document = case_document(name)
     if json:
-        print_json({key: value for key, value in found.items() if key != "json"})  # it would stand in itself
+        print_json({key: value for key, value in document.items() if key != "json"})  # it would stand in itself
         return ExitCode.GOOD
-    print(fill(f"{found['name']}: {found['about']}", 80))
-    if found["source"]:
-        print(fill(f"Source: {found['source']}. Units: {found['units']}.", 80))
+    print(fill(f"{document['name']}: {document['about']}", 80))
+    if document["source"]:
+        print(fill(f"Source: {document['source']}. Units: {document['units']}.", 80))
     for form, title in _FORMS.items():
-        if form in found:
-            print(f"\n{title}\n{found[form]}")
+        if form in document:
+            print(f"\n{title}\n{document[form]}")
     return ExitCode.GOOD
 
 

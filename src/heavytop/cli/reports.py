@@ -56,26 +56,26 @@ def compare(
 
     require_apart((html, markdown, junit), baseline, candidate, policy)
     with counted("comparing", 3, "parts", _REPORT_SECONDS) as advance:  # two reports that are read, and their rows
-        found = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
-    write_comparison(found, markdown, junit, html)
+        result = compared(baseline, candidate, policy, floor, loss, json or junit is not None, advance)
+    write_comparison(result, markdown, junit, html)
     if json:
-        print_json(found.to_json())
+        print_json(result.to_json())
     else:
         from heavytop.report.render.comparison import comparison
 
-        show_on_terminal(comparison(found, full))
-    return found.exit_code
+        show_on_terminal(comparison(result, full))
+    return result.exit_code
 
 
-def write_comparison(found: Comparison, markdown: Path | None, junit: Path | None, html: Path | None) -> None:
+def write_comparison(comparison: Comparison, markdown: Path | None, junit: Path | None, html: Path | None) -> None:
     """The files of a comparison that are asked for, all of them or none."""
     files: list[tuple[Path, str]] = []
     if html is not None:
-        files.append((html, found.to_html()))
+        files.append((html, comparison.to_html()))
     if markdown is not None:
-        files.append((markdown, found.to_markdown(html)))
+        files.append((markdown, comparison.to_markdown(html)))
     if junit is not None:
-        files.append((junit, found.to_junit()))
+        files.append((junit, comparison.to_junit()))
     _write(files)
 
 
@@ -94,13 +94,13 @@ def history(
 
     require_apart((html,), *reports, policy)
     with counted("reading", len(reports), "reports", _REPORT_SECONDS) as advance:
-        found = read_history(reports, metric, case, policy, advance)
+        history_of_reports = read_history(reports, metric, case, policy, advance)
     if html is not None:
-        _write([(html, found.to_html())])
+        _write([(html, history_of_reports.to_html())])
     if json:
-        print_json(found.to_json())
+        print_json(history_of_reports.to_json())
     else:
-        show_on_terminal(history_text(found.names, found.tracks))
+        show_on_terminal(history_text(history_of_reports.names, history_of_reports.tracks))
     return ExitCode.GOOD
 
 
@@ -135,16 +135,16 @@ def show(
     if not files:
         _print(report, full, json)
         return ExitCode.GOOD
-    found = read_report(report)
+    loaded = read_report(report)
     with ExitStack() as stack:
         stack.enter_context(writing())
         if html is not None:
-            page = found.to_html().encode()
+            page = loaded.to_html().encode()
             stack.enter_context(atomic_write(html)).write(page)
         if markdown is not None:
-            stack.enter_context(atomic_write(markdown)).write(found.to_markdown().encode())
+            stack.enter_context(atomic_write(markdown)).write(loaded.to_markdown().encode())
         if parquet is not None:
-            tables.write(parquet, found.rows, found.plan)
+            tables.write(parquet, loaded.rows, loaded.plan)
     for path in files:
         print(path)
     return ExitCode.GOOD
@@ -162,8 +162,8 @@ def _print(report: Path, full: bool, json: bool) -> None:
         print_json(to_json(store.read(report, KINDS), KINDS))
         return
     if not full:
-        found = store.read(report, KINDS)
-        print(brief(found, found.rows, KINDS))
+        loaded = store.read(report, KINDS)
+        print(brief(loaded, loaded.rows, KINDS))
         print(f"\nEvery row: heavytop show {report} --full")
         return
     streamed = store.read_brief(report, KINDS)

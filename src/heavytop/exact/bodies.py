@@ -80,7 +80,7 @@ class Resolved:
 
     def given(self, state: Any) -> list[BallLike]:
         """A state, (Ω, γ) or (Ω, γ, ξ), in the axes given, over any ring that rationals act on."""
-        return [value for place in range(0, len(state), 3) for value in rotated(self.axes, state[place : place + 3])]
+        return [value for begin in range(0, len(state), 3) for value in rotated(self.axes, state[begin : begin + 3])]
 
 
 def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
@@ -132,7 +132,7 @@ def _distance(attitude: Attitude, near: Rows[Fraction], bits: int) -> Fraction:
 def _resolved(
     top: HeavyTop,
     axes: tuple[Vector, Vector, Vector],
-    given: tuple[Body, PrincipalAxes] | None,
+    body_and_axes: tuple[Body, PrincipalAxes] | None,
     start: tuple[Vector, Vector, Any],
     off: tuple[Fraction, Fraction],
     bits: int,
@@ -141,7 +141,7 @@ def _resolved(
     back = transposed(axes)
     unit = dot(up, up) == 1
     xi = rows[0] if rows is not None else perpendicular(up) if unit else None
-    exact = given is None or given[1].exact
+    exact = body_and_axes is None or body_and_axes[1].exact
     if exact and not any(off):
         state = State(rotated(back, spin), rotated(back, up))
         return Resolved(top, state, None if xi is None else rotated(back, xi), axes, None)
@@ -150,9 +150,9 @@ def _resolved(
     omega, speed = _shortened(rotated(back, spin), bits)
     rounded, lacks = (top, None) if exact else _rounded_top(top, bits)
     rate = Fraction(0)
-    if given is not None and not exact:
+    if body_and_axes is not None and not exact:
         fastest = _root(dot(spin, spin)) + 2 * (off[0] + speed)
-        rate = _field_error(given, rounded, lacks, fastest)
+        rate = _field_error(body_and_axes, rounded, lacks, fastest)
     # a vector turned by A moves by at most √3 times the largest of its components
     errors = (*[2 * off[0] + speed] * 3, *[2 * off[1] + rounding] * 6)
     state = State(omega, rotated(back, up))
@@ -178,10 +178,10 @@ def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vect
 
 
 def _field_error(
-    given: tuple[Body, PrincipalAxes], top: HeavyTop, lacks: tuple[Vector, Vector] | None, start_speed: Fraction
+    body_and_axes: tuple[Body, PrincipalAxes], top: HeavyTop, lacks: tuple[Vector, Vector] | None, start_speed: Fraction
 ) -> Fraction:
     """A bound of every component of δ: see the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
-    body, principal = given
+    body, principal = body_and_axes
     rest = _root(sum(value * value for row in principal.left for value in row))
     tensor = _root(sum(value * value for row in body.tensor for value in row))
     none = (Fraction(0), Fraction(0), Fraction(0))
@@ -299,9 +299,9 @@ class BodyMotion:
         if bits not in self._made:
             resolved = resolve(self.body, self.start, bits)
             if resolved.uncertainty is None:
-                found = self.finder(resolved.top, resolved.start, self.system, self.effort)
+                solution = self.finder(resolved.top, resolved.start, self.system, self.effort)
             else:
-                found = Validated(
+                solution = Validated(
                     resolved.top,
                     resolved.start,
                     self.system,
@@ -310,7 +310,7 @@ class BodyMotion:
                     method="validated: Taylor enclosure of irrational data",
                     uncertainty=resolved.uncertainty,
                 )
-            self._made.setdefault(bits, (resolved, found))
+            self._made.setdefault(bits, (resolved, solution))
         return self._made[bits]
 
 
@@ -332,8 +332,8 @@ def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate
 def _given(resolved: Resolved, values: Sequence[arb], bits: int) -> list[arb]:
     with working_precision(bits):
         return [
-            sum((ball(a) * x for a, x in zip(row, values[place : place + 3], strict=True)), arb(0))
-            for place in range(0, len(values), 3)
+            sum((ball(a) * x for a, x in zip(row, values[begin : begin + 3], strict=True)), arb(0))
+            for begin in range(0, len(values), 3)
             for row in resolved.axes
         ]
 

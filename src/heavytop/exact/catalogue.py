@@ -132,10 +132,10 @@ def table() -> list[tuple[str, str, str, str]]:
     """A line a class, in the order of trial: system, class, conditions on the body, conditions on the start."""
 
     def text(conditions: Conditions) -> str:
-        return "; ".join(each.text for each in conditions) or "any"
+        return "; ".join(condition.text for condition in conditions) or "any"
 
-    rows = [(system, each) for system, classes in _CLASSES.items() for each in classes]
-    return [(system, each.name, text(each.body), text(each.starts)) for system, each in rows]
+    rows = [(system, entry) for system, classes in _CLASSES.items() for entry in classes]
+    return [(system, entry.name, text(entry.body), text(entry.starts)) for system, entry in rows]
 
 
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
@@ -144,24 +144,24 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
     A heavy gyrostat whose rotor has no momentum has those of the heavy top too.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
-    yield from (found for found in _attempts(top, start, system) if not isinstance(found, LevelNotDone))
+    yield from (attempt for attempt in _attempts(top, start, system) if not isinstance(attempt, LevelNotDone))
 
 
 def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolution | LevelNotDone]:
     """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
-    for each in _CLASSES[system.name]:
-        for axes in each.namings:
+    for entry in _CLASSES[system.name]:
+        for axes in entry.namings:
             named, begun = renamed_top(top, axes), renamed_state(start, axes)
-            if not (hold(each.body, named, begun) and hold(each.starts, named, begun)):
+            if not (hold(entry.body, named, begun) and hold(entry.starts, named, begun)):
                 continue
             try:
-                found = each.build(named, begun)
+                solution = entry.build(named, begun)
             except LevelNotDone as error:
-                yield LevelNotDone(f"{each.name}: {error.cause}", error.remedy)
+                yield LevelNotDone(f"{entry.name}: {error.cause}", error.remedy)
                 continue
-            yield found if axes == _KEEP[0] else Renamed(found, inverse(axes))
+            yield solution if axes == _KEEP[0] else Renamed(solution, inverse(axes))
             break
     if system is HEAVY_GYROSTAT and not any(top.rotor or ()):
         # with k = 0 the motion is one of the top without a rotor
@@ -175,10 +175,10 @@ def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float 
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     level = ""
-    for found in _attempts(top, start, system):
-        if not isinstance(found, LevelNotDone):
-            return found
-        level = level or found.cause
+    for attempt in _attempts(top, start, system):
+        if not isinstance(attempt, LevelNotDone):
+            return attempt
+        level = level or attempt.cause
     if level:
         return OnLevel(top, start, system, effort=effort, level=level)
     return Validated(top, start, system, effort=effort)

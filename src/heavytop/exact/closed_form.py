@@ -59,10 +59,10 @@ def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
         try:
             return made[key]
         except KeyError:
-            found = make(motion)
+            value = make(motion)
             require_undisturbed()
-            made[key] = found
-            return found
+            made[key] = value
+            return value
 
     return look_up
 
@@ -86,21 +86,21 @@ def without_turning(real: Sequence[Fraction], imaginary: Sequence[Fraction], win
 
     real, imaginary: the coefficients of u and v.
     """
-    found = []
-    for place in range(len(real)):
+    factors = []
+    for k in range(len(real)):
         a = b = Fraction(0)
-        for n in range(place + 1):
+        for n in range(k + 1):
             # (−iκ)^n = (−rate)^n (i√square)^n, and (i√square)² = −square
             weight = (-winding.rate) ** n * (-winding.square) ** (n // 2) / factorial(n)
-            u, v = real[place - n], imaginary[place - n]
+            u, v = real[k - n], imaginary[k - n]
             a, b = (a + weight * u, b + weight * v) if n % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
-        found.append((a, b))
-    return found
+        factors.append((a, b))
+    return factors
 
 
 def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
     """:func:`without_turning` in derivatives at 0, not divided by factorials: of u and v, and of the product."""
-    u, v = ([value / factorial(n) for n, value in enumerate(each)] for each in (real, imaginary))
+    u, v = ([value / factorial(n) for n, value in enumerate(part)] for part in (real, imaginary))
     return [(factorial(n) * a, factorial(n) * b) for n, (a, b) in enumerate(without_turning(u, v, winding))]
 
 
@@ -216,14 +216,14 @@ class Evaluated(ABC):
         return to_bits(lambda _working: self.evaluate(time), bits, self.own_time(time))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        found: list[arb_series] = []
+        series: list[arb_series] = []
 
         def evaluate(_working: int) -> list[arb]:
-            found[:] = [whole_series(part, length) for part in self.evaluate(time)]
-            return [part[0] for part in found]
+            series[:] = [whole_series(part, length) for part in self.evaluate(time)]
+            return [part[0] for part in series]
 
         to_bits(evaluate, bits, self.own_time(time), length)
-        return found
+        return series
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +251,7 @@ class ClosedForm(Evaluated):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Without what was made: balls do not go from process to process."""
-        return type(self), tuple(getattr(self, given.name) for given in fields(self) if given.init)
+        return type(self), tuple(getattr(self, field.name) for field in fields(self) if field.init)
 
 
 class WithAttitude(ClosedForm):
@@ -342,8 +342,8 @@ class Turned:
 
     def _turn(self, working: int) -> tuple[arb, arb, arb]:
         """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
-        found = self._turns.get(working)
-        if found is None:
+        rotation = self._turns.get(working)
+        if rotation is None:
             gamma = self.solution.start.gamma
             wanted, began = initial_xi(gamma), self.own(Fraction(0), working)
             length = ball(dot(gamma, gamma)).sqrt()
@@ -353,7 +353,7 @@ class Turned:
                 self._turns.clear()
             self._turns[working] = turn
             return turn
-        return found
+        return rotation
 
 
 def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits: int) -> list[arb]:

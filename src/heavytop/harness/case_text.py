@@ -31,7 +31,7 @@ def case_data(case: Case) -> dict[str, Any]:
         return head | data_texts(case.top, case.start)
     texts = motion_texts(case.body, case.given_start, _DIGITS)
     return head | {
-        key: _in_decimals(value) if isinstance(value, str) else [_in_decimals(each) for each in value]
+        key: _in_decimals(value) if isinstance(value, str) else [_in_decimals(item) for item in value]
         for key, value in texts.items()
     }
 
@@ -39,10 +39,10 @@ def case_data(case: Case) -> dict[str, Any]:
 def _in_decimals(text: str) -> str:
     """A text whose quotients are decimals where they end: the data of other programs are."""
 
-    def decimal(found: re.Match[str]) -> str:
-        below = int(found[2])
+    def decimal(match: re.Match[str]) -> str:
+        below = int(match[2])
         places = next((n for n in range(_PLACES) if 10**n % below == 0), None)
-        return found[0] if places is None else f"{Decimal(int(found[1]) * 10**places // below).scaleb(-places):f}"
+        return match[0] if places is None else f"{Decimal(int(match[1]) * 10**places // below).scaleb(-places):f}"
 
     return re.sub(r"(?<![\w/.])(-?\d+)/(\d+)(?![\w/.])", decimal, text)
 

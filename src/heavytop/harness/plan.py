@@ -176,9 +176,9 @@ def document_of(text: str) -> dict[str, Any]:
 
 def _as_written(key: str, value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _as_written(name, each) for name, each in value.items()}
+        return {name: _as_written(name, item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_as_written(key, each) for each in value]
+        return [_as_written(key, item) for item in value]
     return str(value) if key in QUANTITIES and type(value) is int else value
 
 
@@ -202,7 +202,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
             raise InputError(f"integrators = {quoted(text)} is no file.", "Give FILE.toml or FILE.py:FUNCTION.")
         else:
             sources.append(source)
-    defined = {each.name: each for each in sources}
+    defined = {source.name: source for source in sources}
     for name in (name for name in defined if name in known_integrators()):
         raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
     if len(defined) < len(sources):
@@ -254,9 +254,9 @@ def with_integrator(plan: Plan, integrator: str | IntegratorSource) -> Plan:
 
 def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     """The plan in a TOML document; raises ValidationError with the place of an unknown key, kind or impossible type."""
-    tables = {each.name: each.table for each in kinds.values() if each.table is not None}
+    tables = {kind.name: kind.table for kind in kinds.values() if kind.table is not None}
     _require_kinds(document, "measure", tables)
-    _require_kinds(document, "sweep", {str(each.__struct_config__.tag) for each in get_args(Sweep)})
+    _require_kinds(document, "sweep", {str(sweep_class.__struct_config__.tag) for sweep_class in get_args(Sweep)})
     _require_keys(document, tables)
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
@@ -268,25 +268,25 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
 def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) -> None:
     """Raises ValidationError for a table of a kind that is not there: with those that are, and the nearest."""
     entries = table.get(section)
-    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+    for index, entry in enumerate(entries if isinstance(entries, list) else []):
         kind = entry.get("kind") if isinstance(entry, dict) else None
         if isinstance(kind, str) and kind not in known:
             near = get_close_matches(kind, known, 1)
             meant = f"; did you mean {near[0]}" if near else ""
             raise msgspec.ValidationError(
-                f"kind = {quoted(kind)} in {section}[{place}] is none of {', '.join(sorted(known))}{meant}"
+                f"kind = {quoted(kind)} in {section}[{index}] is none of {', '.join(sorted(known))}{meant}"
             )
 
 
 def _require_keys(document: dict[str, Any], tables: Mapping[str, type[PlanTable]]) -> None:
     """Raises ValidationError for a [[measure]] with a key that its kind does not have: with those that it has."""
     entries = records.of_document(document).get("measure")
-    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+    for index, entry in enumerate(entries if isinstance(entries, list) else []):
         table = tables.get(entry.get("kind", "")) if isinstance(entry, dict) else None
         keys = {"kind"} if table is None else {"kind", *table.__struct_encode_fields__}
         if table is not None and (unknown := min(entry.keys() - keys, default="")):
             raise msgspec.ValidationError(
-                f"unknown field `{unknown[:40]}` in measure[{place}]; kind = {quoted(entry['kind'])} has "
+                f"unknown field `{unknown[:40]}` in measure[{index}]; kind = {quoted(entry['kind'])} has "
                 + ", ".join(sorted(keys - {"kind"}))
             )
 
@@ -312,24 +312,26 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
         for whole in plan.measure
-        for table, cases in _parts(whole, {name: whole.swept(*each) for name, each in zip(swept, sweeps, strict=True)})
+        for table, cases in _parts(
+            whole, {name: whole.swept(*entry) for name, entry in zip(swept, sweeps, strict=True)}
+        )
     ]
     sources: dict[str, IntegratorSource | None] = {}
     seen: dict[RowKey, str] = {}
     for templates, _ in parts:
-        for place, task in enumerate(templates):
+        for index, task in enumerate(templates):
             subject = task.key.subject
             if subject.what == "computed" and subject.name not in sources:
                 sources[subject.name] = (defined or {}).get(subject.name)
                 require_integrator(sources[subject.name] or subject.name)
-            task = templates[place] = replace(task, source=sources.get(subject.name))
+            task = templates[index] = replace(task, source=sources.get(subject.name))
             work = _exactly(task.key)
             if work in seen:
                 other = "" if seen[work] == task.label else f", also as {seen[work]}"
                 raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
             if task.label in seen.values():  # one case at several horizons
-                templates[place] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
-            seen[work] = templates[place].label
+                templates[index] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
+            seen[work] = templates[index].label
             _require_fit(task)
     if not seen:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
@@ -338,8 +340,8 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     def task_at(index: int) -> Task:
         part = bisect_right(ends, index)
         templates, cases = parts[part]
-        place, which = divmod(index - (ends[part - 1] if part else 0), len(templates))
-        return templates[which].of(cases[place]) if cases else templates[which]
+        template, which = divmod(index - (ends[part - 1] if part else 0), len(templates))
+        return templates[which].of(cases[template]) if cases else templates[which]
 
     return Lazy(ends[-1], task_at)
 
@@ -366,9 +368,9 @@ def warnings(plan: Plan) -> list[str]:
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
     """The cases of each sweep, by the name under which tables ask for them."""
     swept: dict[str, Sequence[Case]] = {}
-    for place, sweep in enumerate(plan.sweep):
+    for index, sweep in enumerate(plan.sweep):
         _require_name(sweep.name, "sweep")
-        for other in plan.sweep[:place]:
+        for other in plan.sweep[:index]:
             if sweep.name == other.name:
                 raise InputError(f"The plan {plan.name} has two sweeps {sweep.name!r}.", _RENAME)
             if sweep == msgspec.structs.replace(other, name=sweep.name):

@@ -40,7 +40,7 @@ class Lazy(Sequence[_T]):
     def __getitem__(self, index: slice) -> list[_T]: ...
     def __getitem__(self, index: int | slice) -> _T | list[_T]:
         picked = self._indices[index]
-        return self._make(picked) if isinstance(picked, int) else [self._make(each) for each in picked]
+        return self._make(picked) if isinstance(picked, int) else [self._make(index) for index in picked]
 
 
 class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
@@ -80,12 +80,12 @@ class SweepGrid(Strict, tag="grid"):
             raise InputError(f"The sweep {self.name} varies nothing.", "Give a list of values, or use [[top]].")
 
         def label(index: int) -> str:
-            place = zip(numpy.unravel_index(index, shape), axes, strict=True)
-            return f"{self.name}[{','.join(str(i) for i, axis in place if isinstance(axis, list))}]"
+            position = zip(numpy.unravel_index(index, shape), axes, strict=True)
+            return f"{self.name}[{','.join(str(i) for i, axis in position if isinstance(axis, list))}]"
 
         def point(index: int) -> Case:
-            place = numpy.unravel_index(index, shape)
-            inertia, weight, centre, omega, gamma, rotor = (axis[i] for axis, i in zip(axes, place, strict=True))
+            position = numpy.unravel_index(index, shape)
+            inertia, weight, centre, omega, gamma, rotor = (axis[i] for axis, i in zip(axes, position, strict=True))
             top = HeavyTop(inertia, weight, centre, rotor)
             return Case(label(index), "from a grid", system_of(self.system, top), top, State(omega, gamma))
 
@@ -105,16 +105,16 @@ class SweepGrid(Strict, tag="grid"):
 
     def _axis(self, what: str) -> list[Any] | tuple[Any]:
         """The values of one of the six: a list where the plan lists them, a tuple of one where it gives one."""
-        given = getattr(self, what)
-        if given is None:  # no rotor
+        values = getattr(self, what)
+        if values is None:  # no rotor
             return (None,)
         with prefixed(f"The sweep {self.name}"):
             if what == "weight":
-                return [exact(value) for value in given] if isinstance(given, list) else (exact(given),)
-            if not given or all(isinstance(part, list) for part in given):
-                return [vector(value, what) for value in given]
-            if all(isinstance(part, str) for part in given):
-                return (vector(given, what),)
+                return [exact(value) for value in values] if isinstance(values, list) else (exact(values),)
+            if not values or all(isinstance(part, list) for part in values):
+                return [vector(value, what) for value in values]
+            if all(isinstance(part, str) for part in values):
+                return (vector(values, what),)
         raise InputError(
             f"The sweep {self.name}: {what} mixes numbers and lists.", "Give three numbers, or lists of three."
         )

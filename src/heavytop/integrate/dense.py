@@ -104,12 +104,12 @@ class Piece:
     def _powers_of_length(self, count: int) -> list[Dyadic]:
         """length^n for 0 ≤ n < count, to as many bits as are kept."""
         m, e = dyadic(self.length)
-        found = [(1, 0)]
+        powers = [(1, 0)]
         for _ in range(count - 1):
-            k, f = found[-1][0] * m, found[-1][1] + e
+            k, f = powers[-1][0] * m, powers[-1][1] + e
             excess = max(0, k.bit_length() - self._bits)
-            found.append((k >> excess, f + excess))
-        return found
+            powers.append((k >> excess, f + excess))
+        return powers
 
     def state(self, s: fmpq) -> list[Fraction]:
         """(Ω, γ) at s, exactly as the polynomials give it."""
@@ -131,8 +131,8 @@ def _fixed_point(values: Sequence[Dyadic], bits: int) -> fmpq_poly:
     top = max((m.bit_length() + e for m, e in values if m), default=0)
     shift = bits - top
     integers = [m << (e + shift) if e + shift >= 0 else m >> -(e + shift) for m, e in values]
-    found = fmpq_poly(fmpz_poly(integers))
-    return found / (1 << shift) if shift >= 0 else found * (1 << -shift)
+    polynomial = fmpq_poly(fmpz_poly(integers))
+    return polynomial / (1 << shift) if shift >= 0 else polynomial * (1 << -shift)
 
 
 @dataclass(slots=True)

@@ -108,7 +108,7 @@ class Convention:
     def upright(self, vector: Sequence[Any]) -> list[Any]:
         """A vector of the file's axes of space, or three rows of R, in canonical axes of space."""
         places, signs = UPS[self.up]
-        return [_times(vector[place], sign) for place, sign in zip(places, signs, strict=True)]
+        return [_times(vector[index], sign) for index, sign in zip(places, signs, strict=True)]
 
 
 def _directed(rows: Rows[Any], direction: str) -> list[list[Any]]:
@@ -163,7 +163,7 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
     Twice atan2(s, c) with s = |R − S|/(2√2) and c² = 1 − s²: no digits are lost near 0.
     """
     off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
-    square = sum((each * each for each in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
+    square = sum((part * part for part in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
     if square > _ONE:  # of what is no rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
@@ -221,14 +221,14 @@ class ObservedErrors(Statistics):
         if true is None:
             return
         with working_precision(self.bits):
-            found = self._errors(values, true)
+            errors = self._errors(values, true)
             if state is not None:
                 delta = [a - b for a, b in zip(state, true[:6], strict=True)]
                 along, across = split(delta, self.system.field(self.parameters, true[:6]))
-                found |= {Quantity(SOLUTION_ERROR, "along"): along, Quantity(SOLUTION_ERROR, "across"): across}
+                errors |= {Quantity(SOLUTION_ERROR, "along"): along, Quantity(SOLUTION_ERROR, "across"): across}
             for quantity, running in self.running.items():
-                running.take(time, running.following(found[quantity]), time in self.keep)
-            self._last = float(found[Quantity(SOLUTION_ERROR, "relative")].abs_upper())
+                running.take(time, running.following(errors[quantity]), time in self.keep)
+            self._last = float(errors[Quantity(SOLUTION_ERROR, "relative")].abs_upper())
 
     def last(self, rate: Fraction) -> float:
         """The largest error of a column in the last sample."""
@@ -242,15 +242,15 @@ class ObservedErrors(Statistics):
         if len(true) > 6:
             along = rotated(axes, true[6:9])
             rows = [along, cross(gamma, along), gamma]
-        given = {name: [ball(value) for value in part] for name, part in values.items()}
-        found: dict[Quantity, arb] = {}
+        numbers = {name: [ball(value) for value in part] for name, part in values.items()}
+        parts: dict[Quantity, arb] = {}
         columns: list[arb] = []
-        for name, part in given.items():
+        for name, part in numbers.items():
             errors = self._of_columns(name, part, omega, gamma, rows)
             columns.append(errors.pop(Quantity(SOLUTION_ERROR, "relative")))
             for quantity, error in errors.items():
-                found[quantity] = largest((found.get(quantity, error), error))
-        return found | {Quantity(SOLUTION_ERROR, "relative"): largest(columns)}
+                parts[quantity] = largest((parts.get(quantity, error), error))
+        return parts | {Quantity(SOLUTION_ERROR, "relative"): largest(columns)}
 
     def _of_columns(
         self, name: str, part: list[arb], omega: Sequence[arb], gamma: Sequence[arb], rows: Rows[arb] | None
@@ -276,9 +276,9 @@ class ObservedErrors(Statistics):
 
     def _position(self, part: list[arb], rows: Rows[arb]) -> dict[Quantity, arb]:
         pivot = [ball(value) for value in self.said.pivot]
-        given = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
+        position = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
         true = rotated(rows, [ball(value) for value in self.point])
-        off = [a - b for a, b in zip(given, true, strict=True)]
+        off = [a - b for a, b in zip(position, true, strict=True)]
         length, relative = root(dot(off, off)), Quantity(SOLUTION_ERROR, "relative")
         if not self.distance_squared:
             return {Quantity(POSITION_ERROR): length, relative: length}
@@ -294,8 +294,8 @@ class ObservedErrors(Statistics):
         return quantity == Quantity(SOLUTION_ERROR, "relative")
 
 
-def _vector_error(name: str, given: Sequence[arb], true: Sequence[arb]) -> dict[Quantity, arb]:
-    off = [a - b for a, b in zip(given, true, strict=True)]
+def _vector_error(name: str, vector: Sequence[arb], true: Sequence[arb]) -> dict[Quantity, arb]:
+    off = [a - b for a, b in zip(vector, true, strict=True)]
     return {
         Quantity(SOLUTION_ERROR, name): largest(off),
         Quantity(SOLUTION_ERROR, "relative"): relative_error(off, true),
@@ -314,7 +314,7 @@ def state_of(values: Values, said: Convention, posed: Posed, bits: int) -> list[
         return None
     with working_precision(bits):
         columns = {name: [ball(value) for value in part] for name, part in values.items()}
-        form = next((each for each in FORMS if each in columns), None)
+        form = next((name for name in FORMS if name in columns), None)
         rows = None if form is None else said.upright(said.rotation(form, columns[form], ball_functions()))
         gamma = columns["gamma"] if "gamma" in columns else (rows or [])[2]
         if "omega" in columns:
@@ -341,12 +341,12 @@ class JointViolation(Statistics):
     def __call__(self, time: Fraction, values: Values) -> None:
         """Take in one sample."""
         with working_precision(self.bits):
-            given = {name: [ball(value) for value in part] for name, part in values.items()}
-            position, pivot = given["position"], [ball(value) for value in self.said.pivot]
+            columns = {name: [ball(value) for value in part] for name, part in values.items()}
+            position, pivot = columns["position"], [ball(value) for value in self.said.pivot]
             off = self.said.upright([a - b for a, b in zip(position, pivot, strict=True)])
             if any(self.point):
-                form = next(form for form in FORMS if form in given)
-                rows = self.said.upright(self.said.rotation(form, given[form], ball_functions()))
+                form = next(form for form in FORMS if form in columns)
+                rows = self.said.upright(self.said.rotation(form, columns[form], ball_functions()))
                 arm = rotated(rows, [ball(value) for value in self.point])
                 off = [a - b for a, b in zip(off, arm, strict=True)]
             self.distances.take(time, self.distances.following(root(dot(off, off))), time in self.keep)
@@ -403,7 +403,7 @@ class _AttitudeErrors(ObservedErrors):
 
     def quantities(self) -> dict[Quantity, Running]:
         """Both errors, that of the position relative too."""
-        return {q: each for q, each in self.running.items() if q.name in (ATTITUDE_ERROR, POSITION_ERROR)}
+        return {q: running for q, running in self.running.items() if q.name in (ATTITUDE_ERROR, POSITION_ERROR)}
 
 
 class AttitudeScorer(Scorer):

@@ -106,15 +106,15 @@ def known_derivatives(
         )
     known = Validated(resolved.top, resolved.start, system, effort=effort)
     bits = bits_of(digits) + _SPARE_BITS
-    found = derivatives(known, times, bits, which != "start")
+    enclosed = derivatives(known, times, bits, which != "start")
     of_start = of_data = lyapunov = None
     if which != "data":
-        matrices = [in_axes(each.start, resolved) for each in found]
+        matrices = [in_axes(enclosed.start, resolved) for enclosed in enclosed]
         of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
         lyapunov = [None if value is None else Ball(*value_text(value, digits + 1)) for value in exponents]
     if which != "start":
-        matrices = [in_axes(each.data or [], resolved, kept=3) for each in found]
+        matrices = [in_axes(enclosed.data or [], resolved, kept=3) for enclosed in enclosed]
         of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
     return Derivatives(METHOD, of_start, of_data, lyapunov)
 
@@ -133,8 +133,8 @@ def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
 
         def turned(vector: list[Any]) -> list[Any]:
             return [
-                sum((a * x for a, x in zip(row, vector[place : place + 3], strict=True)), arb(0))
-                for place in range(0, len(vector), 3)
+                sum((a * x for a, x in zip(row, vector[begin : begin + 3], strict=True)), arb(0))
+                for begin in range(0, len(vector), 3)
                 for row in axes
             ]
 

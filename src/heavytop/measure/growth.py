@@ -215,7 +215,7 @@ def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
     begin, end = _interval(second - first, starts)
     low, high = _widened(slope, _interval(whole, starts), scatter)
     # the class is that of the numbers as they are written
-    slope, low, high, begin, end = (round(each, _DECIMALS) for each in (slope, low, high, begin, end))
+    slope, low, high, begin, end = (round(value, _DECIMALS) for value in (slope, low, high, begin, end))
     growth = "unresolved" if bent((begin, end)) else nearest_class(slope, low, high)
     return growth, times[late][0], slope, (low, high), (begin, end)
 
@@ -271,7 +271,7 @@ def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
     if _interval(powers, starts)[0] <= CLASSES["t^2"] or better.mean() < 0.95:
         return None
     rates = finite_time_rates(times, numpy.sqrt(shares) * rms)
-    rate, low, high = (round(each, _DECIMALS) for each in (float(numpy.median(rates)), *median_interval(rates)))
+    rate, low, high = (round(value, _DECIMALS) for value in (float(numpy.median(rates)), *median_interval(rates)))
     return "exponential", times[0], rate, (low, high), None
 
 
@@ -299,11 +299,11 @@ def median_interval(values: Array) -> Interval:
     """
     ordered, count = numpy.sort(values), len(values)
     outside, last = 0, 0
-    for place in range(count // 2):
-        outside += math.comb(count, place)
+    for k in range(count // 2):
+        outside += math.comb(count, k)
         if 2 * outside > 0.05 * 2**count:
             break
-        last = place
+        last = k
     return float(ordered[last]), float(ordered[count - 1 - last])
 
 

@@ -80,13 +80,13 @@ class KnownMotion:
         self._kept: dict[int, Sequence[arb]] = {}
         self._signs: list[int] | None = None
 
-    def at(self, place: int, extra: int = GUARD_BITS) -> Sequence[arb]:
+    def at(self, index: int, extra: int = GUARD_BITS) -> Sequence[arb]:
         """Ω, γ and ξ at the time of that place, of ``extra`` bits more than the digits take."""
         if extra != GUARD_BITS:
-            return self.whole(self.times[place], bits_of(self.digits) + extra)
-        if place not in self._kept:
-            self._kept[place] = self.whole(self.times[place], bits_of(self.digits) + extra)
-        return self._kept[place]
+            return self.whole(self.times[index], bits_of(self.digits) + extra)
+        if index not in self._kept:
+            self._kept[index] = self.whole(self.times[index], bits_of(self.digits) + extra)
+        return self._kept[index]
 
     def balls(self, output: Output) -> list[list[arb | None]]:
         """The output at every time, flat, each to the digits asked; None for an Euler angle that is not defined.
@@ -95,7 +95,7 @@ class KnownMotion:
         Raises OutOfReach where the digits cannot be proven.
         """
         narrow = self._narrow(output)
-        outputs = [self._value(place, output, narrow) for place in range(len(self.times))]
+        outputs = [self._value(index, output, narrow) for index in range(len(self.times))]
         if output.name == "quaternion" and outputs:
             turns = self.signs(outputs)
             # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
@@ -108,14 +108,14 @@ class KnownMotion:
     def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:
         """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and from it backwards."""
         if self._signs is None:
-            start, found = self._start(), [1] * len(self.times)
+            start, factors = self._start(), [1] * len(self.times)
             floats = numpy.array([[float(part) for part in q] for q in quaternions])
             for side in (1, -1):
                 places = [p for p, time in enumerate(self.times) if (time >= 0) == (side > 0)]
                 places.sort(key=lambda p: abs(self.times[p]))
-                for place, sign in zip(places, signs(start, floats[places]) if places else (), strict=True):
-                    found[place] = int(sign)
-            self._signs = found
+                for index, sign in zip(places, signs(start, floats[places]) if places else (), strict=True):
+                    factors[index] = int(sign)
+            self._signs = factors
         return self._signs
 
     @whole_evaluation
@@ -125,10 +125,10 @@ class KnownMotion:
         sign = first_sign(q, Fraction(1, 1 << bits_of(self.digits)))
         return [sign * float(part) for part in q]
 
-    def _value(self, place: int, output: Output, narrow: float) -> list[arb | None]:
+    def _value(self, index: int, output: Output, narrow: float) -> list[arb | None]:
         asked, extra = bits_of(self.digits), GUARD_BITS
         most = 2 * asked + 2 * GUARD_BITS if output.name == "euler" else math.inf
-        whole = self.at(place)
+        whole = self.at(index)
         for _ in range(_ATTEMPTS):
             values = self._evaluated(whole, asked + extra, output)
             lacking = max(self._lacking(value, output, narrow) for value in values)
@@ -138,7 +138,7 @@ class KnownMotion:
                 break
             extra += int(lacking) + GUARD_BITS if lacking < math.inf else asked + GUARD_BITS
             try:
-                whole = self.at(place, extra)
+                whole = self.at(index, extra)
             except OutOfReach:
                 if output.name != "euler":
                     raise
@@ -146,7 +146,7 @@ class KnownMotion:
         if output.name == "euler":
             return [None if self._lacking(value, output, narrow) > 0 else value for value in values]
         raise OutOfReach(
-            f"The {output.name} at t = {shown(self.times[place])} is not known to {self.digits} digits, by "
+            f"The {output.name} at t = {shown(self.times[index])} is not known to {self.digits} digits, by "
             f"{self.method}.",
             "Ask for fewer digits.",
         )
@@ -234,7 +234,7 @@ def as_written(
     """A known motion out of printed balls: what has a ``value`` and a ``radius`` as text."""
     with working_precision(bits_of(digits) + 2 * GUARD_BITS):
         lines = [
-            [ball(exact(each.value)) + arb(0, ball(exact(each.radius))) for each in (*y, *xi)]
+            [ball(exact(component.value)) + arb(0, ball(exact(component.radius))) for component in (*y, *xi)]
             for y, xi in zip(states, attitude, strict=True)
         ]
         start = vector(gamma, "gamma")
@@ -337,8 +337,8 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
 
     def _outputs(self, what: Output, write: Callable[[Any], Any]) -> list[Any]:
         """The output at every time in its shape, each number as ``write`` makes it of a ball, or of None."""
-        found = self._known().balls(what)
-        return [shaped([write(value) for value in line], what.shape) for line in found]
+        balls = self._known().balls(what)
+        return [shaped([write(value) for value in line], what.shape) for line in balls]
 
     def _known(self) -> KnownMotion:
         """The motion behind the states; of a reference that was read or copied, the balls that are written in it."""
@@ -364,7 +364,7 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
 
     def _repr_html_(self) -> str:
         states, caption = self.states, "γ, the vertical in body axes, on the unit sphere"
-        picture = path_picture(len(states), lambda place: [ball.value for ball in states[place][3:6]], caption)
+        picture = path_picture(len(states), lambda index: [ball.value for ball in states[index][3:6]], caption)
         return self._table().html() + picture
 
     def derivatives_numpy(self) -> NDArray[numpy.float64] | dict[str, NDArray[numpy.float64]]:
@@ -410,14 +410,14 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
         """All digits, a number a row, which goes on below where it is long; of many times the first and the last."""
         rows: list[list[str]] = []
         count = len(self.times)
-        for place, (time, state) in enumerate(zip(self.times, self.states, strict=True)):
-            if count > 2 * _ENDS and _ENDS <= place < count - _ENDS:
-                rows += [[f"... {count - 2 * _ENDS} more", "", "", ""]] if place == _ENDS else []
+        for index, (time, state) in enumerate(zip(self.times, self.states, strict=True)):
+            if count > 2 * _ENDS and _ENDS <= index < count - _ENDS:
+                rows += [[f"... {count - 2 * _ENDS} more", "", "", ""]] if index == _ENDS else []
                 continue
-            for name, each in zip(NAMES, state, strict=True):
-                parts = [each.value[i : i + _WIDE] for i in range(0, len(each.value), _WIDE)]
+            for name, value in zip(NAMES, state, strict=True):
+                parts = [value.value[i : i + _WIDE] for i in range(0, len(value.value), _WIDE)]
                 rows.append(
-                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), each.radius]
+                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), value.radius]
                 )
                 rows += [["", "", part.ljust(_WIDE), ""] for part in parts[1:]]
         return rows
@@ -457,7 +457,7 @@ def reference(
         steady = stability(system, system.parameters(resolved.top, resolved.start), resolved.start.flat)
     if derivatives is not None:
         derived = known_derivatives(top, start, instants, digits, system, derivatives, effort)
-    found = Reference(
+    result = Reference(
         method=known.method,
         digits=digits,
         written_times=[str(TimeText.of(time)) for time in times],
@@ -470,20 +470,20 @@ def reference(
     if not attitude:
         bits = bits_of(digits)
         states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
-        return msgspec.structs.replace(found, states=states)
+        return msgspec.structs.replace(result, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
     method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
     motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
-    parts = [known_texts(motion.at(place), method, time, digits) for place, time in enumerate(instants)]
-    found = msgspec.structs.replace(
-        found,
+    parts = [known_texts(motion.at(index), method, time, digits) for index, time in enumerate(instants)]
+    result = msgspec.structs.replace(
+        result,
         states=[part[:6] for part in parts],
         attitude=[part[6:] for part in parts],
         attitude_method=method,
         xi=xi_texts(start, digits) or start_texts(start.gamma, digits),
     )
-    found.__dict__["_motion"] = motion
-    return found
+    result.__dict__["_motion"] = motion
+    return result
 
 
 @whole_evaluation

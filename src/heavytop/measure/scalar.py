@@ -37,8 +37,8 @@ def to_ball(value: Any) -> arb:
         return value
     if isinstance(value, float):
         return arb(float(value))
-    if (found := _by_doubles(value)) is not None:
-        return found
+    if (converted := _by_doubles(value)) is not None:
+        return converted
     try:
         return ball(exact(value))
     except InputError:
@@ -198,12 +198,12 @@ def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: 
     numbers = [value for state in states for value in state if value]
     if len(numbers) < least:
         return None
-    return min(_all(numbers, precision), key=lambda each: -each.error, default=None)
+    return min(_all(numbers, precision), key=lambda rounding: -rounding.error, default=None)
 
 
-def explains(found: Rounding, error: float) -> bool:
+def explains(rounding: Rounding, error: float) -> bool:
     """Whether an error, relative to max(1, |value|), is of the size that the rounding makes it."""
-    return _PART * found.error <= error <= EXPLAINS * found.error
+    return _PART * rounding.error <= error <= EXPLAINS * rounding.error
 
 
 def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:

@@ -70,8 +70,8 @@ class Running:
         """Its ``max``, ``rms`` and ``final``; ``missing`` without a sample."""
         if not self.count:
             return {quantity.over(part): Metric("missing", None) for part in STATISTICS}
-        found = (self.maximum, root(self.squares / self.count), self.final)
-        return {quantity.over(part): metric(value) for part, value in zip(STATISTICS, found, strict=True)}
+        statistics = (self.maximum, root(self.squares / self.count), self.final)
+        return {quantity.over(part): metric(value) for part, value in zip(STATISTICS, statistics, strict=True)}
 
     def series(self, quantity: Quantity, time_text: Callable[[Fraction], str]) -> Series:
         """The kept values."""
@@ -113,16 +113,20 @@ class Statistics:
     def metrics(self) -> dict[str, Metric]:
         """``NAME_max``, ``_rms`` and ``_final`` of every quantity, or the first alone."""
         with working_precision(self.bits):
-            found: dict[Quantity, Metric] = {}
+            metrics: dict[Quantity, Metric] = {}
             for quantity, running in self.quantities().items():
                 every, largest = running.metrics(quantity), quantity.over("max")
-                found |= {largest: every[largest]} if self.largest_alone(quantity) else every
-            return by_name(found)
+                metrics |= {largest: every[largest]} if self.largest_alone(quantity) else every
+            return by_name(metrics)
 
     def series(self, time_text: TimeText) -> dict[str, Series]:
         """``NAME`` over the kept times, but for relative errors."""
-        found = self.quantities().items()
-        return {each.text: run.series(each, time_text) for each, run in found if each.component != _RELATIVE}
+        quantities = self.quantities().items()
+        return {
+            quantity.text: run.series(quantity, time_text)
+            for quantity, run in quantities
+            if quantity.component != _RELATIVE
+        }
 
     def content(self) -> dict[str, Any]:
         """The sums so far, by component, as plain text and integers, exact."""
@@ -160,8 +164,8 @@ class Drift(Statistics):
     def take(self, time: Fraction, sums: Sequence[Sums]) -> None:
         """Take in one state by its :meth:`following`."""
         keep = bool(self.keep) and time in self.keep  # a Fraction's hash takes as long as an operation on balls
-        for running, each in zip(self.running.values(), sums, strict=True):
-            running.take(time, each, keep)
+        for running, values in zip(self.running.values(), sums, strict=True):
+            running.take(time, values, keep)
 
     @whole_evaluation
     def _values(self, state: Sequence[Fraction]) -> dict[str, arb]:
@@ -335,19 +339,19 @@ class DriftAndError:
         return self.truth.against
 
     def _parts(self) -> list[Statistics]:
-        return [each for each in (self.drift, self.error) if each is not None]
+        return [part for part in (self.drift, self.error) if part is not None]
 
     def running(self) -> dict[Quantity, Running]:
         """The running values of every drift and error by what they are of."""
-        return {quantity: run for each in self._parts() for quantity, run in each.quantities().items()}
+        return {quantity: run for part in self._parts() for quantity, run in part.quantities().items()}
 
     def metrics(self) -> dict[str, Metric]:
         """``drift_NAME_max``, ... for every integral; ``solution_error_omega_max``, ... where there is a reference."""
-        return {name: metric for each in self._parts() for name, metric in each.metrics().items()}
+        return {name: metric for part in self._parts() for name, metric in part.metrics().items()}
 
     def series(self, time_text: TimeText) -> dict[str, Series]:
         """The series of every drift and error over the kept times."""
-        return {name: series for each in self._parts() for name, series in each.series(time_text).items()}
+        return {name: series for part in self._parts() for name, series in part.series(time_text).items()}
 
 
 class Scorer(DriftAndError):

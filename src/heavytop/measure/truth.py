@@ -109,10 +109,10 @@ class ComputedReference:
         return uncertain
 
 
-def agreement(found: Sequence[ComputedReference]) -> Against:
+def agreement(references: Sequence[ComputedReference]) -> Against:
     """The kind of the references of one ensemble, all over the same times."""
-    (coarse, fine), ends = found[0].words, found[0].ends
-    radii = [each.radius(t) for each in found for t in each.balls if ends is None or abs(t) < abs(ends)]
+    (coarse, fine), ends = references[0].words, references[0].ends
+    radii = [motion.radius(t) for motion in references for t in motion.balls if ends is None or abs(t) < abs(ends)]
     agreed = radius_text(max(radii)) if radii else ""
     until = "" if ends is None else time_text(ends)
     return Against("computed", f"words of {coarse} and {fine} bits", agreed, until=until)
@@ -137,7 +137,7 @@ def _in_format(problem: Problem, precision: Precision) -> Problem:
 
 
 def compute(
-    given: Sequence[Given],
+    problems: Sequence[Given],
     times: Sequence[Fraction],
     bits: int,
     format_bits: int | None = None,
@@ -150,26 +150,30 @@ def compute(
     effort: seconds of the model of the cost that each run may take; None for 60, or the 600 of an ensemble shared out.
     Raises OutOfReach if a run does not reach the last time within the effort.
     """
-    first = [_Served.of(each, bits) for each in given]
-    finer = _finer(given, bits, first)
-    second = [_Served.of(each, finer) for each in given]
+    first = [_Served.of(problem, bits) for problem in problems]
+    finer = _finer(problems, bits, first)
+    second = [_Served.of(problem, finer) for problem in problems]
     words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
-    balls: list[dict[Fraction, list[arb]]] = [{} for _ in given]
-    seconds = effort or (EFFORT if len(given) == 1 else EFFORT_OF_MANY / len(given))
+    balls: list[dict[Fraction, list[arb]]] = [{} for _ in problems]
+    seconds = effort or (EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems))
     for early in _stages(times, _STAGES if format_bits is not None else 0):
         # no bit of a run depends on the samples taken: what a shorter stage had is not taken again
         more = [time for time in early if time not in balls[0]]
         for index, pair in enumerate(zip(_states(first, more, seconds), _states(second, more, seconds), strict=True)):
             known = balls[index] | dict(zip(more, _around(*pair, bits), strict=True))
             balls[index] = {time: known[time] for time in early}
-        found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
-        ends = None if format_bits is None else _last_digit(found, [each.accuracy - format_bits for each in first])
+        references = [ComputedReference(*pair) for pair in zip(words, balls, strict=True)]
+        ends = (
+            None
+            if format_bits is None
+            else _last_digit(references, [served.accuracy - format_bits for served in first])
+        )
         if ends is not None and ends not in times:
             # lost on the way to the first sample
-            return [ComputedReference(each, {}, times[0]) for each in words]
+            return [ComputedReference(words, {}, times[0]) for words in words]
         if ends is not None:
             break
-    return [replace(each, ends=ends) for each in found]
+    return [replace(motion, ends=ends) for motion in references]
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,20 +188,20 @@ class _Served:
     accuracy: int
 
     @classmethod
-    def of(cls, given: Given, bits: int) -> _Served:
-        problem = given(real(bits))
+    def of(cls, request: Given, bits: int) -> _Served:
+        problem = request(real(bits))
         arithmetic, scaled = choose(problem, None)
         return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
 
 
-def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
+def _finer(problems: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
     """The bits of a second format, whose words have 30 bits more at least.
 
     Two formats may be served by the same words, and then differ by nothing.
     """
     finer = bits + MORE_BITS
-    for each, one in zip(given, first, strict=True):
-        while _Served.of(each, finer).bits < one.bits + MORE_BITS:
+    for problem, one in zip(problems, first, strict=True):
+        while _Served.of(problem, finer).bits < one.bits + MORE_BITS:
             finer += _SEARCH
     return finer
 
@@ -210,20 +214,23 @@ def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
     return [*before, *(times[:count] for count in dict.fromkeys(counts[n] for n in range(stages, -1, -1)) if count)]
 
 
-def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
+def _last_digit(references: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
     """The first time at which some motion has lost all significant digits in a format of so many bits ``fewer`` than
     the words have.
 
     Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
     """
-    lost = [each.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits)) for each, bits in zip(found, fewer, strict=True)]
-    return next((time for time in found[0].balls if any(time in each for each in lost)), None)
+    lost = [
+        reference.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits))
+        for reference, bits in zip(references, fewer, strict=True)
+    ]
+    return next((time for time in references[0].balls if any(time in reference for reference in lost)), None)
 
 
 def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:
     """The states of each motion at ``times``."""
-    problems = [each.problem for each in served]
-    words = max(each.bits for each in served)
+    problems = [served.problem for served in served]
+    words = max(served.bits for served in served)
     limit = int(effort / seconds_a_step(words))
     runs = _followed(problems, times, min(limit, _PILOT_STEPS))
     states: list[Sequence[Any]] = [run.states for run in runs]
@@ -349,12 +356,12 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
             return known.truth
         if (nine := _nine(known.solution, problem, horizon)) is not None:
             return Truth(known.against, nine)
-    found = _computed(problem, times, effort)
+    computed = _computed(problem, times, effort)
     if isinstance(known, Known):
-        return found
-    if isinstance(found, str):
-        return f"{known}; {found}"
-    return replace(found, against=replace_struct(found.against, reason=known))
+        return computed
+    if isinstance(computed, str):
+        return f"{known}; {computed}"
+    return replace(computed, against=replace_struct(computed.against, reason=known))
 
 
 def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
@@ -505,15 +512,15 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
     if len(forms) == len(problems):
         return _certified(forms, times, problems[0].precision.bits + GUARD_BITS)
     try:
-        found = of_rounded(problems, times, least)
+        references = of_rounded(problems, times, least)
     except (InputError, OutOfReach) as error:
         return _none(len(problems), f"no closed form; {error.cause}")
-    against = replace_struct(agreement(found), reason="no closed form")
-    motions = [Truth(against, each.state, each.ends) for each in found]
+    against = replace_struct(agreement(references), reason="no closed form")
+    motions = [Truth(against, reference.state, reference.ends) for reference in references]
     covered = [time for time in times if motions[0].covers(time)]
     if not covered:
         return _none(len(problems), f"no closed form; all significant digits are lost at t = {against.until}")
-    return EnsembleReference(against, list(motions), [list(map(each.blur, covered)) for each in found])
+    return EnsembleReference(against, list(motions), [list(map(reference.blur, covered)) for reference in references])
 
 
 def _motion(problem: Problem) -> tuple[Any, ...]:

@@ -88,7 +88,7 @@ class ResumableRun(Steps):
         """Where the last step began, as text: all that is needed to go on from there to the same bits."""
 
     @abstractmethod
-    def restore(self, place: tuple[str, ...], steps: int) -> None:
+    def restore(self, numbers: tuple[str, ...], steps: int) -> None:
         """Go back to that place, after so many steps."""
 
 
@@ -121,11 +121,11 @@ class Scaled:
 
         bounded: with |ω| <= 4 at all times, by the first integrals, in place of |ω| near 1 at the start.
         """
-        given = coefficients(system, p, len(y) == 9)
+        constants = coefficients(system, p, len(y) == 9)
         gamma = _power_above(max(map(abs, y[3:6])))
-        rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
+        rate = _bound(system, p, y) / 4 if bounded else _rate(system, constants, p, y, gamma)
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
-        scaled = given.with_linear(gamma / rate**2, 1 / rate)
+        scaled = constants.with_linear(gamma / rate**2, 1 / rate)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
         return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
 
@@ -146,10 +146,12 @@ def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
     return not turning and not any(system.field(p, y[:6]))
 
 
-def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
+def _rate(
+    system: System, coefficients: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction
+) -> Fraction:
     """A power of two near the rate of the motion: the largest of |Ω|, √(torque per moment), and |λ| or |k|/I."""
-    speed = max(*map(abs, y[:3]), given.turning, abs(p.rotor) if system is GYROSTAT else Fraction(0))
-    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.torque * gamma))) or Fraction(1)
+    speed = max(*map(abs, y[:3]), coefficients.turning, abs(p.rotor) if system is GYROSTAT else Fraction(0))
+    return max((_power_above(speed) if speed else Fraction(0), _root_above(coefficients.torque * gamma))) or Fraction(1)
 
 
 def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
@@ -224,10 +226,10 @@ class _Room:
 
     def __init__(self, orders: int, size: int) -> None:
         width = _width(size)
-        self.given, found = doubles(orders * size * size), doubles((orders + 1) * size * width)
-        self.table = found.reshape(orders + 1, size, width)
+        self.given, products = doubles(orders * size * size), doubles((orders + 1) * size * width)
+        self.table = products.reshape(orders + 1, size, width)
         self.table[0, :, :size] = numpy.eye(size)
-        self.pointers = pointer(self.given), pointer(found)
+        self.pointers = pointer(self.given), pointer(products)
 
 
 class _Rooms(local):
@@ -261,9 +263,9 @@ def _machine(size: int) -> Machine:
         zeros = [code.zero] * (size * width // LANES)
         sums = code.loop(0, after, lambda m, values: _product(code, size, (slopes, powers), (m, n), values), zeros)
         divisor = code.spread(after.to_double())
-        place = code.address(powers, after * (size * width))
+        address = code.address(powers, after * (size * width))
         for k, total in enumerate(sums):
-            code.store(total / divisor, place, LANES * k)
+            code.store(total / divisor, address, LANES * k)
 
     code.loop(0, orders, order, [])
     code.builder.ret_void()
@@ -279,10 +281,10 @@ def _product(
     power = code.address(tables[1], (n - m) * (size * width))
     parts = width // LANES
     rows = [code.load(power, LANES * k) for k in range(size * parts)]
-    found = list(sums)
+    result = list(sums)
     for i in range(size):
         for j in range(size):
             factor = code.spread(code.load_one(slope, size * i + j))
             for part in range(parts):
-                found[parts * i + part] = code.fma(factor, rows[parts * j + part], found[parts * i + part])
-    return found
+                result[parts * i + part] = code.fma(factor, rows[parts * j + part], result[parts * i + part])
+    return result

@@ -172,11 +172,11 @@ class _Path:
         with self._lock:
             while not self._ended and self._steps[-1][0] < span and len(self._steps) <= steps:
                 self._ended = not self._advance()
-        place = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
-        if place == min(len(self._steps), steps + 1):
-            time, largest, lost = self._steps[place - 1]
+        index = bisect_left(self._steps[: steps + 1], span, key=itemgetter(0))
+        if index == min(len(self._steps), steps + 1):
+            time, largest, lost = self._steps[index - 1]
             return largest, lost, time
-        (time, *before), (end, *after) = self._steps[max(place - 1, 0)], self._steps[place]
+        (time, *before), (end, *after) = self._steps[max(index - 1, 0)], self._steps[index]
         part = (span - time) / (end - time) if math.isfinite(end) and end > time else 0.0
         largest, lost = (a ** (1 - part) * b**part for a, b in zip(before, after, strict=True))
         return largest, lost, span
@@ -223,17 +223,17 @@ def _series(linear: Doubles | None, twice: Doubles, state: Doubles) -> Doubles:
     linear: L; None where it is 0.  twice: 2 B, shape (36, 6).
     """
     kind = state.dtype
-    found, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
-    found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)
-    columns, shares = found.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
+    series, jacobians = numpy.empty((_ORDER + 1, 6, 7), kind), numpy.empty((6, 6 * _ORDER), kind)
+    series[0, :, 0], series[0, :, 1:] = state, numpy.eye(6)
+    columns, shares = series.reshape(-1, 7), numpy.array([0.5, 1, 1, 1, 1, 1, 1])
     for n in range(_ORDER):
-        place = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
-        jacobians[:, place : place + 6] = (twice @ found[n, :, 0]).reshape(6, 6)
-        sums = shares * (jacobians[:, place:] @ columns[: 6 * n + 6])
+        offset = 6 * (_ORDER - 1 - n)  # the latest first, as the sum takes them
+        jacobians[:, offset : offset + 6] = (twice @ series[n, :, 0]).reshape(6, 6)
+        sums = shares * (jacobians[:, offset:] @ columns[: 6 * n + 6])
         if linear is not None:
-            sums += linear @ found[n]
-        numpy.divide(sums, n + 1, out=found[n + 1])
-    return found
+            sums += linear @ series[n]
+        numpy.divide(sums, n + 1, out=series[n + 1])
+    return series
 
 
 def digits_eaten(factor: float) -> float:

@@ -113,7 +113,7 @@ def quaternion_products(rows: Rows[Real]) -> tuple[tuple[Real, ...], ...]:
 def _multiple_of_quaternion(rows: Rows[Real]) -> tuple[Real, ...]:
     """4 c q with c the largest component of q: c² is at least 1/4, so that no digits are lost."""
     products = quaternion_products(rows)
-    return products[max(range(4), key=lambda place: float(products[place][place]))]
+    return products[max(range(4), key=lambda index: float(products[index][index]))]
 
 
 def quaternion_of_rows(rows: Rows[Real], lib: Library) -> tuple[Real, Real, Real, Real]:
@@ -260,9 +260,9 @@ class Attitude:
         Raises InputError unless R Rᵀ = 1 and det R = 1 exactly; with ``normalize`` for what is farther than 1e-2 from
         a rotation, in place of which the rotation near it is taken.
         """
-        found = _square(rows)
-        off = max(abs(dot(found[i], found[j]) - (i == j)) for i in range(3) for j in range(3))
-        if dot(found[0], cross(found[1], found[2])) < 0:
+        entries = _square(rows)
+        off = max(abs(dot(entries[i], entries[j]) - (i == j)) for i in range(3) for j in range(3))
+        if dot(entries[0], cross(entries[1], entries[2])) < 0:
             raise InputError(
                 "The matrix is a reflection: its determinant is negative.",
                 "Give the rotation from body axes to space axes; both systems of axes are right-handed.",
@@ -270,8 +270,8 @@ class Attitude:
         if off > (Fraction(1, 100) if normalize else 0):
             raise InputError(f"The matrix is not orthogonal: an entry of R R^T - 1 is {_size(off)}.", _NORMALIZE)
         if off:
-            return cls.quaternion(*_multiple_of_quaternion(found), normalize=True)
-        return cls("matrix", tuple(value for row in found for value in row))
+            return cls.quaternion(*_multiple_of_quaternion(entries), normalize=True)
+        return cls("matrix", tuple(value for row in entries for value in row))
 
     @classmethod
     def euler(cls, sequence: str, a: Given | Angle, b: Given | Angle, c: Given | Angle) -> Attitude:
@@ -284,10 +284,10 @@ class Attitude:
     @classmethod
     def axis_angle(cls, axis: Iterable[Any], angle: Given | Angle) -> Attitude:
         """The rotation by ``angle`` (radians, or "30deg") about ``axis``, of any length; raises InputError for 0."""
-        found = vector(axis, "axis")
-        if not any(found):
+        direction = vector(axis, "axis")
+        if not any(direction):
             raise InputError("The axis is the zero vector, which has no direction.", "Give the axis of the rotation.")
-        return cls("axis_angle", found, (Angle.read(angle),))
+        return cls("axis_angle", direction, (Angle.read(angle),))
 
     @classmethod
     def rotation(cls, rotation: Rotation) -> Attitude:
@@ -370,7 +370,7 @@ class Attitude:
         if sum(value != 0 for value in self.numbers) == 1:
             n = [number(Fraction((value > 0) - (value < 0))) for value in self.numbers]
         elif sine == 0 and cosine == 1:
-            n = [number(Fraction(place == 0)) for place in range(3)]
+            n = [number(Fraction(k == 0)) for k in range(3)]
         else:
             length = root(number(square))
             n = [number(value) / length for value in self.numbers]
@@ -384,19 +384,19 @@ class Attitude:
 
 def _quarter(count: int) -> tuple[Fraction, Fraction]:
     """(cos, sin) of so many right angles."""
-    found = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
-    return Fraction(found[0]), Fraction(found[1])
+    turn = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
+    return Fraction(turn[0]), Fraction(turn[1])
 
 
 def _square(rows: Iterable[Any]) -> Three[Vector]:
     """Three rows of three, out of three rows or nine numbers."""
     remedy = "Give R row by row: nine numbers, or three rows of three."
-    found = ordered(rows, "matrix", remedy)
-    if len(found) == 9:
-        found = [found[:3], found[3:6], found[6:]]
-    if len(found) != 3:
-        raise InputError(f"matrix has {len(found)} entries.", remedy)
-    first, second, third = (vector(row, "a row of the matrix") for row in found)
+    square = ordered(rows, "matrix", remedy)
+    if len(square) == 9:
+        square = [square[:3], square[3:6], square[6:]]
+    if len(square) != 3:
+        raise InputError(f"matrix has {len(square)} entries.", remedy)
+    first, second, third = (vector(row, "a row of the matrix") for row in square)
     return first, second, third
 
 
@@ -540,7 +540,7 @@ class Output:
     @property
     def columns(self) -> tuple[str, ...]:
         """In a CSV file."""
-        return _COLUMNS.get(self.name) or tuple(f"euler{place}" for place in (1, 2, 3))
+        return _COLUMNS.get(self.name) or tuple(f"euler{k}" for k in (1, 2, 3))
 
     def at(
         self,
@@ -592,8 +592,8 @@ def output(text: str | Output, point: Iterable[Any] | None = None, pivot: Iterab
         sequence = require_sequence(sequence.strip())
     if name != "position" and (point is not None or pivot is not None):
         raise InputError(f"{name} has no point and no pivot.", "Ask for position, or leave them out.")
-    found = None if point is None else _place(point, "point")
-    return Output(name, sequence, found, _ORIGIN if pivot is None else _place(pivot, "pivot"))
+    vector_of_point = None if point is None else _place(point, "point")
+    return Output(name, sequence, vector_of_point, _ORIGIN if pivot is None else _place(pivot, "pivot"))
 
 
 def _place(value: Iterable[Any], what: str) -> Vector:
@@ -628,7 +628,7 @@ def shaped(values: Sequence[Any], shape: tuple[int, ...]) -> list[Any]:
     if len(shape) == 1:
         return list(values)
     size = len(values) // shape[0]
-    return [shaped(values[place : place + size], shape[1:]) for place in range(0, len(values), size)]
+    return [shaped(values[begin : begin + size], shape[1:]) for begin in range(0, len(values), size)]
 
 
 def first_sign(q: Sequence[Fraction], slack: Fraction = Fraction(0)) -> int:
@@ -655,13 +655,13 @@ def signs(start: Sequence[float], quaternions: NDArray[numpy.float64]) -> NDArra
 
 def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, Any]:
     """The keys of a JSON document for these outputs."""
-    found: dict[str, Any] = {}
+    document: dict[str, Any] = {}
     for output in outputs:
-        found[output.key] = values(output)
+        document[output.key] = values(output)
         if output.name == "euler":
-            found["sequence"] = output.sequence
+            document["sequence"] = output.sequence
         if output.point is not None:
-            found["point"] = [exact_text(value) for value in output.point]
+            document["point"] = [exact_text(value) for value in output.point]
         if any(output.pivot):
-            found["pivot"] = [exact_text(value) for value in output.pivot]
-    return found
+            document["pivot"] = [exact_text(value) for value in output.pivot]
+    return document

@@ -80,9 +80,9 @@ def principal_axes(tensor: Rows[Fraction], bits: int) -> PrincipalAxes:
         return _with_rest(tensor, IDENTITY, (tensor[0][0], tensor[1][1], tensor[2][2]))
     bits += _spread(tensor)
     near = _near(tensor, bits)
-    found = _rational(tensor, near)
-    if found is not None:
-        return found
+    axes = _rational(tensor, near)
+    if axes is not None:
+        return axes
     turned = multiplied(transposed(near), multiplied(tensor, near))
     first, second, third = (round_to(turned[i][i], bits + _GUARD_BITS) for i in range(3))
     return _with_rest(tensor, near, _exact_moments(tensor, (first, second, third)))
@@ -126,11 +126,11 @@ def _less(tensor: Rows[Fraction], moment: Fraction) -> Three[Vector]:
 def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
     """Each moment that is rational in place of the number near it: over the common denominator it is an integer."""
     common = lcm(*(value.denominator for row in tensor for value in row))
-    found = []
+    moments = []
     for value in near:
         candidate = Fraction(round(value * common), common)
-        found.append(candidate if _determinant(_less(tensor, candidate)) == 0 else value)
-    return found[0], found[1], found[2]
+        moments.append(candidate if _determinant(_less(tensor, candidate)) == 0 else value)
+    return moments[0], moments[1], moments[2]
 
 
 def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | None:
@@ -147,7 +147,7 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
         permutations(range(3)),
         key=lambda chosen: sum(abs(dot(vectors[chosen[i]], transposed(near)[i])) for i in range(3)),
     )
-    columns = [vectors[place] for place in order]
+    columns = [vectors[index] for index in order]
     columns = [v if dot(v, u) >= 0 else (-v[0], -v[1], -v[2]) for v, u in zip(columns, transposed(near), strict=True)]
     if _determinant(columns) < 0:
         columns[2] = (-columns[2][0], -columns[2][1], -columns[2][2])
@@ -159,18 +159,18 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
 def _unit_vectors(tensor: Rows[Fraction], moments: Vector) -> list[Vector] | None:
     """Three rational unit vectors along principal axes; None where there are none."""
     single = [moment for moment in moments if moments.count(moment) == 1]
-    found = []
+    vectors = []
     for moment in single:
         rows = _less(tensor, moment)
         v = max((cross(rows[i], rows[j]) for i, j in ((0, 1), (1, 2), (2, 0))), key=lambda v: dot(v, v))
         length = rational_root(dot(v, v))
         if length is None:
             return None
-        found.append((v[0] / length, v[1] / length, v[2] / length))
-    if len(found) == 1:  # the other two moments are equal: any axes across
-        across = perpendicular(found[0])
-        found += [across, cross(found[0], across)]
-    return found
+        vectors.append((v[0] / length, v[1] / length, v[2] / length))
+    if len(vectors) == 1:  # the other two moments are equal: any axes across
+        across = perpendicular(vectors[0])
+        vectors += [across, cross(vectors[0], across)]
+    return vectors
 
 
 def _near(tensor: Rows[Fraction], bits: int) -> tuple[Vector, Vector, Vector]:
@@ -259,21 +259,21 @@ class Body:
         about: str | None = None,
         rotor: Iterable[Any] | None = None,
     ) -> None:
-        found = {"mass": _number(mass, "mass"), "gravity": _number(gravity, "gravity")}
-        if found["mass"] <= 0:
-            raise InputError(f"mass = {shown(found['mass'])} is not positive.", "Give the mass of the body.")
-        if found["gravity"] < 0:
+        data = {"mass": _number(mass, "mass"), "gravity": _number(gravity, "gravity")}
+        if data["mass"] <= 0:
+            raise InputError(f"mass = {shown(data['mass'])} is not positive.", "Give the mass of the body.")
+        if data["gravity"] < 0:
             raise InputError(
-                f"gravity = {shown(found['gravity'])} is negative.",
+                f"gravity = {shown(data['gravity'])} is negative.",
                 "Give its size, such as 9.81: gravity points down; e_z, or the axis named by up, points up.",
             )
-        place = vector(centre, "centre")
-        given = _tensor(inertia)
-        to_pivot = _about(about, place) == CENTRE
-        at_pivot = plus(given, steiner(found["mass"], place)) if to_pivot else given
-        _require_positive(at_pivot, MassProperties(six_of(given), found["mass"], place, not to_pivot))
+        centre_vector = vector(centre, "centre")
+        inertia_tensor = _tensor(inertia)
+        to_pivot = _about(about, centre_vector) == CENTRE
+        at_pivot = plus(inertia_tensor, steiner(data["mass"], centre_vector)) if to_pivot else inertia_tensor
+        _require_positive(at_pivot, MassProperties(six_of(inertia_tensor), data["mass"], centre_vector, not to_pivot))
         whirl = None if rotor is None else vector(rotor, "rotor")
-        values = {**found, "centre": place, "tensor": at_pivot, "about": about, "rotor": whirl}
+        values = {**data, "centre": centre_vector, "tensor": at_pivot, "about": about, "rotor": whirl}
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -289,8 +289,8 @@ class Body:
         """
         from heavytop.top.body_files import read_body
 
-        found = read_body(Path(path), link).about(None if pivot is None else vector(pivot, "pivot"))
-        return cls(found.mass, gravity, found.centre, found.six, PIVOT if found.at_pivot else CENTRE)
+        body = read_body(Path(path), link).about(None if pivot is None else vector(pivot, "pivot"))
+        return cls(body.mass, gravity, body.centre, body.six, PIVOT if body.at_pivot else CENTRE)
 
     def __repr__(self) -> str:
         texts = [[exact_text(value) for value in row] for row in self.tensor]
@@ -441,14 +441,14 @@ def _principal_moments(tensor: Tensor) -> list[Fraction]:
     return [Fraction(value) * size for value in values.tolist()]
 
 
-def _require_positive(tensor: Tensor, given: MassProperties) -> None:
+def _require_positive(tensor: Tensor, body: MassProperties) -> None:
     """Raises InputError unless every principal moment about the pivot is positive; names the slip that mends it."""
     if is_positive(tensor):
         return
     least = six_digits(_principal_moments(tensor)[0])
     remedy = "Check its entries, and the signs of the products of inertia: I12 is minus the integral of x y dm."
     cause = f"The principal moments of inertia must be positive; the smallest is {least}."
-    raise InputError(cause, mending(given) or remedy)
+    raise InputError(cause, mending(body) or remedy)
 
 
 # A body and its start out of texts: options of the command line, the tables of a plan.
@@ -468,61 +468,61 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     normalize: move γ, or a quaternion or matrix, to a rotation in exact rationals near it.
     Raises InputError for what is missing, contradicts another, or is no body or start.
     """
-    given = {key: value for key, value in values.items() if value is not None and value != []}
-    if "file" in given:
-        return body_of(given), _start(given, normalize)
+    data = {key: value for key, value in values.items() if value is not None and value != []}
+    if "file" in data:
+        return body_of(data), _start(data, normalize)
     for key in ("inertia", "centre"):
-        _require(given, key)
-    return _body(given), _start(given, normalize)
+        _require(data, key)
+    return _body(data), _start(data, normalize)
 
 
-def body_of(given: Mapping[str, Any]) -> Body:
+def body_of(data: Mapping[str, Any]) -> Body:
     """The body of a ``file``, and ``link``, with the gravity that stands beside it; raises InputError for more keys."""
-    twice = [key for key in BODY if key in given and key != "gravity"]
+    twice = [key for key in BODY if key in data and key != "gravity"]
     if twice:
         raise InputError(f"file and {twice[0]} were given.", f"The file says {twice[0]}: leave it out.")
-    return Body.from_file(given["file"], given.get("link"), gravity=given.get("gravity", "9.81"))
+    return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity", "9.81"))
 
 
-def _require(given: Mapping[str, Any], key: str) -> Any:
-    if key not in given:
+def _require(data: Mapping[str, Any], key: str) -> Any:
+    if key not in data:
         raise InputError(f"{key} is missing.", f"Give {key}, or the name of a case that has it.")
-    return given[key]
+    return data[key]
 
 
-def _body(given: Mapping[str, Any]) -> HeavyTop | Body:
-    described = [key for key in ("mass", "gravity", "about") if key in given]
-    rotor = given.get("rotor")
-    if "weight" in given:
+def _body(data: Mapping[str, Any]) -> HeavyTop | Body:
+    described = [key for key in ("mass", "gravity", "about") if key in data]
+    rotor = data.get("rotor")
+    if "weight" in data:
         if described:
             raise InputError(
                 f"weight and {described[0]} were given.",
                 "Give weight with principal moments about the pivot, or mass and gravity with a tensor in any axes.",
             )
-        if len(given["inertia"]) in (6, 9):
+        if len(data["inertia"]) in (6, 9):
             raise InputError(
-                f"inertia has {len(given['inertia'])} numbers, and a weight stands beside it.",
+                f"inertia has {len(data['inertia'])} numbers, and a weight stands beside it.",
                 "A tensor in any axes needs mass and gravity in place of weight; with weight give 3 principal moments.",
             )
-        return HeavyTop(given["inertia"], given["weight"], given["centre"], rotor)
+        return HeavyTop(data["inertia"], data["weight"], data["centre"], rotor)
     if not described:
         raise InputError("Neither weight nor mass and gravity were given.", "Give weight, or mass and gravity.")
     for key in ("mass", "gravity"):
-        _require(given, key)
-    return Body(given["mass"], given["gravity"], given["centre"], given["inertia"], given.get("about"), rotor)
+        _require(data, key)
+    return Body(data["mass"], data["gravity"], data["centre"], data["inertia"], data.get("about"), rotor)
 
 
-def _start(given: Mapping[str, Any], normalize: bool) -> State:
-    named = [key for key in _ATTITUDES[1:] if key in given]
+def _start(data: Mapping[str, Any], normalize: bool) -> State:
+    named = [key for key in _ATTITUDES[1:] if key in data]
     if len(named) > 1:
         raise InputError(f"{named[0]} and {named[1]} were given.", "Give the attitude once.")
-    if not named and "gamma" not in given:
+    if not named and "gamma" not in data:
         raise InputError("No attitude was given.", f"Give one of {', '.join(_ATTITUDES)}.")
-    spin = {key: given.get(key) for key in ("omega", "omega_space")}
+    spin = {key: data.get(key) for key in ("omega", "omega_space")}
     if not named:
-        start = State(gamma=given["gamma"], **spin)
+        start = State(gamma=data["gamma"], **spin)
         return start.normalized() if normalize else start
-    return State(gamma=given.get("gamma"), attitude=_attitude(named[0], given[named[0]], normalize), **spin)
+    return State(gamma=data.get("gamma"), attitude=_attitude(named[0], data[named[0]], normalize), **spin)
 
 
 def _attitude(kind: str, value: Any, normalize: bool) -> Attitude:

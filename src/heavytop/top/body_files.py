@@ -204,12 +204,12 @@ def _urdf(root: Element) -> Iterator[BodyInFile]:
         name = link.get("name", "")
         numbers = _Numbers(f"link {name}")
         origin, tensor, mass = inertial.find("origin"), inertial.find("inertia"), inertial.find("mass")
-        place = {} if origin is None else origin.attrib
+        pose = {} if origin is None else origin.attrib
         six, slack = numbers.tensor(
             [(tensor.attrib if tensor is not None else {}).get(k) for k in _SIX_URDF], _SIX_URDF
         )
-        axes, value = _rpy(numbers, place.get("rpy")), numbers.one(None if mass is None else mass.get("value"), "mass")
-        centre = numbers.three(place.get("xyz"), "origin xyz", "0 0 0")
+        axes, value = _rpy(numbers, pose.get("rpy")), numbers.one(None if mass is None else mass.get("value"), "mass")
+        centre = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
         shape = _shape_of(numbers, _shapes_of_urdf(numbers, link), value, centre)
         yield BodyInFile(name, value, centre, _in_axes(axes, six), slack, False, None, *shape)
 
@@ -266,12 +266,12 @@ def _shapes_of_urdf(numbers: _Numbers, link: Element) -> list[Shape]:
         shapes = []
         for part in link.findall(tag):
             geometry, origin = part.find("geometry"), part.find("origin")
-            place = {} if origin is None else origin.attrib
+            pose = {} if origin is None else origin.attrib
             moments = None if geometry is None else _primitive(numbers, geometry, lambda shape, key: shape.get(key))
             if moments is None:
                 return []
-            middle = numbers.three(place.get("xyz"), "origin xyz", "0 0 0")
-            shapes.append((_rpy(numbers, place.get("rpy")), middle, moments))
+            middle = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
+            shapes.append((_rpy(numbers, pose.get("rpy")), middle, moments))
         if shapes:
             return shapes
     return []
@@ -310,12 +310,12 @@ def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
     quaternion = pose.get("rotation_format") == "quat_xyzw"
     if len(values) != (7 if quaternion else 6):
         raise InputError(f"{numbers.where}: pose has {len(values)} numbers.", "Give x y z roll pitch yaw.")
-    place = (values[0], values[1], values[2])
+    position = (values[0], values[1], values[2])
     if quaternion:
         x, y, z, w = values[3:]
-        return _rotation(Attitude.quaternion(w, x, y, z, normalize=True)), place
+        return _rotation(Attitude.quaternion(w, x, y, z, normalize=True)), position
     text = " ".join(str(value) for value in values[3:])
-    return _rpy(numbers, text, pose.get("degrees") == "true"), place
+    return _rpy(numbers, text, pose.get("degrees") == "true"), position
 
 
 def _mjcf(root: Element) -> Iterator[BodyInFile]:

@@ -169,13 +169,13 @@ class System:
 
     def taken_in(self, numbers: Sequence[Any]) -> Parameters:
         """The parameters of these :meth:`entering` numbers; None for what does not enter."""
-        found: dict[str, Any] = dict.fromkeys(Parameters._fields)
+        parameters: dict[str, Any] = dict.fromkeys(Parameters._fields)
         rest = list(numbers)
         for name in self.enters:
             size = 1 if name == "rotor" and self is GYROSTAT else 3
             part, rest = tuple(rest[:size]), rest[size:]
-            found[name] = part if size == 3 else part[0]
-        return Parameters(**found)
+            parameters[name] = part if size == 3 else part[0]
+        return Parameters(**parameters)
 
     def rates(self, p: Parameters, y: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The field where ``p.inertia`` may be the three rows of a full tensor, with y in its axes.
@@ -246,17 +246,17 @@ class WithRotor(Protocol):
     def rotor(self) -> Vector | None: ...
 
 
-def system_of(given: System | str | None, *tops: WithRotor) -> System:
+def system_of(chosen: System | str | None, *tops: WithRotor) -> System:
     """The system asked for; where none is, `heavy_gyrostat` if a top has a rotor, else `heavy_top`.
 
     Raises InputError for an unknown name, and for a system that does not know the rotor of a top.
     """
-    if given is None:
+    if chosen is None:
         return HEAVY_TOP if all(top.rotor is None for top in tops) else HEAVY_GYROSTAT
-    found = system(given) if isinstance(given, str) else given
+    resolved = system(chosen) if isinstance(chosen, str) else chosen
     for top in tops:
-        require_no_other_rotor(found, top)
-    return found
+        require_no_other_rotor(resolved, top)
+    return resolved
 
 
 def require_no_other_rotor(asked: System, top: WithRotor) -> None:
@@ -512,16 +512,16 @@ def square_of_rate(system: System, p: Parameters, y: tuple[Any, ...]) -> Any:
     """
     inertia, omega, gamma = p.inertia, y[:3], y[3:6]
     by_rotor = () if system is HEAVY_GYROSTAT else p.rotors
-    found = [max(map(abs, (*omega, *by_rotor))) ** 2]
+    squares = [max(map(abs, (*omega, *by_rotor))) ** 2]
     for i, j, k in _AXES:
         apart = (inertia[i] - inertia[j]) * (inertia[i] - inertia[k])
-        found.append(abs(omega[i] ** 2 * apart / (inertia[j] * inertia[k])))
+        squares.append(abs(omega[i] ** 2 * apart / (inertia[j] * inertia[k])))
         if system is HEAVY_GYROSTAT:
-            found.append(p.rotor[k] ** 2 / (inertia[i] * inertia[j]))
+            squares.append(p.rotor[k] ** 2 / (inertia[i] * inertia[j]))
         if system is not GYROSTAT:
             across = [max(abs(vector[j]), abs(vector[k])) for vector in (p.moment, gamma)]
-            found.append(across[0] * across[1] / inertia[i])
-    return max(found)
+            squares.append(across[0] * across[1] / inertia[i])
+    return max(squares)
 
 
 def component(name: str) -> int:

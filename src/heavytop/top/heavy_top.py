@@ -104,15 +104,15 @@ class HeavyTop:
 
     def warnings(self) -> list[str]:
         """Moments that no rigid body has, though the equations do not mind: one larger than the sum of the others."""
-        found = []
+        sentences = []
         for axis, value in enumerate(self.inertia):
             others = sum(self.inertia) - value
             if value > others:
-                found.append(
+                sentences.append(
                     f"I{axis + 1} = {six_digits(value)} exceeds the sum {six_digits(others)} of the other two: "
                     "no rigid body has such moments."
                 )
-        return found
+        return sentences
 
 
 def require_physical(top: HeavyTop, start: State) -> None:
@@ -324,9 +324,9 @@ class RoundedTimes(Sequence[Fraction]):
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def __getitem__(self, place: Any) -> Any:
-        found = self.numbers[place]
-        return tuple(map(exact, found)) if isinstance(place, slice) else exact(found)
+    def __getitem__(self, index: Any) -> Any:
+        value = self.numbers[index]
+        return tuple(map(exact, value)) if isinstance(index, slice) else exact(value)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, tuple | list | RoundedTimes) and tuple(self) == tuple(other)
@@ -359,8 +359,8 @@ def check_times(times: Iterable[Any]) -> CheckedTimes | DoubleTimes:
     doubles = _as_doubles(times)
     if doubles is not None:
         return DoubleTimes(doubles)
-    given = ordered(times, "times", "Give a list such as [1, 2, 5].")
-    values = CheckedTimes(given if set(map(type, given)) == {Fraction} else map(exact, given))
+    instants = ordered(times, "times", "Give a list such as [1, 2, 5].")
+    values = CheckedTimes(instants if set(map(type, instants)) == {Fraction} else map(exact, instants))
     values.doubles = _in_order(values)
     if not values.doubles:
         _check_each(values)
@@ -374,13 +374,13 @@ def _as_doubles(times: Any) -> Any:
     floats = isinstance(times, list | tuple) and set(map(type, times)) == {float}
     if not floats and not (isinstance(times, numpy.ndarray) and times.dtype == numpy.float64 and times.ndim == 1):
         return None
-    found = numpy.array(times, dtype=numpy.float64)
-    if not 0 < len(found) <= MOST_MEMBERS:
+    doubles = numpy.array(times, dtype=numpy.float64)
+    if not 0 < len(doubles) <= MOST_MEMBERS:
         return None
-    sizes = found if found[-1] > 0 else -found
+    sizes = doubles if doubles[-1] > 0 else -doubles
     first, last = float(sizes[0]), float(sizes[-1])
     far = (first > _SMALL or first == 0) and last < _LARGE
-    return found if far and (len(found) == 1 or bool((sizes[1:] > sizes[:-1]).all())) else None
+    return doubles if far and (len(doubles) == 1 or bool((sizes[1:] > sizes[:-1]).all())) else None
 
 
 def _in_order(values: list[Fraction]) -> list[float]:

@@ -130,10 +130,10 @@ def is_positive(tensor: Tensor) -> bool:
     return min(tensor[0][0], tensor[0][0] * tensor[1][1] - tensor[0][1] ** 2, determinant(tensor)) > 0
 
 
-def mending(given: MassProperties) -> str:
+def mending(body: MassProperties) -> str:
     """The likeliest slip as a sentence, with the mended numbers; empty where none makes the tensor that of a body."""
-    for slip in slips(given):
-        if None in slip.inertia or slip.inertia == given.six:
+    for slip in slips(body):
+        if None in slip.inertia or slip.inertia == body.six:
             return slip.sentence
         numbers = ", ".join(decimal_text(value, 6) for value in slip.inertia if value is not None)
         return f"{slip.sentence} Mended: inertia = [{numbers}]."
@@ -151,32 +151,32 @@ def _is_rod(central: Tensor, slack: Fraction) -> bool:
     return not _semidefinite(central, -least)
 
 
-def slips(given: MassProperties) -> list[Slip]:
+def slips(body: MassProperties) -> list[Slip]:
     """The slips of which one makes the tensor that of a body, the likeliest first; [] where nothing is implausible.
 
     A realisable tensor is implausible where no material is so dense or so thin, where the centre of mass lies a hundred
     sizes away, where Steiner's part explains its products of inertia, or where the geometry of the file has another.
     """
-    central = given.central
-    if not realisable(central, given.slack):
-        if has_second_moments(central, given.slack):
-            return [_rod(given)]
-        return [slip for slip, mended in _mends(given) if realisable(mended.central, given.slack)]
-    return [*_against_geometry(given), *_of_units(given), *_of_products(given)][:3]
+    central = body.central
+    if not realisable(central, body.slack):
+        if has_second_moments(central, body.slack):
+            return [_rod(body)]
+        return [slip for slip, mended in _mends(body) if realisable(mended.central, body.slack)]
+    return [*_against_geometry(body), *_of_units(body), *_of_products(body)][:3]
 
 
-def _rod(given: MassProperties) -> Slip:
+def _rod(body: MassProperties) -> Slip:
     return Slip(
         "rod",
         "A principal moment is 0, as of a rod without thickness: the rotation about it has no equation. "
         "Give the rod its radius r, so that the moment is m r^2/2.",
-        given.six,
+        body.six,
     )
 
 
-def _mends(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """Each slip, with the mass properties that it would mean."""
-    n = given.six
+    n = body.six
     for six, which in (
         (
             (n[0], n[3], n[5], n[1], n[2], n[4]),
@@ -187,31 +187,31 @@ def _mends(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
             "I11 I22 I33 I12 I13 I23, and they were read as ixx ixy ixz iyy iyz izz",
         ),
     ):
-        yield _mend(given, "order_urdf", f"The six numbers are in the order {which}.", six)
-    yield from _row_major(given)
+        yield _mend(body, "order_urdf", f"The six numbers are in the order {which}.", six)
+    yield from _row_major(body)
     absolute = (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:])
     if absolute != n:
-        yield _mend(given, "negative_moment", "A moment of inertia is negative: its sign is wrong.", absolute)
+        yield _mend(body, "negative_moment", "A moment of inertia is negative: its sign is wrong.", absolute)
     flipped = (*n[:3], -n[3], -n[4], -n[5])
     sentence = "The products of inertia have the other sign: I12 is minus the integral of x y dm."
     if flipped != n:
-        yield _mend(given, "signs_of_products", sentence, flipped)
-    if given.at_pivot:
+        yield _mend(body, "signs_of_products", sentence, flipped)
+    if body.at_pivot:
         slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
-        yield slip, replace(given, at_pivot=False)
-        shrunk = [value / 1000 for value in given.centre]
+        yield slip, replace(body, at_pivot=False)
+        shrunk = [value / 1000 for value in body.centre]
         slip = Slip("millimetres", "The centre of mass is in millimetres, and the tensor in metres.", n)
-        yield slip, replace(given, centre=(shrunk[0], shrunk[1], shrunk[2]))
+        yield slip, replace(body, centre=(shrunk[0], shrunk[1], shrunk[2]))
 
 
-def _mend(given: MassProperties, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, MassProperties]:
+def _mend(body: MassProperties, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, MassProperties]:
     a, b, c, d, e, f = six
-    return Slip(name, sentence, (a, b, c, d, e, f)), replace(given, six=(a, b, c, d, e, f))
+    return Slip(name, sentence, (a, b, c, d, e, f)), replace(body, six=(a, b, c, d, e, f))
 
 
-def _row_major(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+def _row_major(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """The first six of the nine numbers of a matrix in the six places; its last one is not there."""
-    n = given.six
+    n = body.six
     if n[1] != n[3]:
         return
     for first, second, products in ((n[0], n[4], (n[1], n[2], n[5])), (n[0], n[5], (n[3], n[4], n[2]))):
@@ -219,22 +219,22 @@ def _row_major(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
             continue
         sentence = "These are the first six numbers of the matrix row by row; I33 is not among them."
         for part in (1, Fraction(1, 2), Fraction(9, 10)):  # of what the triangle inequality allows
-            mended = replace(given, six=(first, second, part * (first + second), *products))
-            if realisable(mended.central, given.slack):
+            mended = replace(body, six=(first, second, part * (first + second), *products))
+            if realisable(mended.central, body.slack):
                 yield Slip("row_major", sentence, (first, second, None, *products)), mended
                 break
 
 
-def _size(given: MassProperties) -> float:
+def _size(body: MassProperties) -> float:
     """Diagonal of the uniform box with these moments, √(12 tr S/m)."""
-    trace = sum(second_moments(given.central)[i][i] for i in range(3))
-    return math.sqrt(12 * trace / given.mass)
+    trace = sum(second_moments(body.central)[i][i] for i in range(3))
+    return math.sqrt(12 * trace / body.mass)
 
 
-def _scaled(given: MassProperties, length: int, mass: int) -> MassProperties:
+def _scaled(body: MassProperties, length: int, mass: int) -> MassProperties:
     """With lengths of the tensor and masses divided."""
-    a, b, c, d, e, f = (value / mass / length**2 for value in given.six)
-    return replace(given, six=(a, b, c, d, e, f), mass=given.mass / mass, slack=given.slack / mass / length**2)
+    a, b, c, d, e, f = (value / mass / length**2 for value in body.six)
+    return replace(body, six=(a, b, c, d, e, f), mass=body.mass / mass, slack=body.slack / mass / length**2)
 
 
 _UNITS = (
@@ -244,74 +244,74 @@ _UNITS = (
 )
 
 
-def _of_units(given: MassProperties) -> Iterator[Slip]:
-    if not given.si or given.mass <= 0:
+def _of_units(body: MassProperties) -> Iterator[Slip]:
+    if not body.si or body.mass <= 0:
         return
-    size = _size(given)
+    size = _size(body)
     if not size:
         return
-    if dot(given.centre, given.centre) > (_FAR_CENTRE * size) ** 2:
+    if dot(body.centre, body.centre) > (_FAR_CENTRE * size) ** 2:
         sentence = "The centre of mass is in millimetres: it lies more than a hundred sizes of the body away."
-        yield Slip("millimetres", sentence, given.six)
-    density = float(given.mass) / size**3
+        yield Slip("millimetres", sentence, body.six)
+    density = float(body.mass) / size**3
     if 5 * density > _DENSEST:  # the box of this diagonal has at most its cube / 3√3
-        only_mass = replace(given, mass=given.mass / 1000)
+        only_mass = replace(body, mass=body.mass / 1000)
         if _PLAUSIBLE[0] < 5 * float(only_mass.mass) / _size(only_mass) ** 3 < _PLAUSIBLE[1]:
-            yield Slip("grams", "The mass is in grams: no material is as dense as this body.", given.six)
+            yield Slip("grams", "The mass is in grams: no material is as dense as this body.", body.six)
             return
     for name, length, mass, sentence in _UNITS:
-        mended = _scaled(given, length, mass)
+        mended = _scaled(body, length, mass)
         wrong = 5 * density > _DENSEST if length == 1 else density < _THINNEST
         if wrong and _PLAUSIBLE[0] < 5 * float(mended.mass) / _size(mended) ** 3 < _PLAUSIBLE[1]:
             yield Slip(name, sentence, mended.six)
 
 
-def _of_products(given: MassProperties) -> Iterator[Slip]:
+def _of_products(body: MassProperties) -> Iterator[Slip]:
     """Whether the tensor without Steiner's part is that of a body, and all but diagonal where it was not."""
-    if given.at_pivot or given.geometry is not None:
+    if body.at_pivot or body.geometry is not None:
         return
-    less = six_of(minus(rows(given.six), steiner(given.mass, given.centre)))
-    with_part, without = (max(map(abs, six[3:])) for six in (given.six, less))
-    if with_part > given.slack and without * _ROUND <= with_part and realisable(rows(less), given.slack):
+    less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
+    with_part, without = (max(map(abs, six[3:])) for six in (body.six, less))
+    if with_part > body.slack and without * _ROUND <= with_part and realisable(rows(less), body.slack):
         sentence = (
             "The tensor is about the pivot, and was read as about the centre of mass: its products are Steiner's."
         )
         yield Slip("about_pivot", sentence, less)
 
 
-def _against_geometry(given: MassProperties) -> Iterator[Slip]:
+def _against_geometry(body: MassProperties) -> Iterator[Slip]:
     """The slip by which the tensor becomes that of the shapes in the file."""
-    shape = given.geometry
-    if shape is None or _distance(given.central, shape) < _APART:
+    shape = body.geometry
+    if shape is None or _distance(body.central, shape) < _APART:
         return
-    for slip, mended in (*_conjugated(given), *_mends(given), *_about_pivot(given), *_of_scale(given)):
+    for slip, mended in (*_conjugated(body), *_mends(body), *_about_pivot(body), *_of_scale(body)):
         if _distance(mended.central, shape) < _NEAR:
             yield slip
             return
 
 
-def _conjugated(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+def _conjugated(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """The tensor of principal axes V written as Vᵀ D V."""
-    if given.geometry_axes is None:
+    if body.geometry_axes is None:
         return
-    axes = given.geometry_axes
-    twice = multiplied(multiplied(axes, multiplied(axes, rows(given.six))), transposed(multiplied(axes, axes)))
+    axes = body.geometry_axes
+    twice = multiplied(multiplied(axes, multiplied(axes, rows(body.six))), transposed(multiplied(axes, axes)))
     six = [round_to(value, _SHOWN_BITS) for value in six_of(twice)]
-    yield _mend(given, "conjugate_axes", "The rotation of the principal axes is the inverse of what was meant.", six)
+    yield _mend(body, "conjugate_axes", "The rotation of the principal axes is the inverse of what was meant.", six)
 
 
-def _about_pivot(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
-    less = six_of(minus(rows(given.six), steiner(given.mass, given.centre)))
-    yield _mend(given, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
+def _about_pivot(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
+    yield _mend(body, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
 
 
-def _of_scale(given: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+def _of_scale(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     for name, scale, unit in (
         ("millimetres", 10**6, "kg mm^2"),
         ("grams", 10**3, "g m^2"),
         ("grams", 10**9, "g mm^2"),
     ):
-        yield _mend(given, name, f"The tensor is in {unit}.", [value / scale for value in given.six])
+        yield _mend(body, name, f"The tensor is in {unit}.", [value / scale for value in body.six])
 
 
 def _distance(one: Tensor, other: Tensor) -> Fraction:

@@ -144,10 +144,10 @@ def algebraic_motion(
     if curve is None or min(curve.inertia) <= 0 or curve.gamma_square() <= 0:
         raise InputError(f"No top has {name} motion with these numbers.", "Its builder says which are possible.")
     if place is None:
-        found = gaps(curve)
-        if not found:
+        intervals = gaps(curve)
+        if not intervals:
             raise InputError(f"{name} motion of this top is not real.", "Its builder says which are.")
-        (low, high), *_ = found
+        (low, high), *_ = intervals
         unit = Fraction(2) ** (exponent(Fraction(high) - Fraction(low)) - 4)
         place = round(Fraction(low + high) / (2 * unit)) * unit
     return AlgebraicMotion(curve, place, signs, f"algebraic: {name} motion, inversion of an Abel integral")

@@ -117,8 +117,8 @@ def carried(
     (third,) = axis.at(point, 1 / motion.denominator(point))
     z3, z2 = third[0], coefficient(third, 1) / -rate
     z1 = acb(0, 1) * (z3 * gamma[1] - z2 * gamma[2]) / dot(gamma, gamma).sqrt()
-    found = [acb(z) for z in (z1, z2, z3)]
-    return [z.real for z in found], [z.imag for z in found]
+    numbers = [acb(z) for z in (z1, z2, z3)]
+    return [z.real for z in numbers], [z.imag for z in numbers]
 
 
 def _off(top: HeavyTop, start: State) -> tuple[Fraction]:

@@ -96,16 +96,16 @@ class DeloneAzimuth:
         cubic, e = level.cubic(), level.double()
         if e == 0 or cubic.gcd(cubic.derivative()).degree() > 0:
             raise OutOfReach(f"Delone's level is degenerate: e = {e}, or a double root of its cubic.", _REMEDY)
-        found: Any = cubic.complex_roots()
-        curve = [PhiRoot(acb(value), 1, True) for value, _ in found]
+        roots: Any = cubic.complex_roots()
+        curve = [PhiRoot(acb(value), 1, True) for value, _ in roots]
         start = start_of(level)
         interval = _interval(curve, start)
         # beyond the cubic's roots, or between them and 0, where the other variable rests
         mu, _ = pole([*curve, PhiRoot(acb(0), 2, False)], [interval])
         gap, offset = _gap(curve, interval, mu), ball(e) - mu
         with series_length(2):
-            place = start.inverses(mu)[0]
-            value, slope = arb(coefficient(place, 0)), arb(coefficient(place, 1))
+            inverse = start.inverses(mu)[0]
+            value, slope = arb(coefficient(inverse, 0)), arb(coefficient(inverse, 1))
         phase = gap.phase(value, slope * gap.density(value))
         if level.area == 0:
             return cls(level, gap, gap.integrals(phase)[0], None)
@@ -129,33 +129,33 @@ class DeloneAzimuth:
 def _turned(level: KovalevskayaLevel, state: Sequence[arb]) -> list[arb]:
     """Ω and γ in the level's units and turned frame."""
     (n1, n2), c = (ball(n) for n in level.moment), ball(level.moment_square).sqrt()
-    found = []
+    vectors = []
     for unit, (x, y, z) in ((level.rate, state[:3]), (level.size, state[3:])):
-        found += [part / ball(unit) for part in ((n1 * x + n2 * y) / c, (n1 * y - n2 * x) / c, z)]
-    return found
+        vectors += [part / ball(unit) for part in ((n1 * x + n2 * y) / c, (n1 * y - n2 * x) / c, z)]
+    return vectors
 
 
 def _interval(curve: list[PhiRoot], start: WorkingStart) -> Interval:
     """Where w moves, as in :func:`heavytop.exact.cases.kovalevskaya.intervals`."""
     real = ordered(curve)
     allowed = [(real[0] + 1, 0)] + ([(real[2] + 1, real[1] + 1)] if len(real) == 3 else [])
-    found = [
+    columns = [
         (upper, lower)
         for upper, lower in allowed
         if not start.above(0, curve[upper - 1].value.real) > 0
         and not (lower > 0 and start.above(0, curve[lower - 1].value.real) < 0)
     ]
-    if len(found) != 1:
+    if len(columns) != 1:
         raise Undecided
-    return found[0]
+    return columns[0]
 
 
 def _gap(curve: list[PhiRoot], interval: Interval, mu: arb) -> Gap:
     """The gap of V with the integral of the time."""
     branch, lead = [acb(0)], arb(2)
     for root in curve:
-        found = 1 / (root.value - mu)
-        branch.append(acb(found.real) if root.value.imag.is_zero() else found)
+        width = 1 / (root.value - mu)
+        branch.append(acb(width.real) if root.value.imag.is_zero() else width)
         lead *= abs(mu - root.value)
     low, high = (branch[number].real for number in interval)
     others = [(b, 1) for number, b in enumerate(branch) if number not in interval]

@@ -290,8 +290,8 @@ def _all(motion: Dokshevich) -> tuple[Data, Fraction, Fraction, Fraction]:
     """:func:`_exact`, once."""
     if "exact" not in motion.made:
         motion.made["exact"] = _exact(motion.top, motion.start)
-    found: tuple[Data, Fraction, Fraction, Fraction] = motion.made["exact"]
-    return found
+    data: tuple[Data, Fraction, Fraction, Fraction] = motion.made["exact"]
+    return data
 
 
 def _data(motion: Any) -> Data:

@@ -123,18 +123,18 @@ def roots(level: GoryachevLevel) -> list[Root]:
     """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
     h, constant, a = ball(level.energy), 4 * ball(level.third), size_of(level)
     rotor = ball(level.rotor)
-    found: list[Root] = []
+    roots_in_order: list[Root] = []
     pairs: Any = level.sextic().complex_roots()
     for value, many in pairs:
         if value.is_zero():
-            found.append(Root(acb(value), (many // 2, many - many // 2)))
+            roots_in_order.append(Root(acb(value), (many // 2, many - many // 2)))
             continue
         cubics = [value * (value * (value - 2 * rotor) - 2 * (h + side * a)) - constant for side in (1, -1)]
         of = [cubic.contains(0) for cubic in cubics]
         if sum(of) != 1:
             raise Undecided
-        found.append(Root(acb(value), (many * of[0], many * of[1])))
-    return found
+        roots_in_order.append(Root(acb(value), (many * of[0], many * of[1])))
+    return roots_in_order
 
 
 def size_of(level: GoryachevLevel) -> arb:
@@ -165,26 +165,28 @@ def gap_ends(level: GoryachevLevel, curve: Sequence[Root], places: Sequence[arb]
         inside ^= curve[low].multiplicity % 2 == 1
         if inside:
             allowed.append((low, high))
-    found = []
+    ends = []
     for k, u in enumerate(places):
         possible = [ends for ends in allowed if not (u < curve[ends[0]].value.real or u > curve[ends[1]].value.real)]
         if k in resting:
             possible = [(resting[k], resting[k])]
         if len(possible) != 1:
             raise Undecided
-        found += possible
-    return found
+        ends += possible
+    return ends
 
 
 def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
     """The variable that rests at a double root, if one does, and the number of that root."""
-    place = level.resting()
-    if place is None:
+    double_root = level.resting()
+    if double_root is None:
         return {}
-    found = [i for i, root in enumerate(curve) if root.multiplicity > 1 and root.value.overlaps(acb(ball(place)))]
-    if len(found) != 1:
+    coinciding = [
+        i for i, root in enumerate(curve) if root.multiplicity > 1 and root.value.overlaps(acb(ball(double_root)))
+    ]
+    if len(coinciding) != 1:
         raise Undecided
-    return {0 if place > 0 else 1: found[0]}
+    return {0 if double_root > 0 else 1: coinciding[0]}
 
 
 def _place(root: Root) -> Fraction:
@@ -256,8 +258,8 @@ class GoryachevMotion:
             possible = []
             for sign in (1, -1):
                 motion = cls(level, c, a, tuple(curve), tuple(ends), line, sign)
-                found = motion.turned([arb_series([phase], prec=1) for phase in phases], [0, 0])
-                if all(one[0].overlaps(other) for one, other in zip(found, turned, strict=True)):
+                position = motion.turned([arb_series([phase], prec=1) for phase in phases], [0, 0])
+                if all(one[0].overlaps(other) for one, other in zip(position, turned, strict=True)):
                     possible.append(motion)
         if len(possible) != 1:
             raise Undecided
@@ -305,7 +307,7 @@ class GoryachevMotion:
         gap, (low, high) = self.line.variables[variable], self.ends[variable]
         u, side = gap.position(phase), -1 if turns % 2 else 1
         at_end = dict(zip((low, high), gap.ends(phase), strict=True))
-        found = []
+        half_periods = []
         for factor in (_MINUS, _PLUS):
             value, rest = phase * 0 + 1, phase * 0 + arb(1) / 2
             for number, root in enumerate(self.curve):
@@ -314,9 +316,9 @@ class GoryachevMotion:
                     value *= side * at_end[number] * (at_end[number] if root.counts[factor] > 1 else 1)
                 elif root.counts[factor]:
                     rest *= _distance(u, root.value, root.counts[factor], gap.middle)
-            found.append(value * rest.sqrt())
+            half_periods.append(value * rest.sqrt())
         # y_k = ±α_k β_k has the sign of −du/dθ
-        return u, -found[0] if constant(gap.bend(phase)) < 0 else found[0], found[1]
+        return u, -half_periods[0] if constant(gap.bend(phase)) < 0 else half_periods[0], half_periods[1]
 
 
 def _distance(u: BallLike, root: acb, many: int, middle: arb) -> Any:
@@ -387,14 +389,14 @@ class Strip:
     @classmethod
     def of(cls, motion: GoryachevMotion, gap: Gap, other: arb) -> Strip:
         """u stays nearer to where it is at Im s = 0 than _ROOM of the way to ``other``, the end of the other gap."""
-        place, alpha, beta, less, more, away = _sizes(motion, gap, other)
+        middle, alpha, beta, less, more, away = _sizes(motion, gap, other)
         room, twice = _ROOM / _ROUNDING * away, 2 * _ROUNDING * float(abs(motion.level.rotor))
         off = [np.zeros(_CELLS)] * 3
         scale, height, grown = alpha.max() + beta.max(), 0.0, off
 
         def rates(near: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
             a, b, c = near
-            excess, first, second = (3 * place + twice) * a + 1.5 * a * a, alpha + b, beta + c
+            excess, first, second = (3 * middle + twice) * a + 1.5 * a * a, alpha + b, beta + c
             return [first * second, (less + excess) * second / 2, (more + excess) * first / 2]
 
         for _ in range(5 * _STEPS):
@@ -442,8 +444,8 @@ class Uniform:
     def of(cls, motion: GoryachevMotion, variable: Variable, other: arb) -> Uniform:
         """other: the end of the other gap.  Raises OutOfReach for a variable that tends to a double root."""
         if isinstance(variable, Rest):
-            size, place = motion.size, abs(variable.middle)
-            bound = float((2 * size * place).sqrt().upper()) * _ROUNDING
+            size, middle = motion.size, abs(variable.middle)
+            bound = float((2 * size * middle).sqrt().upper()) * _ROUNDING
             return cls(None, None, (bound, bound))
         if not isinstance(variable, Gap):
             raise OutOfReach("The azimuth of an asymptotic motion is not done.", "Ask for the state alone.")
@@ -460,11 +462,11 @@ class Uniform:
         """θ where φ is at each of the points."""
         if self.gap is None:
             return [arb(0)]
-        inversion, found = Inversion((self.gap,), (1,)), []
+        inversion, phases = Inversion((self.gap,), (1,)), []
         for angle in points(count):
             (phase,), (turns,) = inversion.phases([angle * self.gap.means[0]])
-            found.append(phase + 2 * arb.pi() * turns)
-        return found
+            phases.append(phase + 2 * arb.pi() * turns)
+        return phases
 
     def passed(self, phase: arb, turns: int) -> arb:
         """s = F_0 at the phase after so many turns."""
@@ -621,9 +623,9 @@ def _motion(case: GoryachevChaplygin) -> GoryachevMotion:
     return GoryachevMotion.of(GoryachevLevel.of(case.top, case.start))
 
 
-def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bool:
+def _passes(curve: Sequence[Root], ends: tuple[int, int], double_root: Fraction) -> bool:
     low, high = (curve[number].value.real for number in ends)
-    return not (low > ball(place) or high < ball(place))
+    return not (low > ball(double_root) or high < ball(double_root))
 
 
 @whole_evaluation

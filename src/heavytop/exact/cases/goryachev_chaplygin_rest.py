@@ -104,8 +104,8 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     def evaluate(self, time: Fraction) -> list[BallLike]:
         motion = _motion(self)
         level = motion.level
-        found = motion.state(instant(level.rate * time))
-        return in_units([*level.in_body(found[:3]), *level.in_body(found[3:])], level.rate, level.size)
+        state = motion.state(instant(level.rate * time))
+        return in_units([*level.in_body(state[:3]), *level.in_body(state[3:])], level.rate, level.size)
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.separable.oscillation.WithBearing`: M, along γ × n at rest; not for h = a."""
@@ -113,9 +113,9 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         if isinstance(motion, UprightMotion):
             raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude along with it.")
         with series_length(1):
-            place = motion.at(ball(motion.level.rate * time))
-            gamma, momentum = (motion.level.in_body(v) for v in (place.state()[3:], place.momentum()))
-        return Bearing.of(gamma, momentum, place.azimuth())
+            pair = motion.at(ball(motion.level.rate * time))
+            gamma, momentum = (motion.level.in_body(v) for v in (pair.state()[3:], pair.momentum()))
+        return Bearing.of(gamma, momentum, pair.azimuth())
 
 
 @cached_per_precision
@@ -139,14 +139,14 @@ def _the_one(level: GoryachevLevel, possible: Sequence[Signed]) -> Signed:
     """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
     with series_length(1):
         turned = level.turned()
-        found = [
+        candidates = [
             motion
             for motion in possible
             if all(one.overlaps(other) for one, other in zip(motion.state(arb(0)), turned, strict=True))
         ]
-    if len(found) != 1:
+    if len(candidates) != 1:
         raise Undecided
-    return found[0]
+    return candidates[0]
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,8 +135,8 @@ class HessLevel:
 
     def roots(self) -> list[arb]:
         """The three roots of the cubic, in order."""
-        found: Any = self.cubic().complex_roots()
-        return sorted((root.real for root, _ in found), key=midpoint)
+        roots: Any = self.cubic().complex_roots()
+        return sorted((root.real for root, _ in roots), key=midpoint)
 
     def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
         """The components along e_x and e_y."""

@@ -83,9 +83,9 @@ class System2:
         turning, bending = self.torque * inverse, self.skew * square
         return factor * (turning - bending), -factor * (turning + bending)
 
-    def quadratics(self, place: arb) -> tuple[Quadratic, Quadratic]:
+    def quadratics(self, centre: arb) -> tuple[Quadratic, Quadratic]:
         """P and Q about a place, by their coefficients of 1, z, z²."""
-        sine, cosine = (place / 2).sin(), (place / 2).cos()
+        sine, cosine = (centre / 2).sin(), (centre / 2).cos()
         lowered = 4 * self.reach * sine**2, 8 * self.reach * sine * cosine, 4 * self.reach * cosine**2
         first, second = ((2 * x + lowered[0], lowered[1], 2 * x + lowered[2]) for x in (self.energy, self.top))
         return first, second
@@ -94,14 +94,14 @@ class System2:
         """β."""
         return 2 * (self.energy / (2 * self.reach)).sqrt().asinh()
 
-    def bound(self, place: float, radius: float) -> tuple[arb, arb]:
+    def bound(self, centre: float, radius: float) -> tuple[arb, arb]:
         """κ on the disc and the largest √|w/Q|; not finite where a zero all but lies in it."""
         with working_precision(_BOUND_BITS):
             steepness, widest = arb(0), arb(0)
             # c ((z + b/2c)² + gap): no zero is found where two are near each other
             shapes = [
                 (c, b / c / 2, 4 * x * (x + 2 * self.reach) / c**2)
-                for x, (_, b, c) in zip((self.energy, self.top), self.quadratics(arb(place)), strict=True)
+                for x, (_, b, c) in zip((self.energy, self.top), self.quadratics(arb(centre)), strict=True)
             ]
             # an arc of 2π/64 lies in a box of half its length about its middle
             spread = acb(arb(0, radius * pi / _ARCS), arb(0, radius * pi / _ARCS))
@@ -131,8 +131,8 @@ class Disc:
     @classmethod
     def of(cls, system: System2, left: float, radius: float) -> Disc:
         """The one whose segment begins at ``left``."""
-        place = left + 2 * atan(radius / RATIO)
-        return cls(left, place, 2 * place - left, radius, *system.bound(place, radius))
+        angle = left + 2 * atan(radius / RATIO)
+        return cls(left, angle, 2 * angle - left, radius, *system.bound(angle, radius))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ def plan(system: System2) -> list[Disc]:
     width, left = float(system.width().lower()), 0.0
     if not width > 0:
         raise Undecided
-    found: list[Disc] = []
+    discs: list[Disc] = []
     while left < pi:
         disc = Disc.of(system, left, _SHARE * _distance(left, width))
         while True:
@@ -191,24 +191,24 @@ def plan(system: System2) -> list[Disc]:
             if steep <= _STEEPEST:
                 break
             disc = Disc.of(system, left, disc.radius * max(0.9 * _STEEPEST / steep, 2.0**-100))
-        found.append(disc)
+        discs.append(disc)
         left = disc.right
-        if len(found) > MOST_SEGMENTS:
+        if len(discs) > MOST_SEGMENTS:
             raise OutOfReach(
                 f"The linear system over the period has more than {MOST_SEGMENTS} segments: M·gamma is all but 0, or "
                 "the moments differ by many decades.",
                 "Ask for an earlier time.",
             )
-    return found
+    return discs
 
 
-def _distance(place: float, width: float) -> float:
+def _distance(centre: float, width: float) -> float:
     """How far z = 0 is from the nearest zero of P, Q and w; farther away from 0 it is no less.
 
     The zeros of Q are farther than those of P: E < top, for the cubic of the height is −K² at E.
     """
-    sine, half = sin(place / 2), sinh(min(width, _WIDEST) / 2)
-    return min(1.0, sqrt((half**2 + sine**2) / (half**2 + cos(place / 2) ** 2)))
+    sine, half = sin(centre / 2), sinh(min(width, _WIDEST) / 2)
+    return min(1.0, sqrt((half**2 + sine**2) / (half**2 + cos(centre / 2) ** 2)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,12 +305,12 @@ def _series(
 
 def _power(matrix: arb_mat, exponent: int) -> arb_mat:
     """matrix^exponent for any exponent > 0: FLINT's own takes 64 bits."""
-    found = matrix
+    power = matrix
     for bit in f"{exponent:b}"[1:]:
-        found = found * found
+        power = power * power
         if bit == "1":
-            found = found * matrix
-    return found
+            power = power * matrix
+    return power
 
 
 def _adjugate(matrix: arb_mat) -> arb_mat:

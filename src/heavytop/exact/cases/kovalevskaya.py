@@ -93,15 +93,15 @@ def intervals(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: Working
         below = lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0
         return not below and not start.above(variable, curve[upper - 1].value.real) > 0
 
-    found = [
+    intervals = [
         [(resting[k] + 1, resting[k] + 1)]
         if k in resting
         else [interval for interval in allowed if possible(k, interval)]
         for k in (0, 1)
     ]
-    if any(len(choice) != 1 for choice in found):
+    if any(len(choice) != 1 for choice in intervals):
         raise Undecided
-    return found[0][0], found[1][0]
+    return intervals[0][0], intervals[1][0]
 
 
 def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingStart) -> dict[int, int]:
@@ -109,10 +109,10 @@ def _resting(level: KovalevskayaLevel, curve: Sequence[PhiRoot], start: WorkingS
     double = [i for i, root in enumerate(curve) if root.multiplicity > 1]
     if not double or level.separated(level.double()) != 0:
         return {}
-    found = {k: double[0] for k in (0, 1) if start.above(k, curve[double[0]].value.real).contains(0)}
-    if len(found) != 1:
+    resting = {k: double[0] for k in (0, 1) if start.above(k, curve[double[0]].value.real).contains(0)}
+    if len(resting) != 1:
         raise Undecided
-    return found
+    return resting
 
 
 def ordered(curve: Sequence[PhiRoot]) -> list[int]:
@@ -278,15 +278,15 @@ class AbelMotion:
         gap, ends = self.variables[variable], self.ends[variable]
         low, high = gap.ends(phase)
         side = -1 if turns % 2 else 1
-        v, found = gap.position(phase), []
+        v, half_periods = gap.position(phase), []
         for number, b in enumerate(self.branch):
             if number in ends:
-                found.append(acb_series(side * (low if number == ends[0] else high)))
+                half_periods.append(acb_series(side * (low if number == ends[0] else high)))
             elif b.imag.is_zero():
-                found.append(acb_series((self._side(variable, number) * (v - b.real)).sqrt()))
+                half_periods.append(acb_series((self._side(variable, number) * (v - b.real)).sqrt()))
             else:
-                found.append((acb_series(v) - b).sqrt())
-        return found
+                half_periods.append((acb_series(v) - b).sqrt())
+        return half_periods
 
     def _side(self, variable: int, number: int) -> int:
         """s with h² = s (v − b)."""
@@ -557,10 +557,10 @@ class Kovalevskaya(WithBearing, ClosedForm):
 
         def evaluate(working: int) -> list[arb]:
             motion = _motion(self)
-            found = motion.exponents() if isinstance(motion, AbelMotion) else []
-            if not found:
+            exponents = motion.exponents() if isinstance(motion, AbelMotion) else []
+            if not exponents:
                 raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
-            return found
+            return exponents
 
         return to_bits(evaluate, bits)[0]
 

@@ -238,7 +238,7 @@ _ELSEWHERE = 0.4375
 
 
 def _plus(*characteristics: Characteristic) -> Characteristic:
-    (a, b), (c, d) = ([sum(c[part][place] for c in characteristics) % 2 for place in (0, 1)] for part in (0, 1))
+    (a, b), (c, d) = ([sum(c[part][k] for c in characteristics) % 2 for k in (0, 1)] for part in (0, 1))
     return (a, b), (c, d)
 
 
@@ -250,10 +250,10 @@ def _number(characteristic: Characteristic) -> int:
 
 def _half_periods() -> tuple[Characteristic, ...]:
     """η_1, ..., η_5."""
-    found = [_plus(_CYCLES[1], _CYCLES[3])]
+    periods = [_plus(_CYCLES[1], _CYCLES[3])]
     for cycle in _CYCLES:
-        found.append(_plus(found[-1], cycle))
-    return tuple(found)
+        periods.append(_plus(periods[-1], cycle))
+    return tuple(periods)
 
 
 def _odd(characteristic: Characteristic) -> bool:
@@ -280,8 +280,8 @@ class HyperellipticCurve:
     @classmethod
     def of(cls, values: Sequence[acb]) -> HyperellipticCurve:
         """Raises Undecided where the working precision does not exclude seven of eight choices of signs."""
-        found = sorted(values, key=lambda e: (midpoint(e.real), midpoint(e.imag)))
-        halves = [_between(found, k) for k in range(4)]
+        ordered = sorted(values, key=lambda e: (midpoint(e.real), midpoint(e.imag)))
+        halves = [_between(ordered, k) for k in range(4)]
         possible = []
         for signs in product((1, -1), repeat=3):
             cycles = [halves[0], *((s * one, s * two) for s, (one, two) in zip(signs, halves[1:], strict=True))]
@@ -298,7 +298,7 @@ class HyperellipticCurve:
                 possible.append((inverse, acb_mat([[tau[0, 0], middle], [middle, tau[1, 1]]])))
         if len(possible) != 1:
             raise Undecided
-        return cls(tuple(found), *possible[0])
+        return cls(tuple(ordered), *possible[0])
 
     def image(self, w: arb, y: arb) -> acb_mat:
         """∫ (dw/y, w dw/y) from ∞ to (w, y), modulo periods, times a^−1."""
@@ -317,20 +317,20 @@ def _integrals(places: Any, rest: Sequence[tuple[Any, Any]], factor: Any, lower:
     def integrand(weight: int) -> Any:
         def value(s: acb, analytic: bool) -> acb:
             w = places(s)
-            found = acb(1)
+            product = acb(1)
             for root, scale in rest:
-                found *= ((w - root) / scale).rsqrt(analytic=analytic)
-            return found * w if weight else found
+                product *= ((w - root) / scale).rsqrt(analytic=analytic)
+            return product * w if weight else product
 
         return value
 
     return factor * acb.integral(integrand(0), lower, upper), factor * acb.integral(integrand(1), lower, upper)
 
 
-def _between(found: Sequence[acb], k: int) -> Pair:
+def _between(roots: Sequence[acb], k: int) -> Pair:
     """A_(k+1), up to its sign: w = m + δ sin s."""
-    middle, reach = (found[k] + found[k + 1]) / 2, (found[k + 1] - found[k]) / 2
-    rest = [(x, middle - x) for i, x in enumerate(found) if i not in (k, k + 1)]
+    middle, reach = (roots[k] + roots[k + 1]) / 2, (roots[k + 1] - roots[k]) / 2
+    rest = [(x, middle - x) for i, x in enumerate(roots) if i not in (k, k + 1)]
     factor = -2 * _I / square_root(acb(-2))
     for _, scale in rest:
         factor /= square_root(scale)
@@ -338,11 +338,11 @@ def _between(found: Sequence[acb], k: int) -> Pair:
     return _integrals(lambda s: middle + reach * s.sin(), rest, factor, -quarter, quarter)
 
 
-def _from_root(found: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
+def _from_root(roots: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
     """∫ from e_near, the root nearest to w: w = e + (w − e) s²."""
-    start = found[near]
+    start = roots[near]
     step = w - start
-    rest = [(x, w - x) for i, x in enumerate(found) if i != near]
+    rest = [(x, w - x) for i, x in enumerate(roots) if i != near]
     if y.is_zero() and step.contains(0):
         return acb(0), acb(0)
     factor = 2 * step / y
@@ -355,13 +355,13 @@ def _from_root(found: Sequence[acb], near: int, w: arb, y: arb) -> Pair:
     return _integrals(lambda s: start + step * s * s, rest, factor, 0, 1)
 
 
-def _from_infinity(found: Sequence[acb], w: arb, y: arb) -> Pair:
+def _from_infinity(roots: Sequence[acb], w: arb, y: arb) -> Pair:
     """∫ from ∞ for |w| > |e_j|: w/s² in the place of w."""
 
     def integrand(power: int) -> Any:
         def value(s: acb, analytic: bool) -> acb:
             result = s**power
-            for root in found:
+            for root in roots:
                 result *= ((w - root * s * s) / (w - root)).rsqrt(analytic=analytic)
             return result
 
@@ -394,17 +394,17 @@ class ThetaMotion:
     @classmethod
     def of(cls, level: KovalevskayaLevel) -> ThetaMotion:
         """At the working precision; raises Undecided where it does not suffice, or the roots are not distinct."""
-        start, found = start_of(level), roots(level)
-        if any(root.multiplicity > 1 for root in found):
+        start, branch_points = start_of(level), roots(level)
+        if any(root.multiplicity > 1 for root in branch_points):
             raise Undecided
-        curve = HyperellipticCurve.of([root.value for root in found])
+        curve = HyperellipticCurve.of([root.value for root in branch_points])
         origin = acb_mat(2, 1)
         for w, y in points(start):
             origin += curve.image(w, y)
         rate = curve.inverse * acb_mat([[0], [1]])
         motion = cls(level, start, curve, origin, rate, ())
-        places = [next(i for i, e in enumerate(curve.roots) if e is root.value) for root in found if root.cubic]
-        return replace(motion, rows=motion._rows([root.value for root in found if root.cubic], places))
+        places = [next(i for i, e in enumerate(curve.roots) if e is root.value) for root in branch_points if root.cubic]
+        return replace(motion, rows=motion._rows([root.value for root in branch_points if root.cubic], places))
 
     def at(self, time: Fraction, length: int) -> list[Any]:
         """The six components at ``time``, numbers, or series in t of that length."""
@@ -431,19 +431,19 @@ class ThetaMotion:
         order = current_length() - 1
         jets, (one, two) = acb_mat.theta_jets(self.curve.tau, z, order), self.rate.entries()
         weights = [(n, one ** (n - i) * two**i) for n in range(order + 1) for i in range(n + 1)]
-        found = []
+        thetas = []
         for number in range(jets.nrows()):
             row = [acb(0)] * (order + 1)
             for column, (n, weight) in enumerate(weights):
                 row[n] += jets[number, column] * weight
-            found.append(acb_series(row, prec=current_length()))
-        return found
+            thetas.append(acb_series(row, prec=current_length()))
+        return thetas
 
     def _rows(self, values: Sequence[acb], places: Sequence[int]) -> tuple[tuple[tuple[int, acb], ...], ...]:
         """N, D and r as combinations of theta functions."""
         alphas, betas, inverse = linear(self.start, values)
         none = _number(_DELTA)
-        single = [_number(_plus(_DELTA, _ETA[place])) for place in places]
+        single = [_number(_plus(_DELTA, _ETA[k])) for k in places]
         with series_length(ORDERS):
             thetas = self._thetas(self.origin)
             p, q = (acb_series(x) for x in self.start.motion[:2])

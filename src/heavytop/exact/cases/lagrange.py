@@ -175,8 +175,8 @@ class Lagrange(ClosedForm):
         x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
         length, across = prepared.axis, prepared.across
         plus, minus = _sides(h[0] / length, coefficient(h, 1) / length, g[0] / across, w[0] / across, x / length, size)
-        found = ((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real
-        return prepared.composed(found[0] * across, found[1] * across, h[0].real)
+        vector = ((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real
+        return prepared.composed(vector[0] * across, vector[1] * across, h[0].real)
 
 
 def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, acb]:
@@ -325,8 +325,8 @@ class LagrangeGyrostat(ClosedForm):
     @property
     def lagrange(self) -> Lagrange:
         """The motion of the top."""
-        found: Lagrange = self.made["top"]
-        return found
+        top: Lagrange = self.made["top"]
+        return top
 
     def evaluate(self, time: Fraction) -> list[BallLike]:
         turned = self._turned(self.lagrange.evaluate(time), instant(time))
@@ -345,11 +345,11 @@ class LagrangeGyrostat(ClosedForm):
     def _turned(self, vectors: Sequence[Balls], time: Balls) -> list[Balls]:
         """Rz(k3 t/I3) of each three components."""
         sine, cosine = (time * ball(self._ahead)).sin_cos()
-        found: list[Any] = []
-        for place in range(0, len(vectors), 3):
-            x, y, z = vectors[place : place + 3]
-            found += [cosine * x - sine * y, sine * x + cosine * y, z]
-        return found
+        rotated: list[Any] = []
+        for begin in range(0, len(vectors), 3):
+            x, y, z = vectors[begin : begin + 3]
+            rotated += [cosine * x - sine * y, sine * x + cosine * y, z]
+        return rotated
 
 
 # A top with I1 = I2 and P c = 0, in sizes of about 1 and turned so that its moment of weight is (c, 0, 0).
@@ -411,10 +411,10 @@ class Reduced:
 
     def turned(self) -> list[arb]:
         """The six components of the start in the turned frame, as balls."""
-        c, found = ball(self.moment_square).sqrt(), []
+        c, vectors = ball(self.moment_square).sqrt(), []
         for vector in (self.omega, self.gamma):
-            found += [ball(self.along(vector)) / c, ball(self.across(vector)) / c, ball(vector[2])]
-        return found
+            vectors += [ball(self.along(vector)) / c, ball(self.across(vector)) / c, ball(vector[2])]
+        return vectors
 
     def in_body(self, vector: Sequence[Balls]) -> list[Balls]:
         """A vector of the turned frame in the top's own axes."""

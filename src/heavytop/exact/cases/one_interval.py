@@ -73,14 +73,14 @@ class IntervalCurve:
     ) -> IntervalCurve:
         """The motions with these Q and R; raises NotInClass where an identity fails."""
         a, b, c = (rational(moment) for moment in inertia)
-        speed, place, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
+        speed, shift, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
         turning = factor.derivative()
-        t = (a - b) * factor * place - c * speed * (turning * third + _HALF * factor * third.derivative())
-        u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * place
+        t = (a - b) * factor * shift - c * speed * (turning * third + _HALF * factor * third.derivative())
+        u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * shift
         second_rate = speed * (t.derivative() * second + _HALF * t * second.derivative())
         third_rate = speed * (u.derivative() * third + _HALF * u * third.derivative())
-        s, left = divmod(u * place - second_rate, factor)
-        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * place
+        s, left = divmod(u * shift - second_rate, factor)
+        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * shift
         for defect in defects:
             if defect.degree() >= 0:
                 raise NotInClass(
@@ -100,11 +100,11 @@ class IntervalCurve:
         """
         a, b, c = (rational(moment) for moment in self.inertia)
         s, t, u = self.heights
-        place, factor = _X**self.power, _X ** (self.power // 2)
+        shift, factor = _X**self.power, _X ** (self.power // 2)
         square = rational(self.gamma_square())
-        area = a * place * s + factor * (b * self.second * t + c * self.third * u)
-        numerator = a * place - area * s / square
-        denominator = a * a * place * place + factor * factor * (b * b * self.second + c * c * self.third)
+        area = a * shift * s + factor * (b * self.second * t + c * self.third * u)
+        numerator = a * shift - area * s / square
+        denominator = a * a * shift * shift + factor * factor * (b * b * self.second + c * c * self.third)
         denominator -= area * area / square
         shared = numerator.gcd(denominator)
         return divmod(numerator, shared)[0], divmod(denominator, shared)[0]
@@ -121,8 +121,8 @@ class IntervalCurve:
 
 def value(polynomial: fmpq_poly, x: Fraction) -> Fraction:
     """The polynomial at a rational place."""
-    found = polynomial(rational(x))
-    return Fraction(int(found.p), int(found.q))
+    ball_of_value = polynomial(rational(x))
+    return Fraction(int(ball_of_value.p), int(ball_of_value.q))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,8 +190,8 @@ class OneGapMotion:
     def azimuth(self) -> Azimuth:
         """That of the level part of M about γ; see :meth:`Curve.turning`."""
         numerator, denominator = self.curve.turning()
-        found: Any = denominator.complex_roots()
-        doubled = [(acb(root), 2 * many) for root, many in found]
+        poles: Any = denominator.complex_roots()
+        doubled = [(acb(root), 2 * many) for root, many in poles]
         lead = ball(self.curve.speed) ** 2 * abs(_lead(self.curve.second) * _lead(self.curve.third))
         roots = Roots.of(lead * _lead(denominator) ** 2, [(root.place, 1) for root in self.others] + doubled)
         low, high = (end.place.real for end in self.stops)
@@ -219,10 +219,10 @@ class OneGapMotion:
     def _square_roots(self, phase: Balls, turns: int) -> tuple[Balls, Balls]:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
-        found = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
+        roots = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
         for stop, half in zip(self.stops, halves, strict=True):
-            found[stop.of] *= -half if turns % 2 else half
-        return found[0], found[1]
+            roots[stop.of] *= -half if turns % 2 else half
+        return roots[0], roots[1]
 
     def _state(self, phase: Balls, turns: int) -> list[Balls]:
         x = self.gap.position(phase)
@@ -234,10 +234,10 @@ class OneGapMotion:
 
 def horner(polynomial: fmpq_poly, x: Balls) -> Balls:
     """A rational polynomial at a ball or series."""
-    found = x * 0
+    total = x * 0
     for coefficient in reversed(polynomial.coeffs()):
-        found = found * x + arb(coefficient)
-    return found
+        total = total * x + arb(coefficient)
+    return total
 
 
 def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[BallLike]:
@@ -265,8 +265,8 @@ def _lead(polynomial: fmpq_poly) -> arb:
 
 
 def _roots(curve: IntervalCurve) -> list[_End]:
-    found: Any = [part.complex_roots() for part in (curve.second, curve.third)]
-    return [_End(acb(place), which) for which in (0, 1) for place, _ in found[which]]
+    roots: Any = [part.complex_roots() for part in (curve.second, curve.third)]
+    return [_End(acb(root), which) for which in (0, 1) for root, _ in roots[which]]
 
 
 def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:

@@ -111,11 +111,11 @@ class ZhukovskyVolterra(ClosedForm):
         constant = Fraction(dot(shift, self._rotor))
         constant -= sum((w * w * i for w, i in zip(self.start.omega, self.top.inertia, strict=True)), Fraction(0))
         lines: list[list[Fraction]] = [[rate, Fraction(1)] for rate in rates]
-        found = _product([*lines, [constant, Fraction(-square)]])
-        for place, part in enumerate(shift):
-            others = _product([line for other, line in enumerate(lines) if other != place])
-            found = [f - part * part * g for f, g in zip(found, [*others, Fraction(0), Fraction(0)], strict=True)]
-        return tuple(c / weight for c, weight in zip(reversed(found), (1, 4, 6, 4, 1), strict=True))
+        product = _product([*lines, [constant, Fraction(-square)]])
+        for row, part in enumerate(shift):
+            others = _product([line for other, line in enumerate(lines) if other != row])
+            product = [f - part * part * g for f, g in zip(product, [*others, Fraction(0), Fraction(0)], strict=True)]
+        return tuple(c / weight for c, weight in zip(reversed(product), (1, 4, 6, 4, 1), strict=True))
 
     def invariants(self) -> tuple[Fraction, Fraction]:
         """(g2, g3)."""
@@ -166,14 +166,14 @@ class ZhukovskyVolterra(ClosedForm):
 
 def _product(factors: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     """The product of polynomials, lowest coefficient first."""
-    found = [Fraction(1)]
+    product = [Fraction(1)]
     for factor in factors:
-        row = [Fraction(0)] * (len(found) + len(factor) - 1)
-        for i, a in enumerate(found):
+        row = [Fraction(0)] * (len(product) + len(factor) - 1)
+        for i, a in enumerate(product):
             for j, b in enumerate(factor):
                 row[i + j] += a * b
-        found = row
-    return found
+        product = row
+    return product
 
 
 def _terms(point: Point, order: int) -> list[BallLike]:
@@ -182,8 +182,8 @@ def _terms(point: Point, order: int) -> list[BallLike]:
     powers = [point.square * 0 + 1]
     for _ in range(order):
         powers.append(powers[-1] * t)
-    found = [powers[order], wp * powers[order - 2], slope * powers[order - 3], wp * wp * powers[order - 4]]
-    return [*found, wp * slope] if order == _POLE else found
+    terms = [powers[order], wp * powers[order - 2], slope * powers[order - 3], wp * wp * powers[order - 4]]
+    return [*terms, wp * slope] if order == _POLE else terms
 
 
 def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[BallLike]:
@@ -223,12 +223,12 @@ def _basis(g2: Fraction, g3: Fraction) -> list[list[Fraction]]:
         parts = sum((wp[2 * j + 3] * wp[2 * (n - j) + 3] for j in range(2, n - 1)), zero)
         if 2 * n + 3 < wide:
             wp[2 * n + 3] = Fraction(3, (2 * n + 1) * (n - 3)) * parts
-    slope = [(place + 1 - _POLE) * wp[place + 1] if place + 1 < wide else zero for place in range(wide)]
+    slope = [(n + 1 - _POLE) * wp[n + 1] if n + 1 < wide else zero for n in range(wide)]
 
     def times(one: list[Fraction], other: list[Fraction]) -> list[Fraction]:
         return [
-            sum((one[i] * other[place + _POLE - i] for i in range(wide) if 0 <= place + _POLE - i < wide), zero)
-            for place in range(size)
+            sum((one[i] * other[n + _POLE - i] for i in range(wide) if 0 <= n + _POLE - i < wide), zero)
+            for n in range(size)
         ]
 
     one = [zero] * size
@@ -239,11 +239,11 @@ def _basis(g2: Fraction, g3: Fraction) -> list[list[Fraction]]:
 def _momentum_series(case: ZhukovskyVolterra) -> list[list[Fraction]]:
     """The Taylor coefficients of M at t = 0, up to t^10."""
     rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), case.start.flat, _POLE + _LAST + 1)
-    found = []
+    columns = []
     for moment, own, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
         series = [moment * c / factorial(n) for n, c in enumerate(row)]
-        found.append([series[0] + own, *series[1:]])
-    return found
+        columns.append([series[0] + own, *series[1:]])
+    return columns
 
 
 def _parameters(case: ZhukovskyVolterra) -> Any:
@@ -258,27 +258,27 @@ def _exact(case: ZhukovskyVolterra) -> _Exact:
     basis, momentum = _basis(*case.invariants()), _momentum_series(case)
     size = len(basis[0])
     equations = []
-    for place, series in enumerate(momentum):
+    for axis, series in enumerate(momentum):
         moved = [_times_taylor(row, series) for row in basis]
         for power in range(size):
             line = [row[power] for row in moved] + [Fraction(0)] * 15
             for j, row in enumerate(basis):
-                line[5 + 5 * place + j] = -row[power]
+                line[5 + 5 * axis + j] = -row[power]
             equations.append(line)
     solution = _kernel(equations)
     groups = [tuple(solution[start : start + 5]) for start in (0, 5, 10, 15)]
     whole = tuple(
         sum((d * row[power] for d, row in zip(groups[0], basis, strict=True)), Fraction(0)) for power in range(size)
     )
-    found = _Exact(groups[0], tuple(groups[1:]), whole)
-    case.made["exact"] = found
-    return found
+    exact = _Exact(groups[0], tuple(groups[1:]), whole)
+    case.made["exact"] = exact
+    return exact
 
 
 def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> list[Fraction]:
     return [
-        sum((laurent[place - n] * series[n] for n in range(min(place + 1, len(series)))), Fraction(0))
-        for place in range(len(laurent))
+        sum((laurent[k - n] * series[n] for n in range(min(k + 1, len(series)))), Fraction(0))
+        for k in range(len(laurent))
     ]
 
 
@@ -291,12 +291,12 @@ def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
         raise LevelNotDone("The curve of M is degenerate.", "The enclosure proves such a motion, up to its reach.")
     pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
     (free,) = set(range(width)) - set(pivots)
-    found = [Fraction(0)] * width
-    found[free] = Fraction(1)
+    kernel = [Fraction(0)] * width
+    kernel[free] = Fraction(1)
     for i, j in enumerate(pivots):
         entry = reduced[i, free]
-        found[j] = -Fraction(int(entry.p), int(entry.q))
-    return found
+        kernel[j] = -Fraction(int(entry.p), int(entry.q))
+    return kernel
 
 
 @cached_per_precision
@@ -310,9 +310,9 @@ def _curve(case: ZhukovskyVolterra) -> _Curve:
 
 @cached_per_precision
 def _lattice(case: ZhukovskyVolterra) -> Lattice:
-    found = from_invariants(*case.invariants())
-    assert isinstance(found, Lattice)
-    return found
+    lattice = from_invariants(*case.invariants())
+    assert isinstance(lattice, Lattice)
+    return lattice
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,15 +346,15 @@ class _Fixed:
         powers = [square * 0 + 1]
         for _ in range(self.order - 1):
             powers.append(powers[-1] * t)
-        found = [
+        terms = [
             phi * powers[self.order - 1],
             slope * powers[self.order - 2],
             lame * phi * powers[self.order - 3],
             (2 * steep * phi + lame * slope) * powers[self.order - 4],
         ]
         if self.order == _POLE:
-            found.append((12 * wp * wp - self.invariant * square * square + lame * lame) * phi + 4 * steep * slope)
-        return found
+            terms.append((12 * wp * wp - self.invariant * square * square + lame * lame) * phi + 4 * steep * slope)
+        return terms
 
 
 @cached_per_precision

@@ -70,14 +70,14 @@ class QuarticMotion:
         """f and its first four derivatives at the start."""
         row = self._numbers(*self.coefficients)
         start, zero = self._numbers(self.start, 0)
-        found = []
+        values = []
         for _ in range(5):
             value = zero
             for coefficient in reversed(row):
                 value = value * start + coefficient
-            found.append(value)
+            values.append(value)
             row = [coefficient * index for index, coefficient in enumerate(row)][1:]
-        return tuple(found)
+        return tuple(values)
 
     def invariants(self) -> tuple[Any, Any]:
         """(g2, g3) of f."""

@@ -221,17 +221,17 @@ class StepDerivatives:
 
 def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivatives | None:
     """(Φ, σ) of ``step`` at 0 < τ ≤ 1; None where there are none, or the bounds of the theorem are not finite."""
-    found = _columns(tangent, step, tau != 1)
-    if found is None:
+    result = _columns(tangent, step, tau != 1)
+    if result is None:
         return None
-    errors = _errors(tangent, step, found)
+    errors = _errors(tangent, step, result)
     if errors is None:
         return None
     of_phi, of_sigma, moved = errors
-    rounding, ends = 0.0, found.total
-    if found.values is not None:
-        rounding = len(found.values[0][0]) / 2 + 1
-        ends = [[horner(component, tau) for component in column] for column in found.values]
+    rounding, ends = 0.0, result.total
+    if result.values is not None:
+        rounding = len(result.values[0][0]) / 2 + 1
+        ends = [[horner(component, tau) for component in column] for column in result.values]
     size = tangent.field.dimension
     bounds = [(of_phi if k < size else of_sigma) + rounding for k in range(tangent.width)]
     return StepDerivatives([list(row) for row in zip(*ends, strict=True)], bounds, moved)
@@ -245,10 +245,10 @@ def _columns(tangent: Tangent, step: Step, values: bool) -> Columns | None:
     size, one = tangent.field.dimension, 1 << tangent.precision
     unit = [one * (i == j) for j in range(tangent.width) for i in range(size)]
     start = [*map(int, step.node.centre), *unit]
-    found = coefficients(tangent.together, start, tangent.precision, step.node.halvings)
-    if found is None:
+    table = coefficients(tangent.together, start, tangent.precision, step.node.halvings)
+    if table is None:
         return None
-    own, after = found[:size], found[size:]
+    own, after = table[:size], table[size:]
     beyond = sum(max(map(abs, together)) for together in [*zip(*own, strict=True)][step.order + 1 :])
     columns = [after[k : k + size] for k in range(0, len(after), size)]
     return _WholeColumns(columns, tangent.precision, Whole(own, tangent.precision), float(beyond) * _UP)
@@ -281,8 +281,8 @@ def _errors(tangent: Tangent, step: Step, columns: Columns) -> tuple[float, floa
         gq, gl = (max(float(value) for value in bounds) * _UP for bounds in zip(*slopes, strict=True))
         off = h * widest * (2 * q * float(sums[size:].max()) + 2 * gq * reach + gl) * _UP
         of_sigma = factor * (_defect(tangent, step, columns, h, (gq, gl)) + off) * _UP
-    found = (of_phi * _UP, of_sigma * _UP, moved * _UP)
-    return found if all(value < inf for value in found) else None
+    bounds = (of_phi * _UP, of_sigma * _UP, moved * _UP)
+    return bounds if all(value < inf for value in bounds) else None
 
 
 def _defect(
@@ -439,14 +439,14 @@ def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bo
 
     Raises OutOfReach where the digits cannot be proven, or would take longer than ``known.effort``.
     """
-    found: dict[Fraction, EnclosedDerivatives] = {}
+    enclosed: dict[Fraction, EnclosedDerivatives] = {}
     for direction in (1, -1):
         spans = sorted({abs(time) for time in times if time * direction > 0})
         if spans:
-            found |= _one_way(known, direction, spans, bits, data)
+            enclosed |= _one_way(known, direction, spans, bits, data)
     if any(time == 0 for time in times):
-        found[Fraction(0)] = _at_rest(bits, data)
-    return [found[time] for time in times]
+        enclosed[Fraction(0)] = _at_rest(bits, data)
+    return [enclosed[time] for time in times]
 
 
 @whole_evaluation
@@ -476,7 +476,7 @@ def _one_way(
         tangent = _tangent(known, motion, *of_columns, places)
         start = start_node(motion.field, motion.scaled.state, planned[0])
         run = EnclosureRun(motion, planned[0], (start,), motion.certified(planned[0]) if planned[1] else None)
-        found, lacking = {}, 0
+        enclosed, lacking = {}, 0
         for span, values in _run(tangent, run, spans):
             at = _in_units(known, motion, tangent, values) if values else None
             lacking = bits - (
@@ -484,9 +484,9 @@ def _one_way(
             )
             if at is None or lacking > 0:
                 break
-            found[direction * span] = at
+            enclosed[direction * span] = at
         else:
-            return found
+            return enclosed
         wanted, own = (before[0] + lacking + _GUARD // 2 for before in (planned, of_columns))
     raise OutOfReach(
         f"Derivatives at t = {decimal_text(time, 6)} to so many digits are out of reach of a validated integration.",
@@ -509,13 +509,13 @@ def _independent(known: Validated, motion: ScaledMotion) -> tuple[int, ...]:
 def _tangent(
     known: Validated, motion: ScaledMotion, precision: int, in_words: bool, places: tuple[int, ...]
 ) -> Tangent:
-    found = [_datum(known, motion, k) for k in places]
-    data_of = tuple(datum for datum, _ in found)
+    data = [_datum(known, motion, k) for k in places]
+    data_of = tuple(datum for datum, _ in data)
     together = Together.of(motion.field, [datum.field for datum in data_of])
-    lanes = [given for _, given in found if given is not None]
+    lanes = [lanes_of_datum for _, lanes_of_datum in data if lanes_of_datum is not None]
     certified = columns = None
     grid = motion.grid(precision) if in_words else None
-    if grid is not None and not grid.relative and len(lanes) == len(found):
+    if grid is not None and not grid.relative and len(lanes) == len(data):
         certified = motion.certified(precision)
         columns = CertifiedColumns(certified, lanes)
     tangent = Tangent(motion.field, precision, together, certified, columns, data_of, places)
@@ -535,8 +535,8 @@ def _datum(known: Validated, motion: ScaledMotion, datum: int) -> tuple[Datum, C
     lanes = coefficients_of(scaled.system, rates, mpq(0))
     field = quadratic(lambda y: [sign * rate for rate in rates(y)], 6)
     by_lanes = quadratic(lambda y: [sign * rate for rate in lane_rates(scaled.system, lanes, y)], 6)
-    given = unit if datum < 3 else unit * scaled.rate**2 / scaled.sizes[3]
-    return Datum(field, given), lanes if (field.pairs, field.rows) == (by_lanes.pairs, by_lanes.rows) else None
+    datum_vector = unit if datum < 3 else unit * scaled.rate**2 / scaled.sizes[3]
+    return Datum(field, datum_vector), lanes if (field.pairs, field.rows) == (by_lanes.pairs, by_lanes.rows) else None
 
 
 def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
@@ -549,13 +549,13 @@ def _require_right(tangent: Tangent, motion: ScaledMotion) -> None:
         return
     centre = [round(value * 2**tangent.precision) for value in motion.scaled.state]
     for halvings in range(2, 64):
-        own, found = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
-        if own is None or found is None or found.values is None:
+        own, computed = certified.series(centre, halvings), columns.columns(centre, halvings, values=True)
+        if own is None or computed is None or computed.values is None:
             continue
-        after = [0] * (found.sizes.shape[1] - 1 - own.order)
-        values = [*(component + after for component in own.values), *(v for column in found.values for v in column)]
+        after = [0] * (computed.sizes.shape[1] - 1 - own.order)
+        values = [*(component + after for component in own.values), *(v for column in computed.values for v in column)]
         off = sum(lacking(tangent.together, Whole(values, tangent.precision), tangent.precision, halvings)[: own.order])
-        if off > Fraction(max(own.rounding, *found.rounding)):
+        if off > Fraction(max(own.rounding, *computed.rounding)):
             raise Contradiction(
                 f"Machine code in {tangent.precision} bits gives derivatives that are further from the truth than they "
                 "can be.",
@@ -571,11 +571,11 @@ def _run(tangent: Tangent, run: EnclosureRun, spans: list[Fraction]) -> Iterator
     columns = _Columns(unit_columns(size, tangent.precision, tangent.width), np.zeros((size, tangent.width)), 0)
     rest = list(spans)
     while rest:
-        found = _step(tangent, run, node)
-        if found is None:
+        taken = _step(tangent, run, node)
+        if taken is None:
             yield rest[0], None
             return
-        whole, along, own = found
+        whole, along, own = taken
         while rest and node.time + whole.length >= rest[0] * rate:
             tau = (rest[0] * rate - node.time) / whole.length
             at = own if tau == 1 else step_derivatives(tangent, along, tau)
@@ -593,13 +593,13 @@ def _step(tangent: Tangent, run: EnclosureRun, node: Node) -> tuple[Step, Step, 
     """A step, the same in their bits, and its derivatives; shorter where they need it, in integers if words fail."""
     for certified in (tangent.certified, None) if tangent.certified else (None,):
         for shorter in range(_SHORTENED):
-            found = run.step(replace(node, halvings=node.halvings + shorter))
-            if found is None:
+            taken = run.step(replace(node, halvings=node.halvings + shorter))
+            if taken is None:
                 return None
-            along = in_other_bits(tangent.field, found, tangent.precision, certified)
+            along = in_other_bits(tangent.field, taken, tangent.precision, certified)
             own = None if along is None else step_derivatives(tangent, along, Fraction(1))
             if along is not None and own is not None:
-                return found, along, own
+                return taken, along, own
     return None
 
 
@@ -619,18 +619,18 @@ def _local(tangent: Tangent, own: StepDerivatives, columns: _Columns) -> Matrix:
     """Bounds of the errors that a step itself makes in each column, in ulps 2^exponent."""
     size = len(columns.rows)
     of_phi = max(own.errors[:size])
-    found = of_phi * columns.sizes(tangent.precision) + 1.0
-    found[size:] += own.errors[size:]
-    return np.asarray(np.ldexp(found * _UP, -columns.exponent) + _TINY)
+    sizes = of_phi * columns.sizes(tangent.precision) + 1.0
+    sizes[size:] += own.errors[size:]
+    return np.asarray(np.ldexp(sizes * _UP, -columns.exponent) + _TINY)
 
 
 def _carried(
-    tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, transfer: tuple[Matrix, Matrix, float]
+    tangent: Tangent, taken: Step, own: StepDerivatives, columns: _Columns, transfer: tuple[Matrix, Matrix, float]
 ) -> _Columns:
     """(J, S) at the end of a step, in its new frame."""
     frame, turned, slack = transfer
     inverse = (norm(frame.T) + slack) * _UP
-    slack = (slack + inverse * own.moved * norm(found.node.errors.frame)) * _UP
+    slack = (slack + inverse * own.moved * norm(taken.node.errors.frame)) * _UP
     radii = np.abs(turned) @ columns.radii + slack * columns.radii.max(axis=0)
     reach = (np.abs(frame.T).sum(axis=1) + slack) * _UP
     radii = (radii + np.outer(reach, _local(tangent, own, columns))) * _UP
@@ -640,24 +640,24 @@ def _carried(
     return _Columns(_product(tangent, own, columns.rows), radii, exponent)
 
 
-def _at(tangent: Tangent, found: Step, own: StepDerivatives, columns: _Columns, tau: Fraction) -> Centre:
+def _at(tangent: Tangent, taken: Step, own: StepDerivatives, columns: _Columns, tau: Fraction) -> Centre:
     """(J, S) within a step: the centre, and bounds of the errors in ulps 2^exponent."""
-    variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(found.variation))
-    frame = found.node.errors.frame
-    spread = (found.summed_error + 64 * _UNIT * found.powers + own.moved) * norm(frame) * _UP
+    variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(taken.variation))
+    frame = taken.node.errors.frame
+    spread = (taken.summed_error + 64 * _UNIT * taken.powers + own.moved) * norm(frame) * _UP
     radii = np.abs(variation @ frame) @ columns.radii + spread * columns.radii.max(axis=0)
     return (
         _product(tangent, own, columns.rows),
         np.asarray((radii + _local(tangent, own, columns)) * _UP),
         columns.exponent,
-        (found, tau, found.radii(tau)),
+        (taken, tau, taken.radii(tau)),
     )
 
 
 @whole_evaluation
 def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: Centre) -> EnclosedDerivatives:
     """As balls, in the units given."""
-    rows, radii, exponent, (found, tau, around) = values
+    rows, radii, exponent, (taken, tau, around) = values
     sizes = motion.scaled.sizes
     scales = [*sizes, *(datum.unit for datum in tangent.data)]
     limits = [[float(r) for r in row] for row in radii]
@@ -674,7 +674,7 @@ def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: 
         start, data = [line[: len(rows)] for line in table], [line[len(rows) :] for line in table]
         if len(tangent.places) in (0, len(DATA)):
             return EnclosedDerivatives(start, data if tangent.data else None)
-        state = [value * ball(size) for value, size in zip(found.around(tau, around), sizes, strict=True)]
+        state = [value * ball(size) for value, size in zip(taken.around(tau, around), sizes, strict=True)]
         return EnclosedDerivatives(start, _completed(known, tangent.places, state, start, data))
 
 
@@ -682,12 +682,12 @@ def _completed(known: Validated, places: Sequence[int], state: list[arb], start:
     """S from its columns of ``places``, by (c)."""
     size = [ball(value) for value in (*known.parameters.inertia, *known.parameters.moment)]
     gamma = [ball(value) for value in known.start.gamma]
-    found = []
+    completed = []
     for i, (of_start, of_data) in enumerate(zip(start, data, strict=True)):
         row = dict(zip(places, of_data, strict=True))
         for k in (k for k in (3, 4, 5, 0, 1, 2) if k not in places):
             others = [j for j in range(3 if k > 2 else 0, len(DATA)) if j != k]
             total = sum(map(mul, gamma, of_start[3:]), -state[i] if i > 2 else arb(0)) if k > 2 else arb(0)
             row[k] = (total - sum((size[j] * row[j] for j in others), arb(0))) / size[k]
-        found.append([row[k] for k in range(len(DATA))])
-    return found
+        completed.append([row[k] for k in range(len(DATA))])
+    return completed

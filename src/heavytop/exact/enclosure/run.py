@@ -105,18 +105,18 @@ class EnclosureRun:
 
     def at(self, time: Fraction) -> tuple[Step, Fraction] | None:
         """The step that covers ``time`` ≥ 0, and τ in it; None if the errors grew too large before it."""
-        found, node = self._nearest(time)
+        taken, node = self._nearest(time)
         while True:
             if self.lost_at is not None and node.time >= self.lost_at:
                 return None
-            if found is None:
-                found = self._last = self.step(node)
-            if found is None:
+            if taken is None:
+                taken = self._last = self.step(node)
+            if taken is None:
                 self.lost_at = node.time
                 return None
-            if node.time + found.length >= time:
-                return found, (time - node.time) / found.length
-            node, found = self.after(found), None
+            if node.time + taken.length >= time:
+                return taken, (time - node.time) / taken.length
+            node, taken = self.after(taken), None
 
     def step(self, node: Node) -> Step | None:
         """From one of its nodes; None where the errors are too large."""
@@ -130,11 +130,11 @@ class EnclosureRun:
         passed = bisect_right(self.falls, time, key=lambda fall: fall.time)
         return self.falls[passed - 1][1:] if passed else (self.precision, self.certified)
 
-    def after(self, found: Step, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
+    def after(self, taken: Step, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
         """The node at the end of a step, remembered; in fewer bits where that is time."""
-        precision = self.motion.fewer(found.precision, found.node.errors.bits)
-        node = found.end(transfer, found.precision - precision)
-        if precision < found.precision and (not self.falls or self.falls[-1].time < node.time):
+        precision = self.motion.fewer(taken.precision, taken.node.errors.bits)
+        node = taken.end(transfer, taken.precision - precision)
+        if precision < taken.precision and (not self.falls or self.falls[-1].time < node.time):
             self.falls = (*self.falls, Fall(node.time, precision, self.motion.certified_at(precision)))
         self.keep(node)
         return node
@@ -205,10 +205,10 @@ class Pilot:
             taken = len(times)
             if taken and taken % _TRIED == 0 and hopeless(losses[-1], taken * _times_as_far(span, times[-1])):
                 break
-            found = run.step(node)
-            if found is None:
+            following = run.step(node)
+            if following is None:
                 break
-            node = run.after(found)
+            node = run.after(following)
             times.append(node.time)
             losses.append(run.lost(node))
         with _one_writer:
@@ -281,16 +281,16 @@ class ScaledMotion:
             vectors=tuple(tuple(tuple(map(mpq, row)) for row in rows) for rows in scaled.coefficients.vectors),
         )
 
-        def given(state: tuple[mpq, ...]) -> list[mpq]:
-            found = [*system.field(own, state[:6])]
+        def as_lane(state: tuple[mpq, ...]) -> list[mpq]:
+            values = [*system.field(own, state[:6])]
             if len(state) == 9:
-                found += system.attitude(own, state[:6], state[6:])
-            return [sign * rate for rate in found]
+                values += system.attitude(own, state[:6], state[6:])
+            return [sign * rate for rate in values]
 
         def by_lanes(state: tuple[mpq, ...]) -> list[mpq]:
             return [sign * rate for rate in rates(system, lanes, state)]
 
-        motion = quadratic(given, size)
+        motion = quadratic(as_lane, size)
         in_words = has_extra("multiword") and not scaled.rest and fixed_point_run.excess(scaled) <= _LARGEST_EXCESS
         if in_words:
             planned = quadratic(by_lanes, size)
@@ -567,9 +567,9 @@ class Validated:
             if motion.seconds(planned, loss, steps) > self.effort:
                 raise self._refusal(time, self._reachable(time, bits, loss, start))
             run = run or self._run(direction, start, *planned)
-            found = run.at(span)
-            if found is not None:
-                values = _evaluated(*found, found[0].radii(found[1]), found[0].precision + 64, sizes)
+            taken = run.at(span)
+            if taken is not None:
+                values = _evaluated(*taken, taken[0].radii(taken[1]), taken[0].precision + 64, sizes)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
@@ -634,11 +634,11 @@ class Validated:
 def _steps_of(run: EnclosureRun, span: Fraction) -> Iterator[Step]:
     node = run.nodes[0]
     while node.time < span:
-        found = run.step(node)
-        if found is None:
+        taken = run.step(node)
+        if taken is None:
             return
-        yield found
-        node = run.after(found)
+        yield taken
+        node = run.after(taken)
 
 
 @whole_evaluation
@@ -659,9 +659,9 @@ def _rounded_up(value: Fraction) -> tuple[float, int]:
 
 
 @whole_evaluation
-def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, sizes: tuple[Fraction, ...]) -> list[arb]:
+def _evaluated(taken: Step, tau: Fraction, radii: Matrix, bits: int, sizes: tuple[Fraction, ...]) -> list[arb]:
     """The state at ``tau`` in the units given."""
     # numpy would let other threads in amid the balls: the radii are there already
     with working_precision(bits):
-        values = found.around(tau, radii)
+        values = taken.around(tau, radii)
         return [value * ball(size) for value, size in zip(values, sizes, strict=True)]

@@ -242,15 +242,15 @@ def lacking(motion: QuadraticField, series: StepSeries, precision: int, halvings
     """|b_(n+1) − h f_n/(n + 1)| in the maximum norm, in ulps, for 0 ≤ n < N: exactly, from integers."""
     polynomials = [fmpz_poly([int(value) for value in component]) for component in series.values]
     products = [polynomials[j] * polynomials[k] for j, k in motion.pairs]
-    found = [Fraction(0)] * series.order
+    terms = [Fraction(0)] * series.order
     for component, row in zip(series.values, motion.rows, strict=True):
         quadratic = sum((c * products[pair] for c, pair in row.products), fmpz_poly([]))
         linear = sum((c * polynomials[j] for c, j in row.linear), fmpz_poly([]))
         for n in range(series.order):
             rate = int(quadratic[n]) + (int(linear[n]) << precision)
             step = Fraction(rate, row.denominator * (n + 1) << precision) / Fraction(2) ** halvings
-            found[n] = max(found[n], abs(int(component[n + 1]) - step))
-    return found
+            terms[n] = max(terms[n], abs(int(component[n + 1]) - step))
+    return terms
 
 
 _UNIT = 2.0**-53
@@ -465,9 +465,9 @@ def step(field: Quadratic, node: Node, precision: int, certified: CertifiedSerie
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
         series = taylor_series(field, trial, precision, certified)
-        found = None if series is None else _prove(field, trial, series, precision)
-        if found is not None and isfinite(found.widest) and found.variation_error < CAP:
-            return found if found.widest < CAP else None
+        proven = None if series is None else _prove(field, trial, series, precision)
+        if proven is not None and isfinite(proven.widest) and proven.variation_error < CAP:
+            return proven if proven.widest < CAP else None
         halvings += 1
     return None
 
@@ -517,15 +517,15 @@ def _tail(field: Quadratic, node: Node, series: StepSeries, precision: int) -> _
     return _Tail(factor, defect, bound, float(np.ldexp(bound, min(scale - precision, 900))))
 
 
-def in_other_bits(field: Quadratic, found: Step, precision: int, certified: CertifiedSeries | None) -> Step | None:
-    """``found`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
+def in_other_bits(field: Quadratic, taken: Step, precision: int, certified: CertifiedSeries | None) -> Step | None:
+    """``taken`` with a polynomial in ``precision`` bits, from its centre rounded to them; None where that has no proof.
 
-    The set of errors is a box around that of ``found``, wider by what was rounded.  V̂ remains that along the polynomial
-    of ``found``: W is the larger of both, so that the motion is within it of either.
+    The set of errors is a box around that of ``taken``, wider by what was rounded.  V̂ remains that along the polynomial
+    of ``taken``: W is the larger of both, so that the motion is within it of either.
     """
-    node, shift = found.node, precision - found.precision
-    if not shift and isinstance(found.series, Whole) == (certified is None):
-        return found
+    node, shift = taken.node, precision - taken.precision
+    if not shift and isinstance(taken.series, Whole) == (certified is None):
+        return taken
     centre = rounded_off(node.centre, -shift) if shift < 0 else tuple(mpz(value) << shift for value in node.centre)
     smaller, exponent = min(0, node.errors.exponent + shift), max(0, node.errors.exponent + shift)
     radii = np.ldexp(node.errors.sizes(), smaller) + (np.ldexp(0.5, -exponent) * (shift < 0) + _TINY)
@@ -535,9 +535,9 @@ def in_other_bits(field: Quadratic, found: Step, precision: int, certified: Cert
     tail = None if series is None else _tail(field, rounded, series, precision)
     if series is None or tail is None:
         return None
-    bound = max(tail.bound, float(np.ldexp(found.widest_ulps, smaller)) + _TINY)
-    widest = max(tail.widest, found.widest)
-    kept = replace(found, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
+    bound = max(tail.bound, float(np.ldexp(taken.widest_ulps, smaller)) + _TINY)
+    widest = max(tail.widest, taken.widest)
+    kept = replace(taken, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
     return kept if widest < CAP else None
 
 

@@ -120,9 +120,12 @@ _held = _Held()
 
 def _note() -> None:
     """The context is not what it was set to: remember what the user wants from now on, and set it again."""
-    found, wanted, own = (ctx.prec, ctx.cap), _held.context, _held.own
+    precision, wanted, own = (ctx.prec, ctx.cap), _held.context, _held.own
     _held.disturbed = _held.ever = True
-    _held.own = own[0] if found[0] == wanted[0] else found[0], own[1] if found[1] == wanted[1] else found[1]
+    _held.own = (
+        own[0] if precision[0] == wanted[0] else precision[0],
+        own[1] if precision[1] == wanted[1] else precision[1],
+    )
     ctx.prec, ctx.cap = wanted
 
 
@@ -245,14 +248,14 @@ def at_precision(bits: int, length: int, evaluate: Callable[[int], Found]) -> Fo
     before = _held.context
     _held.context = ctx.prec, ctx.cap = bits, length
     try:
-        found = evaluate(bits)
+        result = evaluate(bits)
     finally:
         if (ctx.prec, ctx.cap) != _held.context:
             _note()
         _held.context = ctx.prec, ctx.cap = before
     if _held.disturbed:
         raise ContextChanged
-    return found
+    return result
 
 
 def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
@@ -280,10 +283,10 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
                     if _held.ever:
                         interval = getswitchinterval()
                         setswitchinterval(max(interval, _UNHURRIED * 4**attempt))
-                    found = function(*args, **kwargs)
+                    result = function(*args, **kwargs)
                     if _held.disturbed or (ctx.prec, ctx.cap) != _held.context:
                         require_undisturbed()
-                    return found
+                    return result
                 except ContextChanged:
                     _held.ever = True
                 except Exception:
@@ -459,8 +462,8 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
 @whole_evaluation
 def nearest_integer(value: arb) -> int:
     """The integer nearest to the middle of a ball; 0 if it is not finite."""
-    found = (value + _HALF).mid().floor().unique_fmpz()
-    return 0 if found is None else int(found)
+    nearest = (value + _HALF).mid().floor().unique_fmpz()
+    return 0 if nearest is None else int(nearest)
 
 
 def relative_bits(value: arb) -> int:
@@ -537,8 +540,8 @@ def largest_singular_value(matrix: list[list[arb]], bits: int) -> arb:
     An infinite ball where neither comes to an end.
     """
     with working_precision(2 * bits + 64):
-        given = arb_mat(matrix)
-        square = given.transpose() * given
+        entries = arb_mat(matrix)
+        square = entries.transpose() * entries
         below = _quotient(square)
         margin = below.abs_upper() * arb(2) ** -(bits + 8)
         for _ in range(bits // 4 + 16):

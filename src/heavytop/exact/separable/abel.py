@@ -221,13 +221,13 @@ def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
 
 
 class Rest:
-    """The variable at rest at ``place``; its phase stays 0."""
+    """The variable at rest at ``point``; its phase stays 0."""
 
     turn = 1.0
     periodic = False
 
-    def __init__(self, place: arb) -> None:
-        self.middle = place
+    def __init__(self, point: arb) -> None:
+        self.middle = point
         self.column = [arb(0), arb(0)]
 
     def position(self, phase: Balls) -> Balls:
@@ -256,10 +256,10 @@ class Rest:
 
 
 class RestingVariable:
-    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
+    """``variable`` with the one integral H for a variable at rest at ``point``, outside its gap."""
 
-    def __init__(self, variable: Variable, place: arb) -> None:
-        self.variable, self.place = variable, place
+    def __init__(self, variable: Variable, point: arb) -> None:
+        self.variable, self.place = variable, point
         self.turn, self.periodic, self.middle = variable.turn, variable.periodic, variable.middle
         self.position, self.ends = variable.position, variable.ends
         self.bend, self.phase = variable.bend, variable.phase
@@ -358,9 +358,9 @@ class Line:
         for k in (0, 1):
             if k not in moving:
                 # of ε_o (G_1 − e G_0), one number
-                place, other = variables[k].middle, 1 - k
-                inversion = Inversion((RestingVariable(variables[other], place),), (1,))
-                rates = (signs[other] * (slopes[1] - place * slopes[0]),)
+                middle, other = variables[k].middle, 1 - k
+                inversion = Inversion((RestingVariable(variables[other], middle),), (1,))
+                rates = (signs[other] * (slopes[1] - middle * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
         return cls(variables, moving, inversion, tuple(origin), rates)
 
@@ -370,11 +370,11 @@ class Line:
         Raises Undecided where the working precision does not prove them.
         """
         target = [value + slope * time for value, slope in zip(self.origin, self.slopes, strict=True)]
-        found, counts = self.inversion.phases(target)
-        if not all(phase.is_finite() for phase in found):
+        angles, counts = self.inversion.phases(target)
+        if not all(phase.is_finite() for phase in angles):
             raise Undecided
         phases, turns = [arb(0)] * 2, [0] * 2
-        for k, phase, count in zip(self.moving, found, counts, strict=True):
+        for k, phase, count in zip(self.moving, angles, counts, strict=True):
             phases[k], turns[k] = phase, count
         return phases, turns
 
@@ -575,9 +575,9 @@ class LineIntegral:
         error: arb,
     ) -> Self:
         """From the pairs (a, b) and D at the points, W and the error of each pair."""
-        found = [Product.of(first, kernel, second, rates, largest) for first, second in pairs]
-        dropped = sum((part for _, part in found), arb(0))
-        return cls(tuple(product for product, _ in found), rates, began, dropped + len(found) * error)
+        products = [Product.of(first, kernel, second, rates, largest) for first, second in pairs]
+        dropped = sum((part for _, part in products), arb(0))
+        return cls(tuple(product for product, _ in products), rates, began, dropped + len(products) * error)
 
     def at(self, angles: Sequence[arb], length: arb) -> arb:
         """The integral to the angles, which the line reaches after ``length``, but for a constant."""

@@ -80,14 +80,14 @@ class Roots:
         """factor · g."""
         return replace(self, lead=self.lead * factor)
 
-    def polynomial(self, place: arb) -> arb_poly:
-        """g as a polynomial, with the sign that makes it positive at ``place``."""
-        found = arb_poly([self.lead])
+    def polynomial(self, point: arb) -> arb_poly:
+        """g as a polynomial, with the sign that makes it positive at ``point``."""
+        product = arb_poly([self.lead])
         for b, many in self.real:
-            found *= arb_poly([-b, 1]) ** many
+            product *= arb_poly([-b, 1]) ** many
         for x, y, many in self.pairs:
-            found *= arb_poly([x * x + y * y, -2 * x, 1]) ** many
-        return -found if found(place) < 0 else found
+            product *= arb_poly([x * x + y * y, -2 * x, 1]) ** many
+        return -product if product(point) < 0 else product
 
     def all(self) -> list[tuple[acb, int]]:
         """Every b; of a pair the one above the real axis, with twice its multiplicity."""
@@ -112,8 +112,8 @@ class SineSums:
         """Each sum at the angle: sin(l + j)θ = sin lθ cos jθ + cos lθ sin jθ."""
         if self.polynomials:
             sine, cosine = angle.sin_cos()
-            place = acb(cosine, sine)
-            return [polynomial(place).imag for polynomial in self.polynomials]
+            point = acb(cosine, sine)
+            return [polynomial(point).imag for polynomial in self.polynomials]
         steps = [(angle * j).sin_cos() for j in range(self.small)]
         inner = self.matrix * arb_mat([[cosine, sine] for sine, cosine in steps])
         leaps = [(angle * (i * self.small)).sin_cos() for i in range(self.large)]
@@ -186,8 +186,8 @@ class Gap:
                 "differ by too many decades.",
                 "Choose numbers of less different size.",
             )
-        found: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
-        return found
+        values: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
+        return values
 
 
 class FourierBound:
@@ -257,10 +257,10 @@ def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -
 
     def values(cosine: arb) -> list[arb]:
         v = middle + reach * cosine
-        found = [rest.density(v)]
+        values = [rest.density(v)]
         for _ in range(count - 1):
-            found.append(v * found[-1])
-        return found
+            values.append(v * values[-1])
+        return values
 
     return even_rows(values, terms)
 
@@ -273,8 +273,8 @@ def even_rows(values: Callable[[arb], list[arb]], terms: int) -> list[list[arb]]
     rows: list[list[arb]] = []
     for even, odd in zip(samples[::2], [*samples[1::2], samples[-1]], strict=False):
         # all coefficients are real, so two functions fit into one transform
-        found = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
-        rows += [[c.real / terms for c in found], [c.imag / terms for c in found]]
+        product = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
+        rows += [[c.real / terms for c in product], [c.imag / terms for c in product]]
     return rows[: len(samples)]
 
 
@@ -286,10 +286,10 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
     """
     half = len(values) - 1
     full = values + values[-2:0:-1]
-    found = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
+    spectrum = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
     sums = [acb(0)] * (half + 1)
     for k in range(half // 2 + 1):
-        mean, apart = (found[k] + found[-k]) / 2, (found[-k] - found[k]) / 2
+        mean, apart = (spectrum[k] + spectrum[-k]) / 2, (spectrum[-k] - spectrum[k]) / 2
         odd = apart / (2 * cosines[half // 2 - k]) if k else sum(full[1::2], acb(0))
         sums[k], sums[half - k] = mean + odd, mean - odd
     return sums[:half]
@@ -361,12 +361,12 @@ class Approach:
         def values(v: arb) -> list[arb]:
             here = self.density(v)
             # 1/√a − 1/√b = (b − a)/(√a √b (√a + √b))
-            found = [-quotient(v) * here * at_limit / (1 / here + 1 / at_limit)]
+            values = [-quotient(v) * here * at_limit / (1 / here + 1 / at_limit)]
             value = at_limit
             for _ in range(count - 1):
-                found.append(v * found[-1] + value)
+                values.append(v * values[-1] + value)
                 value = value * self.limit
-            return [-self.length * part for part in found]
+            return [-self.length * part for part in values]
 
         return even_rows(lambda cosine: values(self.turning + self.length * (1 - cosine) / 2), self.terms)
 
@@ -394,27 +394,27 @@ class Approach:
 
     def estimates(self, phase: float) -> NDArray[np.float64]:
         angle = 2 * atan(tanh(phase / 2))
-        found: NDArray[np.float64] = self._rate_floats * phase + self._floats @ np.sin(self._orders * angle)
-        return found
+        values: NDArray[np.float64] = self._rate_floats * phase + self._floats @ np.sin(self._orders * angle)
+        return values
 
 
 def _sines(means: list[arb]) -> list[arb]:
     """The coefficients of sin χ, sin 2χ, ... of ∫ q dy, from the means of q cos 2nχ."""
     cosines = [means[0], *(2 * mean for mean in means[1:])]
-    found = []
+    sums = []
     for k, (one, two) in enumerate(zip(cosines, [*cosines[1:], arb(0)], strict=True)):
-        found += [((2 * one if k == 0 else one) + two) / (2 * (2 * k + 1)), arb(0)]
-    return found
+        sums += [((2 * one if k == 0 else one) + two) / (2 * (2 * k + 1)), arb(0)]
+    return sums
 
 
-def _divided(polynomial: arb_poly, place: arb) -> arb_poly:
+def _divided(polynomial: arb_poly, point: arb) -> arb_poly:
     """(g(v) − g(e))/(v − e) as a polynomial in v, by Horner's scheme."""
-    found: list[arb] = []
+    quotients: list[arb] = []
     value = arb(0)
     for coefficient in reversed(polynomial.coeffs()[1:]):
-        value = value * place + coefficient
-        found.append(value)
-    return arb_poly(found[::-1])
+        value = value * point + coefficient
+        quotients.append(value)
+    return arb_poly(quotients[::-1])
 
 
 # Attitude beside a variable that swings in one gap: the azimuth of a vector about the vertical is one more integral.

@@ -115,8 +115,10 @@ class BodyAssessment:
 
 def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> BodyAssessment:
     """The assessment of a body about a pivot in the axes of its link; None: its ball joint, or the origin."""
-    given = body.about(pivot)
-    return BodyAssessment(body.name, given, realisable(given.central, given.slack), tuple(slips(given)), gravity)
+    about_pivot = body.about(pivot)
+    return BodyAssessment(
+        body.name, about_pivot, realisable(about_pivot.central, about_pivot.slack), tuple(slips(about_pivot)), gravity
+    )
 
 
 def _reason(moments: Vector) -> str:

@@ -37,8 +37,8 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
     if branch is not None:
         require_branch(arguments.text(branch, "branch"))
     name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
-    found = audit_named(name, None if system is None else arguments.system(system).name)
-    return found if branch is None else only_branch(found, branch)
+    audited = audit_named(name, None if system is None else arguments.system(system).name)
+    return audited if branch is None else only_branch(audited, branch)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -54,13 +54,15 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
     def __len__(self) -> int:
         return len(self.entries)
 
-    def __getitem__(self, place: Any) -> Any:
-        return self.entries[place]
+    def __getitem__(self, index: Any) -> Any:
+        return self.entries[index]
 
     @property
     def changed(self) -> tuple[str, ...]:
         """Ids of the entries whose verdict is another than the expected one, and is one."""
-        return tuple(each.id for each in self.entries if self.verdicts[each.id].verdict not in (each.expects, _OPEN))
+        return tuple(
+            entry.id for entry in self.entries if self.verdicts[entry.id].verdict not in (entry.expects, _OPEN)
+        )
 
     @property
     def undecided(self) -> tuple[str, ...]:
@@ -77,7 +79,7 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
         return {"claims": [self._document(entry) for entry in self.entries]}
 
     def _document(self, entry: Entry) -> dict[str, Any]:
-        found = self.verdicts[entry.id]
+        judged = self.verdicts[entry.id]
         document = {
             "id": entry.id,
             "title": entry.title,
@@ -86,16 +88,16 @@ class ClaimLibrary(Tabular, Sequence[Entry]):
             "status": entry.status,
             "read": entry.read,
             "tags": entry.tags,
-            "verdict": found.verdict,
+            "verdict": judged.verdict,
             "expects": entry.expects,
-            "seconds": round(found.seconds, 3),
+            "seconds": round(judged.seconds, 3),
         }
-        return document | ({"reason": found.reason} if found.reason else {})
+        return document | ({"reason": judged.reason} if judged.reason else {})
 
     def _table(self) -> TitledTable:
-        counts = [sum(each.verdict == name for each in self.verdicts.values()) for name in _VERDICTS]
+        counts = [sum(verdict.verdict == name for verdict in self.verdicts.values()) for name in _VERDICTS]
         said = ", ".join(f"{count} {_SAID[name]}" for name, count in zip(_VERDICTS, counts, strict=True) if count)
-        rows = [(each.id, str(each.source.year), self.verdicts[each.id].verdict) for each in self.entries]
+        rows = [(entry.id, str(entry.source.year), self.verdicts[entry.id].verdict) for entry in self.entries]
         return TitledTable(f"{len(self.entries)} claims: {said}", ("claim", "year", "verdict"), rows)
 
 
@@ -121,9 +123,9 @@ def claim_library(
     Raises:
         InputError: for a tag that no entry has.
     """
-    found = library().values() if tag is None else _tagged(arguments.text(tag, "tag"))
+    listed = library().values() if tag is None else _tagged(arguments.text(tag, "tag"))
     told = arguments.callback(done, "done") or (lambda: None)
-    entries = tuple(found)
+    entries = tuple(listed)
     return ClaimLibrary(entries, judged(entries, anew=bool(arguments.flag(anew, "anew")), done=told))
 
 

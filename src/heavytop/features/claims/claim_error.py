@@ -122,14 +122,14 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
     form: ``printed`` for (4.2)-(4.6) to the letter, with the positive roots also for t > 0; ``stable`` for the
     hyperbolic forms.
     """
-    given = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
-    i1, i3, c1, t = (exact(value) for value in given)
+    parameters = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
+    i1, i3, c1, t = (exact(value) for value in parameters)
     alpha = number(case.alpha, precision)
     with numpy.errstate(all="ignore"):
         if form == "printed":
-            computed = partial_case(given[0], given[1], given[2], given[3], numpy, "printed")
+            computed = partial_case(parameters[0], parameters[1], parameters[2], parameters[3], numpy, "printed")
         else:
-            computed = stable_case(alpha, given[0], given[1], given[3], numpy)
+            computed = stable_case(alpha, parameters[0], parameters[1], parameters[3], numpy)
     bits = precision.bits + 64
 
     def evaluate(_working: int) -> list[arb]:
@@ -275,12 +275,12 @@ class _Motion:
     def __init__(self, solution: ExactSolution, case: PartialCase) -> None:
         self.field = solution.system.field
         self.state = cache(lambda time: solution.state(time, _BITS))
-        given = solution.system.parameters(solution.top, solution.start)
+        parameters = solution.system.parameters(solution.top, solution.start)
         with working_precision(_BITS):
-            self.parameters = given.mapped(ball)
+            self.parameters = parameters.mapped(ball)
             # ½ I Ω² <= C1 + |P r| along the truth, and along the claim as well, which keeps (1.3)
-            most = 2 * (case.c1 + sum(map(abs, given.moment)))
-            omega = [ball(most / each).sqrt().abs_upper() for each in given.inertia]
+            most = 2 * (case.c1 + sum(map(abs, parameters.moment)))
+            omega = [ball(most / moment).sqrt().abs_upper() for moment in parameters.inertia]
             everywhere = [arb(0, bound) for bound in (*omega, *[arb(1)] * 3)]
             self.fastest = [rate.abs_upper() for rate in self.field(self.parameters, everywhere)]
 
@@ -446,8 +446,8 @@ def _levels(case: PartialCase) -> list[tuple[Array, Array, Array]]:
     state = [m / i for m, i in zip(point(turn, height), moments, strict=True)]
     lines = contour_generator(turn, height, gyrostat_energy(p, state))
     low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
-    found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
-    return [point(*numpy.asarray(line).T) for line in found]
+    line = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
+    return [point(*numpy.asarray(line).T) for line in line]
 
 
 def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:

@@ -62,14 +62,14 @@ def audit(
 def _library(claim: str, system: str | None, branch: str | None, json: bool) -> int:
     if claim or system is not None or branch is not None:
         raise InputError("--library audits every claim as it is.", "Leave out the claim, --system and --branch.")
-    found = _listed(None, anew=True)
+    listed = _listed(None, anew=True)
     if json:
-        print_json(found.to_json())
+        print_json(listed.to_json())
     else:
         from heavytop.features.claims.text import unexpected_text
 
-        show_on_terminal(unexpected_text(found))
-    return ExitCode(found.exit_code)
+        show_on_terminal(unexpected_text(listed))
+    return ExitCode(listed.exit_code)
 
 
 @command
@@ -81,13 +81,13 @@ def claims(
 
     Proven or refuted by `heavytop audit NAME`; verdicts that are not known from before take a second each.
     """
-    found = _listed(tag, anew=False)
+    listed = _listed(tag, anew=False)
     if json:
-        print_json(found.to_json())
+        print_json(listed.to_json())
     else:
         from heavytop.features.claims.text import claims_text
 
-        show_on_terminal(claims_text(found))
+        show_on_terminal(claims_text(listed))
     return ExitCode.GOOD
 
 

@@ -124,11 +124,11 @@ def _comparison(compared: Compared) -> Any:
         for label, curves, colour, style, width in drawn:
             column = curves.angles[:, index] if index < 3 else curves.states[:, index - 3]
             axes.plot(curves.times, column, style, color=colour, lw=width, label=label)
-        for branch, found in compared.parted.items():
-            if found:
+        for branch, parting in compared.parted.items():
+            if parting:
                 colour, dashes = _LINES[branch]
-                label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(found.time):.4f}"
-                axes.axvline(float(found.time), color=colour, lw=1.2, ls=dashes, label=label)
+                label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(parting.time):.4f}"
+                axes.axvline(float(parting.time), color=colour, lw=1.2, ls=dashes, label=label)
         axes.set_title(name, loc="left")
     for axes in grid[1]:
         axes.set_xlabel("t")
@@ -143,7 +143,7 @@ def _comparison(compared: Compared) -> Any:
 def _portrait(portrait: Portrait) -> Any:
     """The momentum sphere of the gyrostat with its homoclinic orbit, and the true homoclinic orbit beside it."""
     figure = new_figure(10, 5.6)
-    left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
+    left, right = (figure.add_subplot(1, 2, index, projection="3d") for index in (1, 2))
     for segment in portrait.levels:
         left.plot(*segment, color="#999999", lw=0.7)
     left.plot(*portrait.gyrostat.T, color=ORANGE, lw=2.6, label="homoclinic orbit of the gyrostat")

@@ -20,11 +20,11 @@ _HEADS = {"holds": "Proven", "refuted": "Refuted", "undecided": "Undecided"}
 _STYLES = {"holds": "green", "refuted": "bold red", "undecided": "yellow"}
 
 
-def claims_text(found: ClaimLibrary) -> RenderableType:
+def claims_text(listing: ClaimLibrary) -> RenderableType:
     """The entries by verdict: id, title and source of each."""
     parts: list[RenderableType] = []
     for verdict, head in _HEADS.items():
-        of_verdict = [entry for entry in found.entries if found.verdicts[entry.id].verdict == verdict]
+        of_verdict = [entry for entry in listing.entries if listing.verdicts[entry.id].verdict == verdict]
         if of_verdict:
             parts += [Text(f"{head}: {len(of_verdict)}", style=_STYLES[verdict])]
             parts += [line for entry in of_verdict for line in _lines(entry)]
@@ -42,16 +42,16 @@ def _folded(text: str, indent: int) -> list[str]:
     return wrap(text, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
-def unexpected_text(found: ClaimLibrary) -> RenderableType:
+def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     """How many verdicts are the expected ones, and each that is not."""
-    off = [entry for entry in found.entries if entry.id in (*found.changed, *found.undecided)]
-    total = f"{len(found.entries) - len(off)} of {len(found.entries)} verdicts are the expected ones."
+    off = [entry for entry in listing.entries if entry.id in (*listing.changed, *listing.undecided)]
+    total = f"{len(listing.entries) - len(off)} of {len(listing.entries)} verdicts are the expected ones."
     lines = [Text(total)]
     for entry in off:
-        judged = found.verdicts[entry.id]
+        judged = listing.verdicts[entry.id]
         said = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(judged.reason)
         lines.append(Text(fill(said, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
-    seconds = sum(each.seconds for each in found.verdicts.values())
+    seconds = sum(judged.seconds for judged in listing.verdicts.values())
     return Group(*lines, Text(f"{seconds:.0f} s of audits."))
 
 
@@ -168,8 +168,8 @@ def _witnesses(report: Audit) -> list[Text]:
     for row in refuted:
         witness = dict(row.witness or {})
         value, radius, parameters = witness.pop("value"), witness.pop("radius"), witness.pop("parameters")
-        place = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
-        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {value} +/- {radius} at {place}"))
+        point = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
+        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {value} +/- {radius} at {point}"))
     notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
     if notes:
         lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]

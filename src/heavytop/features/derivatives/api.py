@@ -103,13 +103,13 @@ def score_derivatives(
         raise InputError(f"derivatives = {quoted(derivatives)} cannot be scored.", 'Give "start" or "data".')
     matrices = _matrices(jacobians, len(instants))
     of_digits = digits_of(max(bits_of(value) for matrix in matrices for row in matrix for value in row))
-    given = [[[component(value) for value in row] for row in matrix] for matrix in matrices]
-    finite = next((i for i, m in enumerate(given) if any(v is None for row in m for v in row)), len(given))
-    outcome = Outcome.SUCCESS if finite == len(given) else Outcome.NON_FINITE
+    values = [[[component(value) for value in row] for row in matrix] for matrix in matrices]
+    finite = next((i for i, m in enumerate(values) if any(v is None for row in m for v in row)), len(values))
+    outcome = Outcome.SUCCESS if finite == len(values) else Outcome.NON_FINITE
     if not finite:
         return DerivativeScore(outcome.value, None, (), (), (), (), of_digits, "nothing", (), None)
     known = known_derivatives(body, state, instants[:finite], of_digits + _MORE, about, derivatives)
-    return _scored(outcome, instants[:finite], given[:finite], known, of_digits, state, needed)
+    return _scored(outcome, instants[:finite], values[:finite], known, of_digits, state, needed)
 
 
 def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
@@ -117,7 +117,7 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
     shape = getattr(jacobians, "shape", None)
     if shape is not None and (len(shape) != 3 or tuple(shape[1:]) != (6, 6)):
         raise InputError(f"The Jacobians have the shape {tuple(shape)}.", _SHAPE)
-    found = []
+    matrices = []
     for i, matrix in enumerate(ordered(jacobians, "jacobians", _SHAPE)):
         rows = [
             ordered(row, f"jacobians[{i}][{j}]", _SHAPE)
@@ -127,18 +127,18 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
             raise InputError(
                 f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE
             )
-        found.append([list(row) for row in rows])
-    if len(found) != count:
-        raise InputError(f"There are {count} times and {len(found)} Jacobians.", "Give one Jacobian for each time.")
+        matrices.append([list(row) for row in rows])
+    if len(matrices) != count:
+        raise InputError(f"There are {count} times and {len(matrices)} Jacobians.", "Give one Jacobian for each time.")
     if count > MOST_STATES:
         raise InputError(f"{count} Jacobians are too many to score.", f"Give at most {MOST_STATES}.")
-    return found
+    return matrices
 
 
 def _scored(
     outcome: Outcome,
     times: list[Fraction],
-    given: list[Any],
+    matrices: list[Any],
     known: Derivatives,
     of_digits: int,
     start: State,
@@ -148,9 +148,9 @@ def _scored(
     balls = known.start or known.data or []
     true = [[[exact(ball.value) for ball in row] for row in matrix] for matrix in balls]
     radii = [[[exact(ball.radius) for ball in row] for row in matrix] for matrix in balls]
-    found = [_worst(*each) for each in zip(given, true, radii, strict=True)]
-    digits = tuple(_digits(error, of_digits) for error, _ in found)
-    names = tuple(f"∂{NAMES[i]}/∂{columns[j]}" for _, (i, j) in found)
+    errors = [_worst(*pair) for pair in zip(matrices, true, radii, strict=True)]
+    digits = tuple(_digits(error, of_digits) for error, _ in errors)
+    names = tuple(f"∂{NAMES[i]}/∂{columns[j]}" for _, (i, j) in errors)
     right = min(digits)
     passed = True if outcome is Outcome.SUCCESS else None
     if needed is not None and exact(right) < needed:
@@ -162,22 +162,22 @@ def _scored(
         tuple(shown(time) for time in times),
         digits,
         names,
-        tuple(float(decimal_text(error, 17)) for error, _ in found),
+        tuple(float(decimal_text(error, 17)) for error, _ in errors),
         of_digits,
         f"{known.method}, largest radius {decimal_text(radius, 3)}",
-        tuple(_diagnoses(given[-1], true[-1], radii[-1], start)) if known.start is not None else (),
+        tuple(_diagnoses(matrices[-1], true[-1], radii[-1], start)) if known.start is not None else (),
         passed,
     )
 
 
-def _worst(given: Matrix, true: Matrix, radii: Matrix) -> tuple[Fraction, tuple[int, int]]:
+def _worst(matrix: Matrix, true: Matrix, radii: Matrix) -> tuple[Fraction, tuple[int, int]]:
     """The largest |error|/max(1, |true value|) that an entry may have, and which it is."""
     errors = (
-        ((abs(given[i][j] - true[i][j]) + radii[i][j]) / max(Fraction(1), abs(true[i][j])), (i, j))
+        ((abs(matrix[i][j] - true[i][j]) + radii[i][j]) / max(Fraction(1), abs(true[i][j])), (i, j))
         for i in range(len(true))
         for j in range(len(true[i]))
     )
-    return max(errors, key=lambda each: each[0])
+    return max(errors, key=lambda pair: pair[0])
 
 
 def _digits(error: Fraction, most: int) -> float:
@@ -185,7 +185,7 @@ def _digits(error: Fraction, most: int) -> float:
     return float(most) if size is None or not math.isfinite(size) else min(float(most), -size)
 
 
-def _diagnoses(given: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
+def _diagnoses(matrix: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
     """Conventions under which the last Jacobian fits much better than as it was given."""
     size, gamma = range(6), (Fraction(0), Fraction(0), Fraction(0), *start.gamma)
     flat = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
@@ -194,5 +194,5 @@ def _diagnoses(given: Matrix, true: Matrix, radii: Matrix, start: State) -> list
         "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],
         "gamma0 was held on the unit sphere: here it counts as three independent variables.": projected,
     }
-    own = _digits(_worst(given, true, radii)[0], 10**6)
-    return [text for text, other in said.items() if _digits(_worst(given, other, radii)[0], 10**6) > own + _EXPLAINS]
+    own = _digits(_worst(matrix, true, radii)[0], 10**6)
+    return [text for text, other in said.items() if _digits(_worst(matrix, other, radii)[0], 10**6) > own + _EXPLAINS]

@@ -119,10 +119,10 @@ class Ratio:
         if abs(count) > _HIGHEST:
             raise InputError(f"The function has a power {quoted(int(count))}.", f"Powers go up to {_HIGHEST}.")
         base = self if count >= 0 else Ratio.of(1) / self
-        found = Ratio.of(1)
+        product = Ratio.of(1)
         for _ in range(abs(int(count))):
-            found = found * base
-        return found
+            product = product * base
+        return product
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -145,7 +145,7 @@ class Ratio:
     @property
     def constant(self) -> Fraction:
         """The number that it is, where it depends on nothing."""
-        part = [(each.to_dict() or {(0,) * 6: fmpq(0)})[(0,) * 6] for each in (self.numerator, self.denominator)]
+        part = [(part.to_dict() or {(0,) * 6: fmpq(0)})[(0,) * 6] for part in (self.numerator, self.denominator)]
         return Fraction(int(part[0].p), int(part[0].q)) / Fraction(int(part[1].p), int(part[1].q))
 
     def reduced(self) -> Ratio:
@@ -193,24 +193,24 @@ class EventFunction:
         return [index for index, degree in enumerate(degrees) if degree > 0]
 
 
-def event_function(given: Any) -> EventFunction:
+def event_function(function: Any) -> EventFunction:
     """The function that a text or a callable names; raises InputError for anything else, and for a constant."""
-    if isinstance(given, EventFunction):
-        return given
-    if isinstance(given, str):
-        found, name = _parsed(given), " ".join(given.split())
-    elif callable(given):
-        name = str(getattr(given, "__name__", type(given).__name__))
-        tried = _tried(given)
+    if isinstance(function, EventFunction):
+        return function
+    if isinstance(function, str):
+        parsed, name = _parsed(function), " ".join(function.split())
+    elif callable(function):
+        name = str(getattr(function, "__name__", type(function).__name__))
+        tried = _tried(function)
         if tried is None:
-            return EventFunction(name, call=given)
-        found = tried
+            return EventFunction(name, call=function)
+        parsed = tried
     else:
-        raise InputError(f"function = {quoted(given)} is neither text nor a callable.", _REMEDY)
-    found = found.reduced()
-    if found.numerator.is_constant() and found.denominator.is_constant():
+        raise InputError(f"function = {quoted(function)} is neither text nor a callable.", _REMEDY)
+    parsed = parsed.reduced()
+    if parsed.numerator.is_constant() and parsed.denominator.is_constant():
         raise InputError(f"The function {quoted(name)} does not depend on the state.", _REMEDY)
-    return EventFunction(name, *_without_square(found.numerator), found.denominator)
+    return EventFunction(name, *_without_square(parsed.numerator), parsed.denominator)
 
 
 def _without_square(polynomial: Any) -> tuple[Any, Any]:
@@ -222,11 +222,11 @@ def _without_square(polynomial: Any) -> tuple[Any, Any]:
     return rest, square
 
 
-def _tried(given: Callable[[Any, Any], Any]) -> Ratio | None:
+def _tried(function: Callable[[Any, Any], Any]) -> Ratio | None:
     """The rational function that a callable is; None where it wants numbers."""
     y = numpy.array(_variables(), dtype=object)
     try:
-        value = given(y[:3], y[3:])
+        value = function(y[:3], y[3:])
         if isinstance(value, numpy.ndarray) and value.shape == ():
             value = value[()]
         return Ratio.of(value)
@@ -293,7 +293,7 @@ def in_body_axes(function: EventFunction, axes: Sequence[Sequence[Fraction]]) ->
         for i in range(3)
     ]
     parts = (function.numerator, function.square, function.denominator)
-    return EventFunction(function.name, *(each.compose(*forms) for each in parts))
+    return EventFunction(function.name, *(part.compose(*forms) for part in parts))
 
 
 def terms_of(polynomial: Any) -> list[tuple[tuple[int, ...], fmpq]]:
@@ -328,10 +328,10 @@ def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     """d/dt of a polynomial along the motions: Σ ∂f/∂y_i f_i(y), a polynomial."""
 
     field = system.field(parameters.mapped(_rational), _context.gens())
-    found = _context.constant(0)
+    total = _context.constant(0)
     for index, rate in enumerate(field):
-        found = found + polynomial.derivative(index) * rate
-    return found
+        total = total + polynomial.derivative(index) * rate
+    return total
 
 
 def _rational(value: Any) -> fmpq:
@@ -351,9 +351,9 @@ def start_series(
     with series_length(_DERIVATIVES):
         series = [fmpq_series(row, prec=_DERIVATIVES) for row in y]
         zero = fmpq_series([0], prec=_DERIVATIVES)
-        whole = [composed(terms_of(each), series, zero) for each in polynomials]
-        found = [[coefficient(each, n) for n in range(_DERIVATIVES)] for each in whole]
-    return [[Fraction(int(c.p), int(c.q)) for c in each] for each in found]
+        whole = [composed(terms_of(polynomial), series, zero) for polynomial in polynomials]
+        coefficients = [[coefficient(series, n) for n in range(_DERIVATIVES)] for series in whole]
+    return [[Fraction(int(c.p), int(c.q)) for c in row] for row in coefficients]
 
 
 def first_term(
@@ -369,7 +369,7 @@ def first_term(
     def first() -> list[tuple[int, Fraction] | None]:
         parts = function.numerator, function.square, function.denominator
         series = start_series(parts, system, parameters, start)
-        return [next(((n, value) for n, value in enumerate(each) if value), None) for each in series]
+        return [next(((n, value) for n, value in enumerate(row) if value), None) for row in series]
 
     numerator, square, denominator = first()
     if numerator is not None and square is not None and denominator is not None:
@@ -463,9 +463,9 @@ class Events(Tabular):
     def _table(self) -> TitledTable:
         digits = min(_SHOWN, self.problem.precision.digits)
 
-        def line(place: int) -> list[str]:
-            numbers = [decimal_text(exact(v), digits) for v in (self.times[place], *self.states[place])]
-            return [numbers[0], _arrow(self.directions[place]), *numbers[1:]]
+        def line(index: int) -> list[str]:
+            numbers = [decimal_text(exact(v), digits) for v in (self.times[index], *self.states[index])]
+            return [numbers[0], _arrow(self.directions[index]), *numbers[1:]]
 
         title = (
             f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
@@ -524,9 +524,9 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
     def _table(self) -> TitledTable:
         digits = min(_SHOWN, self.digits)
 
-        def line(place: int) -> list[str]:
-            numbers = [decimal_text(exact(b.value), digits) for b in (self.times[place], *self.states[place])]
-            return [numbers[0], _arrow(self.directions[place]), *numbers[1:]]
+        def line(index: int) -> list[str]:
+            numbers = [decimal_text(exact(b.value), digits) for b in (self.times[index], *self.states[index])]
+            return [numbers[0], _arrow(self.directions[index]), *numbers[1:]]
 
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
         title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
@@ -552,7 +552,7 @@ class Section(Tabular):
     def points(self, x: str = "gamma1", y: str = "gamma2") -> list[NDArray[numpy.float64]]:
         """Two components of the states of each start, arrays of shape (n, 2)."""
         columns = [component(name) for name in (x, y)]
-        return [each.to_numpy()[:, columns] for each in self.events]
+        return [event.to_numpy()[:, columns] for event in self.events]
 
     @property
     def on_one_level(self) -> bool:
@@ -560,9 +560,9 @@ class Section(Tabular):
         return all(max(v) - min(v) <= 1e-9 * max(1.0, *map(abs, v)) for v in (self.energies, self.areas))
 
     def _table(self) -> TitledTable:
-        def line(place: int) -> list[str]:
-            found = self.events[place]
-            return [str(place), str(len(found)), f"{self.energies[place]:.9g}", f"{self.areas[place]:.9g}"]
+        def line(index: int) -> list[str]:
+            event = self.events[index]
+            return [str(index), str(len(event)), f"{self.energies[index]:.9g}", f"{self.areas[index]:.9g}"]
 
         first = self.events[0]
         title = f"Poincaré section {first.function} of {len(self)} motions, {sum(map(len, self.events))} points"
@@ -590,5 +590,5 @@ def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int
     )
 
 
-def _counted(found: Sized) -> str:
-    return f"{len(found)} event{'s' * (len(found) != 1)}"
+def _counted(events: Sized) -> str:
+    return f"{len(events)} event{'s' * (len(events) != 1)}"

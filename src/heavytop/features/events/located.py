@@ -86,18 +86,18 @@ def locate(
     directions: list[int] = []
     discontinuities: list[tuple[Any, str]] = []
     outcome = None
-    for found in events:
-        if found.discontinuity:
-            discontinuities.append((_native_time(found.piece.time(found.s), precision), found.discontinuity))
+    for event in events:
+        if event.discontinuity:
+            discontinuities.append((_native_time(event.piece.time(event.s), precision), event.discontinuity))
             continue
-        sign = 1 if found.rising == forwards else -1
+        sign = 1 if event.rising == forwards else -1
         if direction not in (0, sign):
             continue
-        state = native_state(_given(found.piece.state(found.s), axes), precision)
+        state = native_state(_given(event.piece.state(event.s), axes), precision)
         if state is None:
             outcome = Outcome.NON_FINITE
             break
-        times.append(_native_time(found.piece.time(found.s), precision))
+        times.append(_native_time(event.piece.time(event.s), precision))
         states.append(state)
         directions.append(sign)
         if limit is not None and len(times) >= limit:

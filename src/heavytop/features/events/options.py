@@ -44,7 +44,7 @@ class EventOptions(NamedTuple):
         from heavytop.features.events.api import events
 
         functions, direction = self.events or (), self.event_direction
-        return MotionEvents([events(top, start, until, each, direction, **settings) for each in functions])
+        return MotionEvents([events(top, start, until, function, direction, **settings) for function in functions])
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class MotionEvents:
 
     def to_json(self) -> dict[str, Any]:
         """Entries of the document of the motion."""
-        return {"events": [each.to_json() if hasattr(each, "to_json") else each for each in self.events]}
+        return {"events": [event.to_json() if hasattr(event, "to_json") else event for event in self.events]}
 
     def text(self) -> RenderableType:
         """A table for each event."""

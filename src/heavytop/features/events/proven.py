@@ -109,9 +109,9 @@ class _Piece:
             with working_precision(_SHORT_BITS, _SHORT_ORDER + 1):
                 return _range(self.short[id(what)], middle, half)
         if half <= _NARROW:
-            found = what(ball(middle) + arb(0, ball(half).upper()))
-            if half == 0 or _sign(found):
-                return found
+            enclosure = what(ball(middle) + arb(0, ball(half).upper()))
+            if half == 0 or _sign(enclosure):
+                return enclosure
         return _range(what, middle, half)
 
     def part(self, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
@@ -137,8 +137,8 @@ class _Near(NamedTuple):
     def over(self, what: Any, low: Fraction, high: Fraction) -> Any:
         """As :meth:`_Piece.over`."""
         middle, half = ((low + high) / 2 - self.low) / self.width, (high - low) / 2 / self.width
-        found = what(ball(middle) + arb(0, ball(half).upper()))
-        return found if half == 0 or _sign(found) else _range(what, middle, half)
+        enclosure = what(ball(middle) + arb(0, ball(half).upper()))
+        return enclosure if half == 0 or _sign(enclosure) else _range(what, middle, half)
 
 
 def _without_tail(what: Any) -> Any:
@@ -266,10 +266,10 @@ class _Search:
             pieces = chain([first], pieces)
         events: list[ProvenEvent] = []
         for low, high in self._zeros(pieces, after):
-            found = self._event(low, high, after)
+            event = self._event(low, high, after)
             after = -after
-            if self.direction in (0, 1 if found.rising else -1):
-                events.append(found)
+            if self.direction in (0, 1 if event.rising else -1):
+                events.append(event)
                 if self.limit is not None and len(events) >= self.limit:
                     break
         return events
@@ -318,23 +318,23 @@ class _Search:
                             yield anchor, cell.high
                         anchor, sign, slope = cell.high, cell.at_high, 0
                 last = cell.high
-            self.kept = [each for each in self.kept if each.began + each.length >= anchor]
+            self.kept = [piece for piece in self.kept if piece.began + piece.length >= anchor]
         if slope:
             raise _Undecided(self._time(last), "whether the function changes sign before the end of the run")
 
     def _cells(self, piece: _Piece, fresh: bool) -> list[_Cell]:
-        found = _cells(piece, fresh)
-        if isinstance(found, Fraction):
-            raise _Undecided(self._time(found), "whether the function changes sign or only touches zero")
-        return found
+        cells = _cells(piece, fresh)
+        if isinstance(cells, Fraction):
+            raise _Undecided(self._time(cells), "whether the function changes sign or only touches zero")
+        return cells
 
     def _event(self, low: Fraction, high: Fraction, before: int) -> ProvenEvent:
         """The zero between two scaled times, refined; ``before``: the sign of the numerator before it."""
-        pieces = [each for each in self.kept if each.began <= high and each.began + each.length >= low]
-        found = _refined(pieces, low, high, -before, self.digits, self.motion, self.until > 0, self.axes)
-        if found is None:
+        pieces = [piece for piece in self.kept if piece.began <= high and piece.began + piece.length >= low]
+        refined = _refined(pieces, low, high, -before, self.digits, self.motion, self.until > 0, self.axes)
+        if refined is None:
             raise _Undecided(self._time(high), "to so many digits where the function changes sign")
-        time, state, below = found
+        time, state, below = refined
         if below == 0:
             raise _Undecided(self._time(high), "whether the denominator of the function vanishes with its numerator")
         rising = (-before if self.until > 0 else before) * below > 0
@@ -392,26 +392,26 @@ def _cells(piece: _Piece, fresh: bool) -> list[_Cell] | Fraction:
     fresh: the function vanishes at the beginning, and the first part is one in which its first derivative that does not
     vanish there vanishes nowhere.
     """
-    found: list[_Cell] = []
+    cells: list[_Cell] = []
     deepest = piece.bits // 2 + 16
     with working_precision(piece.bits):
         parts: list[tuple[Fraction, Fraction, int, _Piece | _Near]] = [(Fraction(0), piece.last, 0, piece)]
         for _ in range(_MOST_PARTS):
             if not parts:
-                return found
+                return cells
             low, high, depth, near = parts.pop()
             if near is piece and high - low <= 2 * _WIDE:
                 near = _Near.of(piece, low, high)
             ends = piece.began + low * piece.length, piece.began + high * piece.length
             if fresh and low == 0:
                 if _sign(near.over(near.first, low, high)):
-                    found.append(_Cell(*ends, 0, 0, 0))
+                    cells.append(_Cell(*ends, 0, 0, 0))
                     continue
             elif clear := _sign(near.over(near.value, low, high)):
-                found.append(_Cell(*ends, clear, 0, clear))
+                cells.append(_Cell(*ends, clear, 0, clear))
                 continue
             elif slope := _sign(near.over(near.rate, low, high)):
-                found.append(_Cell(*ends, 0, slope, _sign(near.over(near.value, high, high))))
+                cells.append(_Cell(*ends, 0, slope, _sign(near.over(near.value, high, high))))
                 continue
             if depth >= deepest:
                 return ends[0]
@@ -422,13 +422,13 @@ def _cells(piece: _Piece, fresh: bool) -> list[_Cell] | Fraction:
 
 def _hull(pieces: Sequence[_Piece], choose: Callable[[_Piece], Any], low: Fraction, high: Fraction) -> Any:
     """The values of a polynomial of the pieces between two scaled times, as one ball."""
-    found = None
+    hull = None
     for piece in pieces:
         first, last = piece.part(low, high)
         if first <= last:
             value = piece.over(choose(piece), first, last)
-            found = value if found is None else found.union(value)
-    return found
+            hull = value if hull is None else hull.union(value)
+    return hull
 
 
 def _rotated(axes: Any, vector: Sequence[arb]) -> list[arb]:

@@ -56,8 +56,8 @@ def sign_changes(polynomial: fmpz_poly, end: fmpq, resolution: int) -> Iterator[
         yield from _isolated(_scaled(polynomial, end), 0, 0, end, min(resolution, _DEEPEST))
 
 
-def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
-    """The changes in the part ``place`` of the 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
+def _isolated(part: fmpz_poly, position: int, depth: int, span: fmpq, resolution: int) -> Iterator[SignChange]:
+    """The changes in part ``position`` of 2^``depth`` of (0, span); ``part`` is the polynomial there on (0, 1)."""
     part = _without_root_at_zero(part)
     variations = _variations(part)
     if variations == 0:
@@ -65,15 +65,15 @@ def _isolated(part: fmpz_poly, place: int, depth: int, span: fmpq, resolution: i
     if variations == 1 or depth >= resolution:
         before, after = sign_after(part), sign_before(part)
         if before != after:
-            yield SignChange(span * fmpq(place, 1 << depth), span * fmpq(place + 1, 1 << depth), after > 0)
+            yield SignChange(span * fmpq(position, 1 << depth), span * fmpq(position + 1, 1 << depth), after > 0)
         return
     left = _halved(part)
     right = left(_ONE_MORE)
-    yield from _isolated(left, 2 * place, depth + 1, span, resolution)
+    yield from _isolated(left, 2 * position, depth + 1, span, resolution)
     if right[0] == 0 and sign_before(left) != (after := sign_after(right)):
-        middle = span * fmpq(2 * place + 1, 2 << depth)
+        middle = span * fmpq(2 * position + 1, 2 << depth)
         yield SignChange(middle, middle, after > 0)
-    yield from _isolated(right, 2 * place + 1, depth + 1, span, resolution)
+    yield from _isolated(right, 2 * position + 1, depth + 1, span, resolution)
 
 
 def _bounded_away(polynomial: fmpz_poly) -> bool:
@@ -86,16 +86,16 @@ def _scaled(polynomial: fmpz_poly, end: fmpq) -> fmpz_poly:
     """A positive multiple of g(end x): that on (0, 1) is g on (0, end)."""
     if end == 1:
         return polynomial
-    p, q, found = int(end.p), int(end.q), [int(c) for c in polynomial.coeffs()]
+    p, q, coefficients = int(end.p), int(end.q), [int(c) for c in polynomial.coeffs()]
     power = 1
-    for n in range(len(found)):
-        found[n] *= power
+    for n in range(len(coefficients)):
+        coefficients[n] *= power
         power *= p
     power = 1
-    for n in range(len(found) - 1, -1, -1):
-        found[n] *= power
+    for n in range(len(coefficients) - 1, -1, -1):
+        coefficients[n] *= power
         power *= q
-    return fmpz_poly(found)
+    return fmpz_poly(coefficients)
 
 
 def _without_root_at_zero(polynomial: fmpz_poly) -> fmpz_poly:
@@ -140,8 +140,8 @@ def refined(polynomial: fmpz_poly, change: SignChange, bits: int) -> fmpq:
             low, high, at_low = (middle, high, value) if (value < 0) == (before < 0) else (low, middle, at_low)
             parts_bits = 2
             continue
-        place = (at_low / (at_low - at_high) * (1 << parts_bits) + fmpq(1, 2)).floor()
-        x = low + unit * place
+        cell = (at_low / (at_low - at_high) * (1 << parts_bits) + fmpq(1, 2)).floor()
+        x = low + unit * cell
         value = polynomial(x)
         if value == 0:
             return x

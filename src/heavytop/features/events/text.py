@@ -15,21 +15,26 @@ from heavytop.precision import decimal_text
 from heavytop.top.equations import NAMES
 
 
-def events_text(found: Sequence[Events | ReferenceEvents]) -> RenderableType:
+def events_text(sections: Sequence[Events | ReferenceEvents]) -> RenderableType:
     """Each function with its events: the time, the state, and whether the function rises."""
     parts: list[RenderableType] = []
-    for each in found:
-        parts += [Text(), Text(f"Events {printable(each.function)}: {len(each)}, {each.guarantee}", style="bold")]
-        if isinstance(each, Events) and each.outcome is not Outcome.SUCCESS:
-            parts.append(Text(f"Looked up to t = {decimal_text(each.time_reached, 6)} only: {each.outcome.message}."))
-        if isinstance(each, Events):
-            if discontinuities := each.discontinuity_text():
+    for section in sections:
+        parts += [
+            Text(),
+            Text(f"Events {printable(section.function)}: {len(section)}, {section.guarantee}", style="bold"),
+        ]
+        if isinstance(section, Events) and section.outcome is not Outcome.SUCCESS:
+            parts.append(
+                Text(f"Looked up to t = {decimal_text(section.time_reached, 6)} only: {section.outcome.message}.")
+            )
+        if isinstance(section, Events):
+            if discontinuities := section.discontinuity_text():
                 parts.append(Text(f"{discontinuities[:1].upper()}{discontinuities[1:]}."))
-            times, states = each.time_texts(), each.texts()
+            times, states = section.time_texts(), section.texts()
         else:
-            times = [f"{ball.value} ± {ball.radius}" for ball in each.times]
-            states = [[f"{ball.value} ± {ball.radius}" for ball in state] for state in each.states]
-        for time, direction, state in zip(times, each.directions, states, strict=True):
+            times = [f"{ball.value} ± {ball.radius}" for ball in section.times]
+            states = [[f"{ball.value} ± {ball.radius}" for ball in state] for state in section.states]
+        for time, direction, state in zip(times, section.directions, states, strict=True):
             table = Table(box=None, show_header=False)
             table.add_row("t", Text(f"{time}, {'rising' if direction > 0 else 'falling'}", overflow="fold"))
             for name, value in zip(NAMES, state, strict=True):

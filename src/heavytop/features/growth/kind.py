@@ -150,7 +150,7 @@ class Growth(Kind):
         turned = run.attitude and task.integrator.carries_attitude
         # with the ξ that a start without attitude has
         posed = [Problem.of(*m, precision, case.system, perpendicular(m[1].gamma)) for m in members] if turned else true
-        given = [_biased(problem, run.bias) for problem in posed]
+        biased = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]
         before = saved.load()
         done = _Done({}) if before is None else msgspec.convert(before, _Done, strict=False)
@@ -166,7 +166,7 @@ class Growth(Kind):
             AttitudeScorer(problem, motion, *member, times, times) if turned else Scorer(problem, motion, times)
             for problem, motion, member in zip(posed, compared.motions, members, strict=True)
         ]
-        complete(done.motions, given, times, scorers, save, task.integrator, run.options)
+        complete(done.motions, biased, times, scorers, save, task.integrator, run.options)
         motions = [done.motions[index] for index in range(len(members))]
         seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
         rounding = max(input_rounding(*member, p) for member, p in zip(members, true, strict=True))
@@ -174,8 +174,8 @@ class Growth(Kind):
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The laws, whether the planted faults are distinguished from them; the laws in short; a line for each law."""
-        if (found := laws_headline(rows)) is not None:
-            yield found
+        if (headline := laws_headline(rows)) is not None:
+            yield headline
         yield from laws_in_short(rows)
         chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
         notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]
@@ -228,8 +228,8 @@ def _row(
     failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
     reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
     distance = math.sqrt(sum(float(part) ** 2 for part in task.given.top.centre))
-    found = growing(starts, task.times, motions, scorers, compared, time_text, distance)
-    metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
+    measured = growing(starts, task.times, motions, scorers, compared, time_text, distance)
+    metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | measured.metrics
     of = "roundings of one motion" if one_motion(task.given, task.options.seed) else "random starts"
     who = f"computed: {first.integrator} in {precision.name}"
     return Row(
@@ -247,10 +247,10 @@ def _row(
         order=first.order,
         flags=first.flags | {"bias": task.options.bias or "none"} | (NOT_CARRIED if alone else {}),
         input_rounding=decimal_text(rounding, 3),
-        series=found.series,
+        series=measured.series,
         samples=len(task.times),
         starts=len(motions),
-        laws=found.laws,
+        laws=measured.laws,
         seconds=seconds,
         request=task.request,
     )

@@ -53,12 +53,12 @@ def break_away_law(rows: Sequence[Row]) -> list[Row]:
     Least squares over the formats; expected slope ln 2/rate, for the errors of p-bit arithmetic leave the saddle
     like 2^-p e^(rate t).
     """
-    found: dict[tuple[str, Subject], list[Row]] = {}
+    groups: dict[tuple[str, Subject], list[Row]] = {}
     for row in rows:
         if row.outcome == Outcome.SUCCESS.value and row.metrics[ESCAPE.text].log10 is not None:
-            found.setdefault((row.case, row.key.subject), []).append(row)
+            groups.setdefault((row.case, row.key.subject), []).append(row)
     laws = []
-    for members in found.values():
+    for members in groups.values():
         if len(members) < 2:
             continue
         bits = [float(row.bits) for row in members]
@@ -108,17 +108,17 @@ _Place = tuple[str, Direction, str]
 
 def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Escape time against the bits of the format, with the law of the saddle."""
-    found: dict[_Place, dict[int, Fraction]] = {}
+    escapes: dict[_Place, dict[int, Fraction]] = {}
     slopes: dict[_Place, tuple[str, str]] = {}
     for source, report in sources:
         for row in report.rows:
-            place = _case(row), row.key.direction, source
+            motion = _case(row), row.key.direction, source
             if row.outcome == "success" and (metric := row.metrics.get(ESCAPE.text)):
                 if metric.log10 is not None and metric.log10 < _LARGEST:
-                    found.setdefault(place, {})[row.bits] = exact(metric.number)
+                    escapes.setdefault(motion, {})[row.bits] = exact(metric.number)
             elif row.key.kind == NAME and row.metrics:
-                slopes[place] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
-    if not found:
+                slopes[motion] = row.metrics[SLOPE.text].value, row.metrics[EXPECTED.text].value
+    if not escapes:
         return None
     section = Section(
         "break-away",
@@ -132,19 +132,19 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         place=40,
     )
     axes = new_axes("format (bits)", "escape |t| (time units of the data)", 3.0)
-    merged = _both_directions(found)
+    merged = _both_directions(escapes)
     left_out(section, len(merged) - len(COLOURS) * max(1, len(sources)), "case")
     alternative, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]
-    for name, place, source in merged:
+    for name, motion, source in merged:
         if name not in bases:
             continue
         old, number = source == "baseline", bases.index(name)
         label = f"{clip(name, 40)}, {source}" if source else clip(name, 40)
         key = section.key(Key(label, number, MARKERS[number], "", old, False))
-        pairs = sorted(found[place].items())
+        pairs = sorted(escapes[motion].items())
         bits, times = [float(b) for b, _ in pairs], [float(t) for _, t in pairs]
         draw(axes, key, bits, times, 5.5)
-        measured, expected = slopes.get(place, ("", ""))
+        measured, expected = slopes.get(motion, ("", ""))
         if logarithm(expected) is not None and not old:
             slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
             line = [middle[1] + slope * (b - middle[0]) for b in bits]
@@ -164,11 +164,11 @@ def _case(row: Row) -> str:
     return row.key.case if row.key.subject.name == HEYOKA else f"{row.key.case} ({row.key.subject.name})"
 
 
-def _both_directions(found: dict[_Place, dict[int, Fraction]]) -> list[tuple[str, _Place, str]]:
+def _both_directions(escapes: dict[_Place, dict[int, Fraction]]) -> list[tuple[str, _Place, str]]:
     """(name, place, source): a case that escapes at the same times forward and backward is named once."""
     result: list[tuple[str, _Place, str]] = []
-    for (case, direction, source), times in found.items():
-        other = found.get((case, "backward" if direction == "forward" else "forward", source))
+    for (case, direction, source), times in escapes.items():
+        other = escapes.get((case, "backward" if direction == "forward" else "forward", source))
         if direction and other == times:
             if direction == "forward":
                 result.append((case, (case, direction, source), source))
@@ -196,19 +196,19 @@ class BreakAwayLaw(Kind):
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """The three numbers say the same."""
-        found = [metric.value for metric in _numbers(row)]
-        if len(found) < 3:
+        values = [metric.value for metric in _numbers(row)]
+        if len(values) < 3:
             return
         try:
-            slope, expected, off = map(exact, found)
+            slope, expected, off = map(exact, values)
         except InputError:
             return
         if expected == 0 or abs(abs(slope / expected - 1) - off) > CLOSE / 100:
-            yield f"{OFF_BY.text}: {found[2]}, where the slope is {found[0]} and {found[1]} is expected"
+            yield f"{OFF_BY.text}: {values[2]}, where the slope is {values[0]} and {values[1]} is expected"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """The time that a bit of the format buys, and how far that is from the law; a line a case."""
-        slopes, off = ([float(row.metrics[each.text]) for row in rows if row.metrics] for each in (SLOPE, OFF_BY))
+        slopes, off = ([float(row.metrics[metric.text]) for row in rows if row.metrics] for metric in (SLOPE, OFF_BY))
         if slopes:
             low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
             buys = f"A bit of the format buys {low if low == high else f'{low} to {high}'} time units before the escape"
@@ -216,14 +216,14 @@ class BreakAwayLaw(Kind):
         yield Table(
             "Escape time gained per bit of the format",
             ("case", "measured", "ln 2 / rate", "off by"),
-            both((row, _cells(*found)) for row in rows if (found := _numbers(row))),
+            both((row, _cells(*values)) for row in rows if (values := _numbers(row))),
         )
         yield Chart(escape_times)
 
 
 def _numbers(row: Row) -> list[Metric]:
     """The slope, the expected one and by how much it is off."""
-    return [row.metrics[each.text] for each in (SLOPE, EXPECTED, OFF_BY) if each.text in row.metrics]
+    return [row.metrics[metric.text] for metric in (SLOPE, EXPECTED, OFF_BY) if metric.text in row.metrics]
 
 
 def _cells(slope: Metric, expected: Metric, off_by: Metric) -> list[Cell]:

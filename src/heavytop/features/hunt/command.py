@@ -33,9 +33,9 @@ def hunt(
     from heavytop.features.hunt.api import hunt as search
 
     say_former([integrator])
-    found = search(integrator, precision, horizon, budget, family, against, limit, seed)  # type: ignore[arg-type]
+    hunted = search(integrator, precision, horizon, budget, family, against, limit, seed)  # type: ignore[arg-type]
     if json:
-        print_json(found.document())
+        print_json(hunted.document())
     else:
-        print(found)
-    return ExitCode.FINDING if found.found else ExitCode.GOOD
+        print(hunted)
+    return ExitCode.FINDING if hunted.found else ExitCode.GOOD

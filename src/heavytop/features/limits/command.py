@@ -49,12 +49,12 @@ def power(
         top, start = motion_of(data | {"quaternion": numbers(quaternion)})
         system = None
     with counted("power", 1, "tests", _SECONDS) as advance:
-        found = power_of(
+        test = power_of(
             top, start, until, tolerance, step, planted, integrator=integrator, control=control, system=system
         )
         advance()
     if json:
-        print_json(found.to_json())
+        print_json(test.to_json())
     else:
-        print(found)
-    return ExitCode.GOOD if found.detects_all else ExitCode.FINDING
+        print(test)
+    return ExitCode.GOOD if test.detects_all else ExitCode.FINDING

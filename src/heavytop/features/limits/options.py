@@ -40,13 +40,13 @@ class LimitOptions(NamedTuple):
         from heavytop.features.limits.digits_end import digits_end
 
         system = settings.get("system")
-        found: dict[str, Any] = {}
+        documents: dict[str, Any] = {}
         if self.digits_end:
             form = settings.get("precision", "double")
-            found["digits_end"] = digits_end(top, start, until, form, system=system)
+            documents["digits_end"] = digits_end(top, start, until, form, system=system)
         if self.between is not None:
-            found["between"] = between_samples(top, start, until, self.between, self.within, system=system)
-        return MotionLimits(found)
+            documents["between"] = between_samples(top, start, until, self.between, self.within, system=system)
+        return MotionLimits(documents)
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,14 +65,14 @@ def _terms(system: System) -> _Terms:
     p = Parameters(parts[0], parts[1], parts[2] if len(_rotors(system)) == 3 else sympy.Symbol("λ"))
     y = sympy.symbols(" ".join(NAMES))
     terms = [
-        (place, term)
-        for place, derivative in enumerate(system.field(p, y))
+        (index, term)
+        for index, derivative in enumerate(system.field(p, y))
         for term in sympy.Add.make_args(sympy.expand(derivative))
     ]
     values = sympy.lambdify([[*p.numbers], [*y]], [term for _, term in terms], "numpy")
     texts = [str(term).replace("*", " ").removeprefix("-") for _, term in terms]
     monomials = [str(sympy.Mul(*(f for f in sympy.Mul.make_args(t) if f.free_symbols & {*y}))) for _, t in terms]
-    return _Terms(values, tuple(place for place, _ in terms), tuple(monomials), tuple(texts))
+    return _Terms(values, tuple(index for index, _ in terms), tuple(monomials), tuple(texts))
 
 
 def _rotors(system: System) -> tuple[int, ...]:
@@ -92,11 +92,11 @@ def _factors(system: System) -> Iterator[_Factor]:
     terms = _terms(system)
     every = range(len(terms.texts))
     letters = [*(f"I{i}" for i in (1, 2, 3)), *(f"r{i}" for i in (1, 2, 3))]
-    yield from (_Factor(letter, numbers=(place,)) for place, letter in enumerate(letters))
+    yield from (_Factor(letter, numbers=(index,)) for index, letter in enumerate(letters))
     yield _Factor("the weight P", numbers=(3, 4, 5))
     yield from (_Factor(f"number {i + 1} of the rotor", numbers=(6 + i,)) for i in _rotors(system))
-    for place, name in enumerate(NAMES):
-        own = tuple(i for i in every if terms.components[i] == place)
+    for index, name in enumerate(NAMES):
+        own = tuple(i for i in every if terms.components[i] == index)
         yield _Factor(f"{name}'", own)
         yield from (_Factor(f"the term {terms.texts[i]} of {name}'", (i,)) for i in own)
         groups = {m: tuple(i for i in own if terms.monomials[i] == m) for m in (terms.monomials[i] for i in own)}

@@ -45,28 +45,28 @@ def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[s
 
     Raises InputError for another shape, and for what is given twice.
     """
-    found = {name: _observed_rows(values, name) for name, values in arrays.items() if values is not None}
+    rows_by_name = {name: _observed_rows(values, name) for name, values in arrays.items() if values is not None}
     if states is not None:
         for name, part in (("omega", slice(0, 3)), ("gamma", slice(3, 6))):
-            if name in found:
+            if name in rows_by_name:
                 raise InputError(f"states and {name} both give it.", "Give either of them.")
-            found[name] = [row[part] for row in states]
-    if not found:
+            rows_by_name[name] = [row[part] for row in states]
+    if not rows_by_name:
         raise InputError("There is nothing to score.", "Give states, quaternions, positions or another array.")
-    return {name: found[name] for name in WIDTHS if name in found}
+    return {name: rows_by_name[name] for name in WIDTHS if name in rows_by_name}
 
 
 def _observed_rows(values: Any, name: str) -> list[list[Any]]:
     remedy = f"Give an array of shape {_SHAPES.get(name, '(n, 3)')}."
-    found = []
+    rows = []
     for i, row in enumerate(ordered(values, name, remedy)):
         numbers = ordered(row, f"{name}[{i}]", remedy)
         if name == "matrix" and len(numbers) == 3:
             numbers = [value for part in numbers for value in ordered(part, f"{name}[{i}]", remedy)]
         if len(numbers) != WIDTHS[name]:
             raise InputError(f"{name}[{i}] has {len(numbers)} numbers, not {WIDTHS[name]}.", remedy)
-        found.append(numbers)
-    return found
+        rows.append(numbers)
+    return rows
 
 
 _PARTS = ("omega", "gamma", "along", "across")
@@ -261,8 +261,8 @@ def score(
         raise InputError("Euler angles need their sequence.", 'Give sequence, such as "ZXZ" or "ZYX".')
     require_system(about)
     flag = bool(arguments.flag(normalize, "normalize"))
-    given = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
-    return scored(given, needed)
+    trajectory = of_observed_arrays(body, raw_start(state), said, instants, arrays, form, names, flag)
+    return scored(trajectory, needed)
 
 
 def read_trajectory(
@@ -286,10 +286,10 @@ def read_trajectory(
     return read(arguments.path(path, "path"), about, bool(arguments.flag(normalize, "normalize"))), needed
 
 
-def scored(given: GivenTrajectory, needed: Fraction | None, progress: Callable[[], None] = lambda: None) -> Score:
+def scored(trajectory: GivenTrajectory, needed: Fraction | None, progress: Callable[[], None] = lambda: None) -> Score:
     """The score of a trajectory of any source.  progress: called twice for each of its states, as they are compared."""
-    found = assess(given, progress)
-    row = found.row
+    assessment = assess(trajectory, progress)
+    row = assessment.row
     distance = {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS}
     for name, label in ((ATTITUDE_ERROR, "attitude"), (POSITION_ERROR, "position")):
         for part, size in _summaries(row.metrics, name).items():
@@ -301,14 +301,14 @@ def scored(given: GivenTrajectory, needed: Fraction | None, progress: Callable[[
         digits_kept(row),
         row.against,
         row,
-        found.of_digits,
-        found.peer,
-        tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
+        assessment.of_digits,
+        assessment.peer,
+        tuple(diagnosis_text(diagnosis, row.system) for diagnosis in assessment.diagnoses),
         passed(row, needed),
-        found.used,
-        found,
+        assessment.used,
+        assessment,
         needed,
-        given.sha256,
+        trajectory.sha256,
     )
 
 
@@ -367,7 +367,7 @@ def _summaries(metrics: dict[str, Metric], name: str) -> dict[str, Summary]:
     """Largest, root mean square and last of each component of the quantity of that name."""
     quantities = [metric.quantity for metric in metrics.values() if metric.quantity]
     return {
-        quantity.component: Summary(*(metrics[quantity.over(each).text] for each in Summary._fields))
+        quantity.component: Summary(*(metrics[quantity.over(statistic).text] for statistic in Summary._fields))
         for quantity in quantities
         if (quantity.name, quantity.statistic) == (name, "rms")
     }

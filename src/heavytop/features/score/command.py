@@ -66,27 +66,27 @@ def score(
         require_new(out)
     require_apart((html,), trajectory)
     page = None if html is None else absolute(html)
-    given, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
-    for warning in given.warnings():
+    motion, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
+    for warning in motion.warnings():
         say(f"warning: {warning}")
-    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
-        found = scored(given, needed, advance)
+    with counted("score", 2 * len(motion.times), "states", _STATE_SECONDS) as advance:
+        score = scored(motion, needed, advance)
     if out is not None:
-        _write_report(found.report(), out)
+        _write_report(score.report(), out)
     if page is not None:
         with writing():
-            replace_all([(page, found.to_html().encode())])
+            replace_all([(page, score.to_html().encode())])
     if json:
-        print_json(found.to_json())
-        return found.exit_code
+        print_json(score.to_json())
+        return score.exit_code
     from heavytop.features.score.text import requirement, score_text
 
-    show_on_terminal(score_text(found.assessment))
+    show_on_terminal(score_text(score.assessment))
     if html is not None:
         print(f"\nPage: {html}")
     if needed is not None:
-        print(f"\n{requirement(found.row, needed)}")
-    return found.exit_code
+        print(f"\n{requirement(score.row, needed)}")
+    return score.exit_code
 
 
 def _several(
@@ -102,7 +102,7 @@ def _several(
         raise InputError("Standard input is one trajectory.", "Give files.")
     files = score_files(paths, case, require, normalize)
     if json:
-        print_json({"files": [each.document for each in files], "orders": [asdict(each) for each in orders(files)]})
+        print_json({"files": [file.document for file in files], "orders": [asdict(order) for order in orders(files)]})
     else:
         print(text(files))
     return exit_code(files)

@@ -16,5 +16,5 @@ def explanation(case: Case, run: Trajectory, error: float) -> Explained | None:
     error: the largest of Ω and γ.
     """
     states = [tuple(map(exact, state[:6])) for state in run.states]
-    found = diagnose(case.top, case.start, case.system, run.times, states, run.problem.precision, error)
-    return Explained(found[0].kind, diagnosis_text(found[0], case.system.name)) if found else None
+    diagnosis = diagnose(case.top, case.start, case.system, run.times, states, run.problem.precision, error)
+    return Explained(diagnosis[0].kind, diagnosis_text(diagnosis[0], case.system.name)) if diagnosis else None

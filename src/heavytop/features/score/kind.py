@@ -26,8 +26,8 @@ class ScoreKind(Kind):
         if beside is not None and len(rows) == 1:
             yield from one_motion(rows[0], beside)
         else:
-            if (found := digits_headline(rows)) is not None:
-                yield found
+            if (headline := digits_headline(rows)) is not None:
+                yield headline
             yield from (Chart(digits), Chart(growth))
         yield from digits_columns(rows)
         yield motions(

@@ -62,19 +62,19 @@ _WORDS = {
 }
 
 
-def exact_problem(given: GivenTrajectory) -> Problem:
+def exact_problem(trajectory: GivenTrajectory) -> Problem:
     """The problem in the format of the trajectory; of attitudes its data are exact: the body was rounded before."""
-    if given.observed is None:
-        return Problem.of(given.top, given.start, given.precision, given.system)
-    posed, attitude = given.observed.posed, set(given.observed.columns) - {"omega", "gamma"}
-    parameters, xi = given.system.parameters(posed.top, posed.start), posed.xi if attitude else None
-    return Problem(given.system, given.precision, parameters, posed.start, xi, (posed.top, posed.start))
+    if trajectory.observed is None:
+        return Problem.of(trajectory.top, trajectory.start, trajectory.precision, trajectory.system)
+    posed, attitude = trajectory.observed.posed, set(trajectory.observed.columns) - {"omega", "gamma"}
+    parameters, xi = trajectory.system.parameters(posed.top, posed.start), posed.xi if attitude else None
+    return Problem(trajectory.system, trajectory.precision, parameters, posed.start, xi, (posed.top, posed.start))
 
 
-def observed_of(given: GivenTrajectory) -> Observed:
+def observed_of(trajectory: GivenTrajectory) -> Observed:
     """The columns that the trajectory gives."""
-    assert given.observed is not None
-    return given.observed
+    assert trajectory.observed is not None
+    return trajectory.observed
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,48 +87,48 @@ class Scored:
     errors: list[float]
 
 
-def _count(found: Observed) -> int:
-    return min(map(len, found.columns.values()), default=0)
+def _count(observed: Observed) -> int:
+    return min(map(len, observed.columns.values()), default=0)
 
 
-def diagnoses(given: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
+def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
     """Explanations of the error: the digits written, lengths off 1, a convention, or another mistake."""
-    about: dict[str, Any] = {"step": _step(given)}
-    count = len(_finite(given))
-    times, states = given.times[:count], _finite(given)
+    about: dict[str, Any] = {"step": _step(trajectory)}
+    count = len(_finite(trajectory))
+    times, states = trajectory.times[:count], _finite(trajectory)
     said: list[Diagnosis] = []
-    if (found := given.observed) is not None:
-        seen = found.seen(times)
+    if (observed := trajectory.observed) is not None:
+        seen = observed.seen(times)
         said = [] if seen is None else _disagreements(seen, times)
-        rounded = _rounded(found, rounding(states, given.precision), error)
+        rounded = _rounded(observed, rounding(states, trajectory.precision), error)
         if error is not None and (error <= _WORTH_ASKING or rounded):
             return said + rounded
-        lengths = _lengths(found, times, given.precision)
+        lengths = _lengths(observed, times, trajectory.precision)
         if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
             return [*said, lengths]
         if seen is None:
             return said
-        states, about["seen"], about["frame"] = _in_axes_of_file(seen), seen, _frame(found)
-    top, start = given.top, given.start
-    return said + diagnose(top, start, given.system, times, states, given.precision, error, errors, **about)
+        states, about["seen"], about["frame"] = _in_axes_of_file(seen), seen, _frame(observed)
+    top, start = trajectory.top, trajectory.start
+    return said + diagnose(top, start, trajectory.system, times, states, trajectory.precision, error, errors, **about)
 
 
-def _rounded(found: Observed, written: Rounding | None, error: float | None) -> list[Diagnosis]:
+def _rounded(observed: Observed, written: Rounding | None, error: float | None) -> list[Diagnosis]:
     """That the digits written explain the error of what follows from them."""
     if written is None or error is None:
         return []
-    arm = math.sqrt(float(dot(found.posed.centre, found.posed.centre)))
+    arm = math.sqrt(float(dot(observed.posed.centre, observed.posed.centre)))
     sizes = {"quaternion": 4.0, "euler": 3.0, "position": max(2.0, 2.0 / arm) if arm else 2.0}
-    amplified = replace(written, error=written.error * max(sizes.get(name, 1.0) for name in found.names))
+    amplified = replace(written, error=written.error * max(sizes.get(name, 1.0) for name in observed.names))
     to = {"to": written.kind, "digits": str(written.digits)}
     return [Diagnosis("rounded", to)] if explains(amplified, error) else []
 
 
-def _frame(found: Observed) -> FileAxes:
+def _frame(observed: Observed) -> FileAxes:
     """The axes of the file, and which of Ω and γ are columns of it."""
-    axes = numpy.array([[float(value) for value in row] for row in found.posed.axes])
-    columns = [*(range(3) if "omega" in found.names else ()), *(range(3, 6) if "gamma" in found.names else ())]
-    return FileAxes(axes, found.posed.xi if set(FORMS) & set(found.names) else None, tuple(columns))
+    axes = numpy.array([[float(value) for value in row] for row in observed.posed.axes])
+    columns = [*(range(3) if "omega" in observed.names else ()), *(range(3, 6) if "gamma" in observed.names else ())]
+    return FileAxes(axes, observed.posed.xi if set(FORMS) & set(observed.names) else None, tuple(columns))
 
 
 def _in_axes_of_file(seen: Seen) -> list[tuple[Any, ...]]:
@@ -146,9 +146,9 @@ def _in_axes_of_file(seen: Seen) -> list[tuple[Any, ...]]:
     return [tuple(None if value != value else Fraction(value) for value in row) for row in rows]
 
 
-def _lengths(found: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
+def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision) -> Diagnosis | None:
     """Quaternions whose length is not 1, by more than roundings make of it."""
-    rows = found.columns.get("quaternion", [])
+    rows = observed.columns.get("quaternion", [])
     off = [abs(dot(row, row) + row[3] ** 2 - 1) / 2 for row in rows]
     if not off or max(off) <= 2**10 * precision.eps:
         return None
@@ -170,11 +170,11 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
     return said
 
 
-def used(given: GivenTrajectory) -> str:
+def used(trajectory: GivenTrajectory) -> str:
     """Which columns were scored, and how they were read."""
-    found = observed_of(given)
-    said, parts = found.said, []
-    for name in found.names:
+    observed = observed_of(trajectory)
+    said, parts = observed.said, []
+    for name in observed.names:
         text = _WORDS[name]
         if name == "quaternion":
             text += f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})"
@@ -185,7 +185,7 @@ def used(given: GivenTrajectory) -> str:
         elif name == "position":
             text += " of the centre of mass" if said.point is None else " of the point"
         parts.append(text)
-    up = "" if not set(found.names) - {"omega", "gamma"} else f"; {said.up} points up"
+    up = "" if not set(observed.names) - {"omega", "gamma"} else f"; {said.up} points up"
     return f"Scored: {', '.join(parts)}{up}."
 
 
@@ -256,128 +256,134 @@ def _is_number(metric: Metric) -> bool:
     return metric.log10 is not None or metric.value == "0"
 
 
-def _step(given: GivenTrajectory) -> Fraction | None:
+def _step(trajectory: GivenTrajectory) -> Fraction | None:
     """The step of the method, where the file says it in a number."""
     try:
-        step = exact(given.flags.get("step", "0"))
+        step = exact(trajectory.flags.get("step", "0"))
     except InputError:
         return None
     return step if step > 0 else None
 
 
-def _on_multiples(given: GivenTrajectory) -> GivenTrajectory | None:
+def _on_multiples(trajectory: GivenTrajectory) -> GivenTrajectory | None:
     """The trajectory at multiples of its step, where its times are all but these; None where they are, or are not."""
-    step = _step(given)
+    step = _step(trajectory)
     if step is None:
         return None
-    times = [round(time / step) * step for time in given.times]
-    off = [abs(one - other) for one, other in zip(times, given.times, strict=True)]
-    same = all(one <= _ROUNDED * given.precision.eps * abs(time) for one, time in zip(off, given.times, strict=True))
+    times = [round(time / step) * step for time in trajectory.times]
+    off = [abs(one - other) for one, other in zip(times, trajectory.times, strict=True)]
+    same = all(
+        one <= _ROUNDED * trajectory.precision.eps * abs(time) for one, time in zip(off, trajectory.times, strict=True)
+    )
     increasing = all(abs(one) < abs(other) for one, other in pairwise(times))
-    return None if same or not increasing or max(off) > _CLOCK * step else replace(given, times=times)
+    return None if same or not increasing or max(off) > _CLOCK * step else replace(trajectory, times=times)
 
 
-def score(given: GivenTrajectory) -> Row:
+def score(trajectory: GivenTrajectory) -> Row:
     """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
 
     The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
     the first that is not finite on are not scored; the outcome says so.
     """
-    return _measured(given).row
+    return _measured(trajectory).row
 
 
-def assess(given: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
+def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
     """The row of :func:`score`, heyoka beside it, and what explains the error.
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
-    found = _measured(given, progress)
-    count, told = len(_finite(given)), _of_clock(given, found.row)
-    explained = found if told is None else told[1]
-    said = diagnoses(given if told is None else told[2], _size(explained.row), explained.errors) if count else []
-    written = None if given.observed is not None else rounding(_finite(given), given.precision)
+    scored = _measured(trajectory, progress)
+    count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
+    explained = scored if told is None else told[1]
+    said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
+    written = None if trajectory.observed is not None else rounding(_finite(trajectory), trajectory.precision)
     single = written is not None and written.kind == "single"
-    peer = _peer(given, found, count, progress)
-    columns = "" if given.observed is None else used(given)
+    peer = _peer(trajectory, scored, count, progress)
+    columns = "" if trajectory.observed is None else used(trajectory)
     clock = [] if told is None else [told[0]]
-    return Assessment(found.row, peer, clock + said, given.format_guessed, single, columns)
+    return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns)
 
 
-def _of_clock(given: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
+def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
     """How many digits are right where the times are multiples of the step, if these are more."""
-    exactly = _on_multiples(given)
+    exactly = _on_multiples(trajectory)
     if exactly is None:
         return None
-    found = _measured(exactly)
-    kept, with_exact = digits_kept(row), digits_kept(found.row)
+    scored = _measured(exactly)
+    kept, with_exact = digits_kept(row), digits_kept(scored.row)
     if kept is None or with_exact is None or with_exact < kept + _NOTICED:
         return None
-    off = max(abs(one - other) for one, other in zip(given.times, exactly.times, strict=True))
-    numbers = {"step": given.flags["step"], "off": decimal_text(off, 3), "digits": f"{with_exact:.1f}"}
-    return Diagnosis("clock", numbers, _size(row), _size(found.row)), found, exactly
+    off = max(abs(one - other) for one, other in zip(trajectory.times, exactly.times, strict=True))
+    numbers = {"step": trajectory.flags["step"], "off": decimal_text(off, 3), "digits": f"{with_exact:.1f}"}
+    return Diagnosis("clock", numbers, _size(row), _size(scored.row)), scored, exactly
 
 
-def _measured(given: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
+def _measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
     """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes."""
-    found, rate = given.observed, turning_rate(given.top, given.start)
+    observed, rate = trajectory.observed, turning_rate(trajectory.top, trajectory.start)
     problem = (
-        Problem.of(given.top, given.start, given.precision, given.system) if found is None else exact_problem(given)
+        Problem.of(trajectory.top, trajectory.start, trajectory.precision, trajectory.system)
+        if observed is None
+        else exact_problem(trajectory)
     )
-    times = [round_to(time, given.precision.bits) for time in given.times]
+    times = [round_to(time, trajectory.precision.bits) for time in trajectory.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
     known = truth(problem, times, _REFERENCE_EFFORT)
     known = known if isinstance(known, str) else known.remembered()
-    samples: Iterable[Any] = _finite(given)
+    samples: Iterable[Any] = _finite(trajectory)
     scorer: Scorer | ObservedScorer = (
         Scorer(problem, known, keep)
-        if found is None
-        else ObservedScorer(problem, known, found.posed, found.said, found.names, keep)
+        if observed is None
+        else ObservedScorer(problem, known, observed.posed, observed.said, observed.names, keep)
     )
-    if found is not None:
-        samples = map(found.sample, range(_count(found)))
+    if observed is not None:
+        samples = map(observed.sample, range(_count(observed)))
     errors: list[float] = []
     for time, sample in zip(times, samples, strict=False):
         scorer(time, sample)
         if scorer.error is not None and scorer.error.truth.covers(time):
             errors.append(scorer.error.last(rate))
         progress()
-    return Scored(_row(given, problem, times, keep, scorer), problem, scorer, errors)
+    return Scored(_row(trajectory, problem, times, keep, scorer), problem, scorer, errors)
 
 
 def _row(
-    given: GivenTrajectory,
+    trajectory: GivenTrajectory,
     problem: Problem,
     times: list[Fraction],
     keep: list[Fraction],
     scorer: DriftAndError,
 ) -> Row:
     """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
-    precision, states = given.precision, _finite(given)
+    precision, states = trajectory.precision, _finite(trajectory)
     count = len(states)
     run = Trajectory(
         problem,
-        given.integrator,
+        trajectory.integrator,
         tuple(times[:count]),
         tuple(states),
-        given.outcome,
+        trajectory.outcome,
         times[count - 1] if count else Fraction(0),
-        given.steps,
+        trajectory.steps,
         0,
-        flags=given.flags,
+        flags=trajectory.flags,
     )
-    case = Case(given.name, "given", given.system, given.top, given.start)
-    subject = Subject("given", given.integrator)
-    key = RowKey("score", given.name, given.system.name, subject, precision.name, horizon=time_text(times[-1]))
-    task = Task(key, "", given.integrator, case, tuple(times), tuple(keep))
+    case = Case(trajectory.name, "given", trajectory.system, trajectory.top, trajectory.start)
+    subject = Subject("given", trajectory.integrator)
+    key = RowKey(
+        "score", trajectory.name, trajectory.system.name, subject, precision.name, horizon=time_text(times[-1])
+    )
+    task = Task(key, "", trajectory.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
-    said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
+    said = {"measured": f"given: {trajectory.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
     return msgspec.structs.replace(row, **said, data=data_of(case))
 
 
-def _finite(given: GivenTrajectory) -> list[tuple[Fraction, ...]]:
+def _finite(trajectory: GivenTrajectory) -> list[tuple[Fraction, ...]]:
     """The states before the first that is not finite."""
-    count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
-    return [state for state in given.states[:count] if state is not None]
+    count = next((i for i, state in enumerate(trajectory.states) if state is None), len(trajectory.states))
+    return [state for state in trajectory.states[:count] if state is not None]
 
 
 def _size(row: Row) -> float | None:
@@ -387,12 +393,12 @@ def _size(row: Row) -> float | None:
     return float(metric)
 
 
-def _peer(given: GivenTrajectory, measured: Scored, count: int, progress: Progress) -> Peer | None:
+def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: Progress) -> Peer | None:
     """heyoka's own run of the same problem over the same times, compared with the same known motion.
 
     None without one, and where heyoka does not get there.
     """
-    precision, problem, known = given.precision, measured.problem, measured.scorer.truth
+    precision, problem, known = trajectory.precision, measured.problem, measured.scorer.truth
     if isinstance(known, str) or not count or precision == DOUBLE_DOUBLE:
         return None
     running, bits = Running(), precision.bits + GUARD_BITS
@@ -402,7 +408,7 @@ def _peer(given: GivenTrajectory, measured: Scored, count: int, progress: Progre
     def following(time: Fraction, state: Sequence[object]) -> Sums:
         true = known.state(time, bits)[: len(state)]
         with working_precision(bits):
-            off = [to_ball(value) - each for value, each in zip(state, true, strict=True)]
+            off = [to_ball(value) - ball for value, ball in zip(state, true, strict=True)]
             return running.following(relative_error(off, true))
 
     def observe(time: Fraction, state: Sequence[object]) -> None:
@@ -413,12 +419,12 @@ def _peer(given: GivenTrajectory, measured: Scored, count: int, progress: Progre
     top, start = problem.given or (problem.top, problem.start)
     options: dict[str, Any] = {"system": problem.system, "xi": problem.xi, "step_limit": limit, "observer": observe}
     try:
-        run = propagate(top, start, given.times[:count], precision, **options)
+        run = propagate(top, start, trajectory.times[:count], precision, **options)
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
     with working_precision(bits):
-        found = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
-    metrics = by_name({RELATIVE: found[RELATIVE]})
+        figures = running.metrics(Quantity(RELATIVE.name, RELATIVE.component))
+    metrics = by_name({RELATIVE: figures[RELATIVE]})
     digits = digits_kept(msgspec.structs.replace(measured.row, metrics=metrics))
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None

@@ -59,16 +59,22 @@ def score_files(paths: Sequence[Path], case: str | None, require: str | None, no
 
 def _scored_file(path: str, case: str | None, require: str | None, normalize: bool) -> ScoredFile:
     try:
-        given, needed = read_trajectory(path, case, require=require, normalize=normalize)
-        found = scored(given, needed)
+        motion, needed = read_trajectory(path, case, require=require, normalize=normalize)
+        score = scored(motion, needed)
     except InputError as error:
         return ScoredFile(path, {"file": path, "error": str(error)}, ExitCode.BAD_INPUT, explained=error.cause)
-    body = (repr(given.top), repr(given.start), exact_text(given.times[-1]), given.system.name, given.precision.name)
-    document = {"file": path, **found.to_json()}
-    digits = "-" if found.digits_kept is None else digits_text(found.digits_kept)
-    said = "; ".join(each.kind for each in found.assessment.diagnoses)
+    body = (
+        repr(motion.top),
+        repr(motion.start),
+        exact_text(motion.times[-1]),
+        motion.system.name,
+        motion.precision.name,
+    )
+    document = {"file": path, **score.to_json()}
+    digits = "-" if score.digits_kept is None else digits_text(score.digits_kept)
+    said = "; ".join(diagnosis.kind for diagnosis in score.assessment.diagnoses)
     return ScoredFile(
-        path, document, found.exit_code, digits, said, (given.integrator, *body), _step(given.flags), _error(found)
+        path, document, score.exit_code, digits, said, (motion.integrator, *body), _step(motion.flags), _error(score)
     )
 
 
@@ -79,38 +85,38 @@ def _step(flags: dict[str, str]) -> Fraction:
         return Fraction(0)
 
 
-def _error(found: Score) -> float | None:
-    metric = found.row.metrics.get(RELATIVE.text)
+def _error(score: Score) -> float | None:
+    metric = score.row.metrics.get(RELATIVE.text)
     return None if metric is None or metric.log10 is None else float(metric)
 
 
 def orders(files: Sequence[ScoredFile]) -> Iterator[Order]:
     """The order of each method of which two files with different steps have an error that is more than rounding."""
-    with_step = sorted((each for each in files if each.step), key=lambda each: (each.method, -each.step))
-    for _, group in groupby(with_step, key=lambda each: each.method):
+    with_step = sorted((file for file in files if file.step), key=lambda file: (file.method, -file.step))
+    for _, group in groupby(with_step, key=lambda file: file.method):
         series = list(group)
-        resolved = [each for each in series if each.error is not None and each.error > _ABOVE_ROUNDING * DOUBLE.eps]
+        resolved = [file for file in series if file.error is not None and file.error > _ABOVE_ROUNDING * DOUBLE.eps]
         pairs = [(a, b) for a, b in pairwise(resolved) if a.step != b.step]
         if pairs:
             coarse, fine = pairs[-1]
             assert coarse.error is not None
             assert fine.error is not None
             order = log2(coarse.error / fine.error) / log2(coarse.step / fine.step)
-            yield Order(tuple(each.path for each in series), order)
+            yield Order(tuple(file.path for file in series), order)
 
 
 def text(files: Sequence[ScoredFile]) -> str:
     """A line for each file, and a sentence for each order."""
-    width = min(_WIDTH, max(len(each.path) for each in files))
+    width = min(_WIDTH, max(len(file.path) for file in files))
     lines = [f"{'file':{width}}  digits right  explained by"]
-    lines += [f"{clip(each.path, width):{width}}  {each.digits:>12}  {each.explained}".rstrip() for each in files]
-    for found in orders(files):
-        said = f"order {found.order:.1f} over {len(found.paths)} steps"
-        lines.append(f"{said}: {clip(found.paths[0], width)} to {clip(found.paths[-1], width)}")
+    lines += [f"{clip(file.path, width):{width}}  {file.digits:>12}  {file.explained}".rstrip() for file in files]
+    for order in orders(files):
+        said = f"order {order.order:.1f} over {len(order.paths)} steps"
+        lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")
     return "\n".join(lines)
 
 
 def exit_code(files: Sequence[ScoredFile]) -> int:
     """2 where a file could not be scored, 1 where fewer digits are right than required, 3 where one ended early."""
-    codes = {each.exit_code for each in files}
+    codes = {file.exit_code for file in files}
     return next((code for code in (ExitCode.BAD_INPUT, ExitCode.FINDING, ExitCode.INCOMPLETE) if code in codes), 0)

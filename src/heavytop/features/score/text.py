@@ -101,26 +101,26 @@ _CONVENTION_SENTENCES = {
 }
 
 
-def is_convention(found: Diagnosis) -> bool:
+def is_convention(fit: Diagnosis) -> bool:
     """Whether it is said here."""
-    if found.kind in ("quaternion_length", "columns_disagree"):
+    if fit.kind in ("quaternion_length", "columns_disagree"):
         return True
     # other files have mistakes of the same names, without a word on where they were found
-    return "of" in found.numbers and all(kind in _CONVENTION_SENTENCES for kind in found.kind.split("+"))
+    return "of" in fit.numbers and all(kind in _CONVENTION_SENTENCES for kind in fit.kind.split("+"))
 
 
-def sentence(found: Diagnosis) -> str:
+def sentence(fit: Diagnosis) -> str:
     """The mistake with its numbers, how far the error falls, and the digits that are right with it."""
-    numbers = found.numbers
-    if found.kind == "quaternion_length":
+    numbers = fit.numbers
+    if fit.kind == "quaternion_length":
         return (
             f"The quaternions have not length 1: it is off by {numbers['off']} at t = {numbers['t']}. Their directions "
             "are scored, and the length counts as an error; --normalize leaves it out."
         )
-    if found.kind == "columns_disagree":
+    if fit.kind == "columns_disagree":
         apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
         return f"Columns contradict each other: {apart}."
-    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in found.kind.split("+"))
+    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
     said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
     where = {
         "columns": ", in the columns but not in the start",
@@ -128,13 +128,13 @@ def sentence(found: Diagnosis) -> str:
         "rates": ". Found by comparing Ω with the rate at which the attitude turns, which needs no reference",
     }
     said += where.get(numbers.get("of", ""), "")
-    if found.error is None or found.left is None:
+    if fit.error is None or fit.left is None:
         return f"{said}."
     if numbers.get("of") == "rates":
-        return f"{said}: they differ by {found.left:.2e} of Ω with it, by {found.error:.2e} without."
-    digits = -math.log10(max(found.left, FLOOR))
-    more = " or more" if found.left < FLOOR else ""
-    fall = f"the largest error relative to the size of each quantity falls from {found.error:.2e} to {found.left:.2e}"
+        return f"{said}: they differ by {fit.left:.2e} of Ω with it, by {fit.error:.2e} without."
+    digits = -math.log10(max(fit.left, FLOOR))
+    more = " or more" if fit.left < FLOOR else ""
+    fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {fit.left:.2e}"
     text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
     return text + (f" As well fits: {numbers['or'].replace('_', ' ')}." if "or" in numbers else "")
 
@@ -211,26 +211,26 @@ _SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "
 _WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
 
 
-def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
+def diagnosis_text(fit: Diagnosis, system: str = "heavy_top") -> str:
     """One or two sentences: what fits, and how far the error falls with it."""
-    likely = "Likely: " if found.likely else ""
-    if is_convention(found):
-        return _scope(found) + likely + sentence(found)
-    said = _scope(found) + likely + _said(found, system)
-    if found.left is None or found.error is None:
+    likely = "Likely: " if fit.likely else ""
+    if is_convention(fit):
+        return _scope(fit) + likely + sentence(fit)
+    said = _scope(fit) + likely + _said(fit, system)
+    if fit.left is None or fit.error is None:
         return said
-    if found.kind in ("one_state", "some_states"):
-        without = "it" if found.kind == "one_state" else "them"
-        return f"{said}; without {without} the largest error relative to the size of Ω and γ is {_size(found.left)}."
-    fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
+    if fit.kind in ("one_state", "some_states"):
+        without = "it" if fit.kind == "one_state" else "them"
+        return f"{said}; without {without} the largest error relative to the size of Ω and γ is {_size(fit.left)}."
+    fall = f"the largest error relative to the size of Ω and γ falls from {_size(fit.error)} to {_size(fit.left)}"
     return f"{said}; {fall}."
 
 
-def _scope(found: Diagnosis) -> str:
+def _scope(fit: Diagnosis) -> str:
     """The states of which the sentence is true, where not all were looked at."""
-    if found.looked_at is None:
+    if fit.looked_at is None:
         return ""
-    looked, states, until = found.looked_at
+    looked, states, until = fit.looked_at
     return f"Looked at {looked} of the {states} states, to t = {until}. "
 
 
@@ -238,13 +238,13 @@ def _size(value: float) -> str:
     return short(f"{value:.2e}", 2) if value >= FLOOR else f"less than {FLOOR:.0e}"
 
 
-def _said(found: Diagnosis, system: str) -> str:
-    numbers = found.numbers
-    if found.kind in _MEANINGS:
-        return " in these states".join(_MEANINGS[found.kind])
-    if found.kind == "time_unit":
+def _said(fit: Diagnosis, system: str) -> str:
+    numbers = fit.numbers
+    if fit.kind in _MEANINGS:
+        return " in these states".join(_MEANINGS[fit.kind])
+    if fit.kind == "time_unit":
         return _time_unit(**numbers)
-    if (text := _SENTENCES.get(numbers.get("to", found.kind))) is None:
+    if (text := _SENTENCES.get(numbers.get("to", fit.kind))) is None:
         return _integrals_off(numbers)
     more = {
         "columns_said": _columns(numbers),
@@ -357,30 +357,39 @@ def requirement(row: Row, needed: Fraction) -> str:
     return f"{asked}: not known, for " + ("there is no reference." if kept is None else f"{shown} are resolved.")
 
 
-def guessed(found: Assessment) -> str | None:
+def guessed(assessment: Assessment) -> str | None:
     """That the format was not named, and what it was taken for."""
-    if not found.format_guessed:
+    if not assessment.format_guessed:
         return None
-    said = f"No format is named; {found.row.precision} is the narrowest that holds the digits written."
+    said = f"No format is named; {assessment.row.precision} is the narrowest that holds the digits written."
     single = " Every number in the states is one of single precision (24 bits): perhaps they were computed in it."
-    return said + (single if found.single else "")
+    return said + (single if assessment.single else "")
 
 
-def told(found: Assessment) -> list[str]:
+def told(assessment: Assessment) -> list[str]:
     """Explanations of the error, and what was guessed."""
-    said = [diagnosis_text(each, found.row.system) for each in found.diagnoses]
-    note = guessed(found)
-    return [*([found.used] if found.used else []), *said, *([note] if note else [])]
+    said = [diagnosis_text(fit, assessment.row.system) for fit in assessment.diagnoses]
+    note = guessed(assessment)
+    return [*([assessment.used] if assessment.used else []), *said, *([note] if note else [])]
 
 
-def to_json(found: Assessment) -> dict[str, Any]:
+def to_json(assessment: Assessment) -> dict[str, Any]:
     """The row, and beside it what `score --json` says more."""
-    peer = None if found.peer is None else asdict(found.peer)
-    said = [asdict(each) | {"sentence": diagnosis_text(each, found.row.system)} for each in found.diagnoses]
-    answers = {"digits_kept": found.digits_right, "digits_right": found.digits_right, "of_digits": found.of_digits}
-    more: dict[str, Any] = {"scored": found.used} if found.used else {}
-    more |= {"peer": peer, "mostly": found.direction, "format_guessed": found.format_guessed, "diagnosis": said}
-    row: dict[str, Any] = msgspec.to_builtins(found.row)
+    peer = None if assessment.peer is None else asdict(assessment.peer)
+    said = [asdict(fit) | {"sentence": diagnosis_text(fit, assessment.row.system)} for fit in assessment.diagnoses]
+    answers = {
+        "digits_kept": assessment.digits_right,
+        "digits_right": assessment.digits_right,
+        "of_digits": assessment.of_digits,
+    }
+    more: dict[str, Any] = {"scored": assessment.used} if assessment.used else {}
+    more |= {
+        "peer": peer,
+        "mostly": assessment.direction,
+        "format_guessed": assessment.format_guessed,
+        "diagnosis": said,
+    }
+    row: dict[str, Any] = msgspec.to_builtins(assessment.row)
     return row | answers | more
 
 
@@ -390,25 +399,27 @@ def sizes(row: Row) -> list[list[Cell]]:
     names = {Quantity(SOLUTION_ERROR, part): f"error{until}, {label}" for part, label in _PARTS.items()}
     names |= {Quantity(name): f"error{until}, {label}" for name, label in _OBSERVED.items()}
     names[Quantity(JOINT_VIOLATION)] = "distance of the joint"
-    found = [metric.quantity for metric in row.metrics.values() if metric.quantity]
-    names |= {Quantity(DRIFT, q.component): f"drift, {integral_text(q.component)}" for q in found if q.name == DRIFT}
+    quantities = [metric.quantity for metric in row.metrics.values() if metric.quantity]
+    names |= {
+        Quantity(DRIFT, q.component): f"drift, {integral_text(q.component)}" for q in quantities if q.name == DRIFT
+    }
     return [
-        [label, *(Value(row.metrics.get(each.over(part).text)) for part in ("max", "rms", "final"))]
-        for each, label in names.items()
-        if each.over("max").text in row.metrics
+        [label, *(Value(row.metrics.get(statistic.over(part).text)) for part in ("max", "rms", "final"))]
+        for statistic, label in names.items()
+        if statistic.over("max").text in row.metrics
     ]
 
 
-def score_text(found: Assessment) -> RenderableType:
+def score_text(assessment: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
-    row = found.row
+    row = assessment.row
     numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system.replace('_', ' ')} in {row.precision} ({row.bits} bits)"
-    parts: list[RenderableType] = [Text(line) for line in answer(row, found.peer)]
+    parts: list[RenderableType] = [Text(line) for line in answer(row, assessment.peer)]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Reference: {row.reference.brief}.")]
-    explained = told(found)
+    explained = told(assessment)
     if explained:
-        parts += [Text(), *(line for each in explained for line in _wrapped(each))]
+        parts += [Text(), *(line for text in explained for line in _wrapped(text))]
     return Group(*parts)
 
 
@@ -430,10 +441,10 @@ _CURVES = {
 }
 
 
-def score_report(found: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
+def score_report(assessment: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
     """A report with this row alone, which `compare` understands, and what its page says beside the row."""
-    beside = Beside(found.peer, tuple(told(found)))
-    return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [found.row], beside)
+    beside = Beside(assessment.peer, tuple(told(assessment)))
+    return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [assessment.row], beside)
 
 
 def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
@@ -478,11 +489,11 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
     )
     axes = new_axes(TIME, "digits right", 3.2)
     alternative = []
-    for place, (label, series) in enumerate(held.items()):
+    for index, (label, series) in enumerate(held.items()):
         x, sizes_ = points(series)
         if x:
             y = [right(size) for size in sizes_]
-            draw(axes, section.key(numbered(label, place)), x, y)
+            draw(axes, section.key(numbered(label, index)), x, y)
             alternative.append(f"{label}: {y[-1]:.1f} digits right at |t| = {scientific(x[-1])}.")
     axes.set_ylim(0, most * 1.04)
     axes.axhline(most, color=COLOURS[-1], lw=0.9, ls=DASHED)

@@ -65,7 +65,10 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
             section.pictures.append(_paths(row, row.worst, label, f"survey-worst-{number}"))
     left_out(section, len(rows) - _MOST_MAPS, "map")
     section.rows = [
-        _cells(_label(source, row), each) for source, row in rows if isinstance(row.worst, tuple) for each in row.worst
+        _cells(_label(source, row), motion)
+        for source, row in rows
+        if isinstance(row.worst, tuple)
+        for motion in row.worst
     ]
     return section
 
@@ -123,8 +126,8 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
     for step in range(_SHADES):
         lost = high + (low - high) * step / (_SHADES - 1)
         paint(0.3 + 0.4 * step / _SHADES, 1.005, 0.4 / _SHADES, 0.03, lost, transform=axes.transAxes, clip_on=False)
-    for place, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
-        axes.text(place, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
+    for position, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
+        axes.text(position, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
     said = f"From {digits - high:.1f} digits right, the darkest, to {digits - low:.1f}, the lightest."
     return finish(axes, f"Digits right over {x} and {y}: {label}", said, name, said)
 
@@ -133,11 +136,11 @@ def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
     """A sphere each, five in a row, with its index in the sweep below it."""
     axes = new_axes("", "", 0.8 + 0.75 * -(-len(worst) // _IN_A_ROW))
     angles = numpy.linspace(0, 2 * numpy.pi, 73)
-    for place, each in enumerate(worst):
-        x, y = 2.5 * (place % _IN_A_ROW), -2.9 * (place // _IN_A_ROW)
+    for index, motion in enumerate(worst):
+        x, y = 2.5 * (index % _IN_A_ROW), -2.9 * (index // _IN_A_ROW)
         axes.plot(x + numpy.cos(angles), y + numpy.sin(angles), color=COLOURS[5], lw=0.5)
-        axes.text(x, y - 1.45, str(each.index), ha="center", size=7)
-        gamma = _gamma(row, each)
+        axes.text(x, y - 1.45, str(motion.index), ha="center", size=7)
+        gamma = _gamma(row, motion)
         if gamma is None:
             continue
         across, up = (gamma @ axis for axis in _AXES)
@@ -154,11 +157,11 @@ def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
     return finish(axes, f"The worst {len(worst)} motions: {label}", said, name, said)
 
 
-def _gamma(row: Row, each: Worst) -> Any:
+def _gamma(row: Row, motion: Worst) -> Any:
     """The vertical at many times, (times, 3), by heyoka in double; None where that fails."""
     horizon = min(exact(row.horizon), exact(_LONGEST))
     times = [horizon * k / _POINTS for k in range(_POINTS + 1)]
-    data = each.data
+    data = motion.data
     try:
         top = HeavyTop(data.inertia, data.weight, data.centre, data.rotor or None)
         run = propagate(top, State(data.omega, data.gamma), times, DOUBLE, system=system(row.system))
@@ -168,17 +171,17 @@ def _gamma(row: Row, each: Worst) -> Any:
     return states[:, 3:] if len(states) and numpy.isfinite(states).all() else None
 
 
-def _cells(label: str, each: Worst) -> list[str]:
-    data = each.data
+def _cells(label: str, motion: Worst) -> list[str]:
+    data = motion.data
     vectors = (data.inertia, (data.weight,), data.centre, data.omega, data.gamma)
-    right = "" if each.digits_right is None else f"{each.digits_right:.2f}"
+    right = "" if motion.digits_right is None else f"{motion.digits_right:.2f}"
     texts = [clip(", ".join(vector), 120) for vector in vectors]
     return [
         label,
-        clip(each.case, 30),
-        clip(each.outcome, 20),
-        short(each.error),
+        clip(motion.case, 30),
+        clip(motion.outcome, 20),
+        short(motion.error),
         right,
         *texts,
-        clip(each.command, 900),
+        clip(motion.command, 900),
     ]

@@ -132,8 +132,8 @@ def cell_map(
     counts = numpy.bincount(cell, minlength=width * height)
     ends = numpy.cumsum(counts)
     ordered = lost[kept][order]
-    for place in numpy.flatnonzero(counts).tolist():
-        medians[place] = round(float(ordered[ends[place] - 1 - counts[place] // 2]), 3)
+    for index in numpy.flatnonzero(counts).tolist():
+        medians[index] = round(float(ordered[ends[index] - 1 - counts[index] // 2]), 3)
     rows = tuple(tuple(medians[k * width : (k + 1) * width]) for k in range(height))
     return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
 
@@ -201,7 +201,7 @@ class Gathered:
         self._steps += int(sum(table["steps"].to_pylist()))
         error = table["error_max"].to_numpy()
         error = numpy.where(numpy.isnan(error), 0.0, error)
-        success = numpy.array([each == Outcome.SUCCESS.value for each in outcomes])
+        success = numpy.array([outcome == Outcome.SUCCESS.value for outcome in outcomes])
         places = numpy.lexsort((-error, success))[:MOST_WORST].tolist()
         index, digits = table["index"].to_numpy(), table["digits_right"].to_numpy()
         worst = [_Bad(bool(success[i]), -error[i], int(index[i]), float(digits[i]), outcomes[i]) for i in places]
@@ -220,7 +220,7 @@ class Gathered:
         sorted_values = {column: numpy.sort(numpy.concatenate(values)) for column, values in self._values.items()}
         for column, values in sorted_values.items():
             metrics |= _quantiles(Quantity(*_QUANTITIES[column]), values)
-        histograms = {name: found for name, values in sorted_values.items() if (found := histogram(values))}
+        histograms = {name: bins for name, values in sorted_values.items() if (bins := histogram(values))}
         return msgspec.structs.replace(
             self._row,
             case=name,
@@ -233,7 +233,7 @@ class Gathered:
             data=None,
             request=_request(self._task),
             spread=Spread(histograms, self._cells()),
-            worst=tuple(_worst(self._task, cases[each.motion], each) for each in self._worst),
+            worst=tuple(_worst(self._task, cases[motion.motion], motion) for motion in self._worst),
         )
 
     def _cells(self) -> CellMap | None:
@@ -293,14 +293,14 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
         assert isinstance(task.case, Chunk)
         assert task.case.sweep is not None
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
-        found = sums.setdefault(key, None)
+        entry = sums.setdefault(key, None)
         if not isinstance(row.chunk, bytes):
             lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key, request=_request(task)))
             continue
-        if found is None:
-            found = sums[key] = Gathered(row, task)
-        found.take(row)
-    return [_survey(each, lost.get(key)) for key, each in sums.items()]
+        if entry is None:
+            entry = sums[key] = Gathered(row, task)
+        entry.take(row)
+    return [_survey(entry, lost.get(key)) for key, entry in sums.items()]
 
 
 def _request(task: Task) -> dict[str, str]:

@@ -54,7 +54,7 @@ def worse_motions(old: Row, new: Row, files: tuple[Path, Path], limits: LossLimi
     lost = _lost(before, after, limits, old)
     worse = numpy.flatnonzero(lost > 0)
     order = worse[numpy.lexsort((before["index"][worse], -lost[worse]))]
-    first = tuple(_motion(new, before, after, place) for place in order[:MOST].tolist())
+    first = tuple(_motion(new, before, after, index) for index in order[:MOST].tolist())
     return WorseMotions(new.identity, len(here), len(worse), first)
 
 
@@ -80,12 +80,12 @@ def _lost(before: dict[str, Any], after: dict[str, Any], limits: LossLimits, row
 
     A motion that failed before is never worse.
     """
-    reached = [each["outcome"] == Outcome.SUCCESS.value for each in (before, after)]
+    reached = [columns["outcome"] == Outcome.SUCCESS.value for columns in (before, after)]
     eps = log10(parse(row.precision).eps)
     assert eps is not None
     floor = 10.0 ** max(limits.floor + eps, -300.0)
     with numpy.errstate(all="ignore"):
-        sizes = [numpy.log10(numpy.fmax(each["error_max"], floor)) for each in (before, after)]
+        sizes = [numpy.log10(numpy.fmax(columns["error_max"], floor)) for columns in (before, after)]
         grown = numpy.where(reached[0] & reached[1], sizes[1] - sizes[0], 0.0)
         grown = numpy.where(numpy.isnan(grown), 0.0, grown)
     up, down = numpy.quantile(grown, 1 - _TAIL), -numpy.quantile(grown, _TAIL)
@@ -93,18 +93,18 @@ def _lost(before: dict[str, Any], after: dict[str, Any], limits: LossLimits, row
     return numpy.where(reached[0] & ~reached[1], math.inf, numpy.where(grown > allowed, grown, 0.0))
 
 
-def _motion(row: Row, before: dict[str, Any], after: dict[str, Any], place: int) -> WorseMotion:
-    index, outcome = int(after["index"][place]), str(after["outcome"][place])
-    digits = [round(float(each["digits_right"][place]), 2) for each in (before, after)]
-    known = [None if math.isnan(each) else each for each in digits]
+def _motion(row: Row, before: dict[str, Any], after: dict[str, Any], at: int) -> WorseMotion:
+    index, outcome = int(after["index"][at]), str(after["outcome"][at])
+    digits = [round(float(columns["digits_right"][at]), 2) for columns in (before, after)]
+    known = [None if math.isnan(value) else value for value in digits]
     worst = row.worst if isinstance(row.worst, tuple) else ()
-    said = next((each.command for each in worst if each.index == index), "")
-    return WorseMotion(index, known[0], known[1], outcome, said or _command(row, after, place, outcome))
+    said = next((motion.command for motion in worst if motion.index == index), "")
+    return WorseMotion(index, known[0], known[1], outcome, said or _command(row, after, at, outcome))
 
 
-def _command(row: Row, columns: dict[str, Any], place: int, outcome: str) -> str:
+def _command(row: Row, columns: dict[str, Any], index: int, outcome: str) -> str:
     """The command of the rounded top and start: the motion itself in double, within a rounding in other formats."""
-    numbers = [Fraction(repr(float(columns[name][place]))) for name in DATA]
+    numbers = [Fraction(repr(float(columns[name][index]))) for name in DATA]
     inertia, moment, rotor, omega, gamma = (numbers[k : k + 3] for k in range(0, 15, 3))
     top = HeavyTop(inertia, 1, moment, rotor if any(rotor) else None)
     case = Case("motion", "a motion of a survey", system(row.system), top, State(omega, gamma))

@@ -98,10 +98,10 @@ class Survey(Kind):
         motions = drawn(task.case, precision, task.seed)
         asked = task.key.subject.tolerance
         options = {"tolerance": exact(asked)} if asked else {}
-        found = measured(motions, task.integrator, times, precision, options)
-        radius = float(numpy.nanmax(found["reference_radius"], initial=0.0))
+        figures = measured(motions, task.integrator, times, precision, options)
+        radius = float(numpy.nanmax(figures["reference_radius"], initial=0.0))
         row = exact_row(task, f"{task.case.count} motions", Against("computed", _METHOD, f"{radius:.3g}"), {})
-        everything = found | _names(task, motions) | _data(motions)
+        everything = figures | _names(task, motions) | _data(motions)
         return msgspec.structs.replace(row, bits=precision.bits, chunk=chunk_bytes(everything))
 
     def join(
@@ -173,7 +173,7 @@ def _line(row: Row) -> str:
     counts = ", ".join(f"{count} {outcome}" for outcome, count in of_motions(row))
     if row.outcome != Outcome.SUCCESS.value:
         return f"{row.case} {row.integrator} {row.precision}: {row.outcome}"
-    found = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
-    said = ", ".join(f"{name} {float(metric):.2g}" for name, metric in found.items() if metric is not None)
+    metrics = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
+    said = ", ".join(f"{name} {float(metric):.2g}" for name, metric in metrics.items() if metric is not None)
     worst = f"; the worst is {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
     return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {said}{worst}"

@@ -54,7 +54,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
     rows = [(source, row) for source, report in sources for row in report.rows]
     if not rows:
         return None
-    found = [_lead_cells(lead, source) for source, report in sources for lead in leads(report.rows)]
+    cells = [_lead_cells(lead, source) for source, report in sources for lead in leads(report.rows)]
     section = Section(
         "work-precision",
         "Work and precision",
@@ -66,8 +66,8 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
             "general code, and the others, are given them when they run.",
         ],
-        answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
-        if found
+        answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, cells)
+        if cells
         else None,
         columns=[
             "case",
@@ -106,11 +106,11 @@ def _in_colour(cases: Sequence[Sequence[WorkPrecisionLine]]) -> dict[str, int]:
     points: Counter[str] = Counter()
     for lines in cases:
         times = sorted((seconds, line.label) for line in lines if (seconds := line.seconds_at(-10.0)) is not None)
-        points.update({label: _MOST_COLOURS - place for place, (_, label) in enumerate(times[:_MOST_COLOURS])})
+        points.update({label: _MOST_COLOURS - index for index, (_, label) in enumerate(times[:_MOST_COLOURS])})
     labels = list(dict.fromkeys(line.label for lines in cases for line in lines))
     theirs = [line.label for lines in cases for line in lines if line.integrator not in INTEGRATORS]
     best = list(dict.fromkeys([*theirs, *(label for label, _ in points.most_common()), *labels]))[:_MOST_COLOURS]
-    return {label: place for place, label in enumerate(sorted(labels, key=lambda label: label not in best))}
+    return {label: index for index, label in enumerate(sorted(labels, key=lambda label: label not in best))}
 
 
 def _lead_cells(lead: Lead, source: str) -> list[str]:
@@ -138,8 +138,8 @@ def _picture(lines: Sequence[tuple[str, WorkPrecisionLine]], colours: dict[str, 
     decades(axes.yaxis)
     alternative, ends = [], []
     for (source, line), label in zip(lines, names, strict=True):
-        place = min(colours[line.label], _MOST_COLOURS)
-        key = numbered(label, place, source == "baseline")
+        colour = min(colours[line.label], _MOST_COLOURS)
+        key = numbered(label, colour, source == "baseline")
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)
@@ -318,12 +318,12 @@ def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None
         alternative = []
         ends = []
         for key, row in chosen:
-            found, last, end = _curve(axes, key, row, name, power)
+            line, last, end = _curve(axes, key, row, name, power)
             ends += [end] if end else []
             section.key(key)
-            alternative.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
-            exponent = found.said if found else ""
-            error, law = short(row.metrics["error_max"].value), found.law if found else ""
+            alternative.append(f"{key.label}: {line.text if line else 'too few samples for a law'}.")
+            exponent = line.said if line else ""
+            error, law = short(row.metrics["error_max"].value), line.law if line else ""
             section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
         said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]
         heading = f"{title[0].upper()}{title[1:]} over time"

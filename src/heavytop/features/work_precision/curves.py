@@ -222,7 +222,9 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
             cells = []
             for line in of_name[case]:
                 ours = [
-                    each for each in lines_by_case[case] if (each.integrator, each.precision) == (OURS, line.precision)
+                    curve
+                    for curve in lines_by_case[case]
+                    if (curve.integrator, curve.precision) == (OURS, line.precision)
                 ]
                 cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
                 cells += [] if line.order is None else [["order seen", line.order_text, "", ""][: 3 + beside]]
@@ -316,6 +318,6 @@ def _least_error(rows: Sequence[Row]) -> Headline | None:
     best = [(line.best, case, line.label) for case, lines in panels(rows).items() for line in lines if line.best]
     if not best:
         return None
-    point, case, label = min(best, key=lambda each: each[0].log10)
+    point, case, label = min(best, key=lambda entry: entry[0].log10)
     text = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
     return Headline(f"{text}, in {point.takes()}.")

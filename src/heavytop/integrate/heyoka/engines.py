@@ -91,10 +91,10 @@ def derivatives(system: System, attitude: bool, count: int, p: Parameters | None
     """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
     values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(XI if attitude else ()))]
     y = [Jet(column.__getitem__) for column in values]
-    given = p or known_parameters(system)
-    rates = system.field(given, y[:6])
+    parameters = p or known_parameters(system)
+    rates = system.field(parameters, y[:6])
     if attitude:
-        rates = (*rates, *system.attitude(given, y[:6], y[6:]))
+        rates = (*rates, *system.attitude(parameters, y[:6], y[6:]))
     for n in range(count):
         yield [column[n] for column in values]
         following = [rate.at(n) for rate in rates]
@@ -272,9 +272,9 @@ def compiled(
     """
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
     key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
-    found = _compiled.get(key)
-    if found is not None:
-        return found
+    machine = _compiled.get(key)
+    if machine is not None:
+        return machine
     require(precision)
     if precision == DOUBLE_DOUBLE:
         raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
@@ -362,7 +362,7 @@ def arrays(problem: Problem) -> tuple[Any, Any]:
     p = problem.parameters
     numbers = list(problem.system.entering(p))
     start = [*problem.start.flat, *(problem.xi or ())]
-    found = numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
-    for array in found:
+    columns = numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
+    for array in columns:
         array.setflags(write=False)  # kept for the next who asks
-    return found
+    return columns

@@ -357,11 +357,11 @@ def states_on_a_grid(
             engine.set_time(0.0)
             engine.pars[:] = parameters[places].T
             engine.state[:] = starts[places].T
-            found = engine.propagate_grid(grid)
+            grid_run = engine.propagate_grid(grid)
             results = engine.propagate_res
             reached = heyoka.taylor_outcome.time_limit
-            moved = all(each[0] == reached and 2 * each[1] > least for each in results)
-            states[places] = (found[1] if isinstance(found, tuple) else found)[1:].transpose(2, 0, 1)
-            steps[places] = [each[3] for each in results]
+            moved = all(result[0] == reached and 2 * result[1] > least for result in results)
+            states[places] = (grid_run[1] if isinstance(grid_run, tuple) else grid_run)[1:].transpose(2, 0, 1)
+            steps[places] = [result[3] for result in results]
             good[places] = moved and numpy.isfinite(states[places]).all()
     return states, steps, good

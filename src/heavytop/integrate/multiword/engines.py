@@ -36,12 +36,12 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
     begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
     Raises Contradiction.
     """
-    given = known_parameters(system).mapped(Fraction)
+    parameters = known_parameters(system).mapped(Fraction)
     start = tuple(map(Fraction, (*OMEGA, *GAMMA, *(XI if attitude else ()))))
-    scaled = Scaled.of(system, given, start, bounded)
+    scaled = Scaled.of(system, parameters, start, bounded)
     run = begin(scaled)
     _require(run.advance(Fraction(1, 2**40), 1) is Status.OK, "the outcome of a step", bits)
-    exact = list(derivatives(system, attitude, min(run.order, _MOST_ORDERS) + 1, given))
+    exact = list(derivatives(system, attitude, min(run.order, _MOST_ORDERS) + 1, parameters))
     step, largest = run.time / scaled.rate, max(map(abs, scaled.state))
     terms = [
         [Fraction(value) * step**n / (factorial(n) * size) for value, size in zip(row, scaled.sizes, strict=True)]
@@ -52,12 +52,12 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
         _require(off <= largest * Fraction(2) ** (_GUARD_BITS - bits), f"Taylor coefficient {n}", bits)
     tail = 4 * max(map(abs, terms[-1])) + largest * Fraction(2) ** (_GUARD_BITS - bits)
     later = run.time * _LATER
-    for found, part, what in (
+    for computed, part, what in (
         (run.state, Fraction(1), "the new state"),
         (run.sample(later), _LATER, "a state inside the step"),
     ):
         sums = [sum(row[i] * part**n for n, row in enumerate(terms)) for i in range(len(start))]
-        fine = found is not None and max(abs(a - b) for a, b in zip(found, sums, strict=True)) <= tail
+        fine = computed is not None and max(abs(a - b) for a, b in zip(computed, sums, strict=True)) <= tail
         _require(fine, what, bits)
 
 
@@ -241,8 +241,8 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     wanted = wanted_tolerance(problem.precision, tolerance)
     start = (*problem.start.flat, *(problem.xi or ()))
     scaled = Scaled.of(problem.system, problem.parameters, start)
-    if (found := floats(wanted, scaled)) is not None:
-        return found, scaled
+    if (machine := floats(wanted, scaled)) is not None:
+        return machine, scaled
     scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True)
     asked = wanted.denominator.bit_length() - wanted.numerator.bit_length()
     bits = asked + _GUARD_BITS + fixed_point_run.spread(scaled) + fixed_point_run.excess(scaled)

@@ -22,23 +22,23 @@ def _warm(system: System, width: int, method: str) -> None:
     _call(Request(system, numpy.zeros(width), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
 
 
-def _call(given: Request, method: str) -> Any:
+def _call(request: Request, method: str) -> Any:
     return nbsolve2_ivp(
-        _machine_code(given.system, given.width).address,
-        (0.0, float(given.times[-1])),
-        given.start,
+        _machine_code(request.system, request.width).address,
+        (0.0, float(request.times[-1])),
+        request.start,
         method,
-        given.times,
-        args=given.numbers,
-        rtol=given.control,
-        atol=given.control,
+        request.times,
+        args=request.numbers,
+        rtol=request.control,
+        atol=request.control,
     )
 
 
 def _solver(method: str) -> Solve:
-    def solve(given: Request) -> Solution:
-        _, seconds = timed(_warm, given.system, given.width, method)
-        run = _call(given, method)
+    def solve(request: Request) -> Solution:
+        _, seconds = timed(_warm, request.system, request.width, method)
+        run = _call(request, method)
         try:
             states = run.y.T.copy()
             return Solution(states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds)

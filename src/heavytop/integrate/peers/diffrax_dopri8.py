@@ -48,11 +48,11 @@ def _compiled(system: System, width: int, samples: int) -> Callable[..., Any]:
     return jax.jit(integrate).lower(*shapes).compile()
 
 
-def _solve(given: Request) -> Solution:
+def _solve(request: Request) -> Solution:
     # settings of this thread and this block alone: the user's jax stays what it is
     with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
-        code, seconds = timed(_compiled, given.system, given.width, len(given.times))
-        run = code(given.start, given.times, given.numbers, given.control)
+        code, seconds = timed(_compiled, request.system, request.width, len(request.times))
+        run = code(request.start, request.times, request.numbers, request.control)
         states = numpy.asarray(jax.block_until_ready(run.ys))
     # diffrax fills what it did not reach with infinities
     unreached = numpy.isinf(states).all(axis=1)

@@ -139,7 +139,7 @@ def double_peer(
     Raises:
         InputError: for declarations that are not lists of text.
     """
-    singular = tuple(vectors.vector(each, "singular_at") for each in singular_at)
+    singular = tuple(vectors.vector(point, "singular_at") for point in singular_at)
     if attitude not in (False, True, "quaternion"):
         raise InputError(f"attitude = {quoted(attitude)} declares nothing.", 'Give True, False or "quaternion".')
     if fixed_grid and control != "step":
@@ -148,15 +148,15 @@ def double_peer(
     declared = Declared(*able, attitude, one_step, fixed_grid, singular)
 
     def integrate(problem: Problem, times: Sequence[Fraction], value: Fraction) -> Trajectory:
-        given = _given(name, control, problem, times, value)
+        request = _given(name, control, problem, times, value)
         if declared.attitude == "quaternion":
             q = problem.native(quaternion(problem))
-            given = replace(given, start=numpy.array([*given.start[:3], *q], dtype=float))
+            request = replace(request, start=numpy.array([*request.start[:3], *q], dtype=float))
         began = perf_counter()
-        solved = _from_start(name, given, solve)
+        solved = _from_start(name, request, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
-        flags = {control: repr(given.control), "field": field_kind()}
-        return _judged(problem, name, order, given, solved, seconds, flags)
+        flags = {control: repr(request.control), "field": field_kind()}
+        return _judged(problem, name, order, request, solved, seconds, flags)
 
     def with_step(
         top: HeavyTop,
@@ -200,7 +200,7 @@ def fixed_steps(
 
 
 def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
-    if names is not None and (isinstance(names, str) or not all(isinstance(each, str) for each in names)):
+    if names is not None and (isinstance(names, str) or not all(isinstance(name, str) for name in names)):
         raise InputError(f"{quoted(names)} declares nothing.", 'Give a list of names such as ["heavy_top"], or None.')
     return None if names is None else tuple(names)
 
@@ -217,32 +217,32 @@ def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction],
     return Request(problem.system, start, grid, numbers, float(value))
 
 
-def _from_start(name: str, given: Request, solve: Solve) -> Solution:
+def _from_start(name: str, request: Request, solve: Solve) -> Solution:
     """The solution of ``solve`` at the times after 0, which most libraries refuse, behind the start itself."""
-    at_start = int(given.times[0] == 0)
+    at_start = int(request.times[0] == 0)
     # the times are judged by as they were, whatever is done to those that are given
-    later = replace(given, times=given.times[at_start:].copy())
-    solved = solve(later) if len(later.times) else Solution(numpy.empty((0, given.width)), 0.0, 0, 0)
+    later = replace(request, times=request.times[at_start:].copy())
+    solved = solve(later) if len(later.times) else Solution(numpy.empty((0, request.width)), 0.0, 0, 0)
     if not isinstance(solved, Solution):
         raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solution")
     if not at_start:
         return solved
-    states = _states(name, solved.states, len(later.times), given.width)
-    return replace(solved, states=numpy.concatenate([[given.start], states]))
+    states = _states(name, solved.states, len(later.times), request.width)
+    return replace(solved, states=numpy.concatenate([[request.start], states]))
 
 
 def _judged(
     problem: Problem,
     name: str,
     order: int,
-    given: Request,
+    request: Request,
     solved: Solution,
     seconds: dict[str, float],
     flags: dict[str, str],
 ) -> Trajectory:
     """The trajectory of a solution, up to the first state that is not finite."""
-    times = given.times
-    states = _states(name, solved.states, len(times), given.width)
+    times = request.times
+    states = _states(name, solved.states, len(times), request.width)
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
     reached = times[-1] if count == len(times) else solved.reached
@@ -251,7 +251,7 @@ def _judged(
         problem,
         name,
         tuple(exact(time) for time in times[:count]),
-        tuple(of_quaternion(name, problem, state) if given.width == 7 else state for state in states[:count]),
+        tuple(of_quaternion(name, problem, state) if request.width == 7 else state for state in states[:count]),
         Outcome.SUCCESS if count == len(times) else outcome,
         exact(reached if numpy.isfinite(reached) else times[count - 1] if count else 0.0),
         solved.steps,
@@ -262,9 +262,9 @@ def _judged(
     )
 
 
-def _states(name: str, given: Any, count: int, width: int) -> Any:
+def _states(name: str, returned: Any, count: int, width: int) -> Any:
     """The states as an array of doubles, shape (m, width) with m <= count; raises PeerFailed for anything else."""
-    states = numpy.asarray(given)
+    states = numpy.asarray(returned)
     if not states.size:
         return numpy.zeros((0, width))
     if states.dtype.kind not in "fiu":

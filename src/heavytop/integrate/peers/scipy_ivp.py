@@ -12,27 +12,27 @@ _FINEST = 100 * 2.0**-52
 
 
 def _solver(method: str) -> Solve:
-    def solve(given: Request) -> Solution:
+    def solve(request: Request) -> Solution:
         from scipy.integrate import solve_ivp
 
-        field, seconds = timed(rates, given.system, given.width)
-        dense = len(given.times) > 1
+        field, seconds = timed(rates, request.system, request.width)
+        dense = len(request.times) > 1
         try:
             run = solve_ivp(
                 field,
-                (0.0, given.times[-1]),
-                given.start,
+                (0.0, request.times[-1]),
+                request.start,
                 method=method,
-                args=(given.numbers,),
-                rtol=max(given.control, _FINEST),
-                atol=given.control,
+                args=(request.numbers,),
+                rtol=max(request.control, _FINEST),
+                atol=request.control,
                 dense_output=dense,
             )
         except ValueError as error:
             if "infs or NaNs" not in str(error):
                 raise
             return Solution([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
-        covered = given.times[abs(given.times) <= abs(run.t[-1])]
+        covered = request.times[abs(request.times) <= abs(run.t[-1])]
         states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
         return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)
 

@@ -39,13 +39,13 @@ class PythonFile:
             status = path.stat()
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror}.", "Give FILE.py:FUNCTION.") from None
-        found: Any = _module(path, (status.st_mtime_ns, status.st_size))
+        module: Any = _module(path, (status.st_mtime_ns, status.st_size))
         for part in self.function.split("."):
             try:
-                found = getattr(found, part)
+                module = getattr(module, part)
             except AttributeError:
                 raise InputError(f"{self.path} has no {self.function}.", "Give FILE.py:FUNCTION.") from None
-        return as_peer(found, self.name)
+        return as_peer(module, self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +128,11 @@ def as_peer(call: Any, name: str) -> Callable[..., Any]:
             arguments = inspect.signature(call).parameters.values()
     except PeerFailed as error:
         raise InputError(f"{error.cause}.", _FORMS) from None
-    positional = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
-    several = any(each.kind is each.VAR_POSITIONAL for each in arguments) or len(positional) >= 4
+    positional = [arg for arg in arguments if arg.kind in (arg.POSITIONAL_ONLY, arg.POSITIONAL_OR_KEYWORD)]
+    several = any(arg.kind is arg.VAR_POSITIONAL for arg in arguments) or len(positional) >= 4
     if several:
         return call  # type: ignore[no-any-return]
-    if len(positional) == 1 or (positional and all(each.default is not each.empty for each in positional[1:])):
+    if len(positional) == 1 or (positional and all(arg.default is not arg.empty for arg in positional[1:])):
         from heavytop.integrate.peers.double import double_peer
 
         return double_peer(name, 0, call)

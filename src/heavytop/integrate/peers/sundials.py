@@ -23,18 +23,18 @@ def _machine_code(system: System, width: int) -> Any:
     return write
 
 
-def _solve(given: Request) -> Solution:
-    write, seconds = timed(_machine_code, given.system, given.width)
+def _solve(request: Request) -> Solution:
+    write, seconds = timed(_machine_code, request.system, request.width)
 
     def rates(time: float, y: Any, result: Any) -> None:
-        write(result, time, y, given.numbers)
+        write(result, time, y, request.numbers)
 
-    solver = CVODE(rates, method="Adams", rtol=given.control, atol=given.control, max_num_steps=_MOST_STEPS)
-    run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
-    if len(given.times) == 1:
+    solver = CVODE(rates, method="Adams", rtol=request.control, atol=request.control, max_num_steps=_MOST_STEPS)
+    run = solver.solve(numpy.concatenate([[0.0], request.times]), request.start)
+    if len(request.times) == 1:
         # two times are a span: CVODE gives every step in between
         return Solution(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
-    reached = abs(given.times) <= abs(run.t[-1])
+    reached = abs(request.times) <= abs(run.t[-1])
     return Solution(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
 
 

@@ -82,7 +82,7 @@ def once(make: Callable[P, Machine]) -> Callable[P, Machine]:
     making, made, signature = Lock(), dict[tuple[Any, ...], Machine](), inspect.signature(make)
     full = len(signature.parameters)
 
-    def found(*arguments: P.args, **named: P.kwargs) -> Machine:
+    def cached(*arguments: P.args, **named: P.kwargs) -> Machine:
         if len(arguments) == full and arguments in made:
             return made[arguments]
         bound = signature.bind(*arguments, **named)
@@ -93,7 +93,7 @@ def once(make: Callable[P, Machine]) -> Callable[P, Machine]:
                 made[bound.args] = _from_disk(make, bound.args)
             return made[bound.args]
 
-    return found
+    return cached
 
 
 def _from_disk(make: Callable[..., Machine], arguments: tuple[Any, ...]) -> Machine:
@@ -517,17 +517,17 @@ class Stepping(ABC):
     def write_step(self) -> Operand:
         """Write one step; gives the bit that says whether it stands."""
 
-    def time(self, place: int) -> Operand:
+    def time(self, index: int) -> Operand:
         """A double of the clock."""
-        return self.code.load_one(self.clock, place)
+        return self.code.load_one(self.clock, index)
 
-    def count(self, place: int) -> Operand:
+    def count(self, index: int) -> Operand:
         """A count, by its place."""
-        return self.code.load_one(self.counts, place)
+        return self.code.load_one(self.counts, index)
 
-    def set_count(self, value: Index, place: int) -> None:
+    def set_count(self, value: Index, index: int) -> None:
         """Put one of the counts."""
-        self.code.store_one(value, self.counts, place)
+        self.code.store_one(value, self.counts, index)
 
     def write(self) -> None:
         """The loop; the function gives the number of steps that stand."""
@@ -561,11 +561,11 @@ class Following(ABC):
         self.progress, self.times_count, self.most, self.result = code.arguments[-4:]
 
     @abstractmethod
-    def covered(self, place: Operand) -> Operand:
+    def covered(self, index: Operand) -> Operand:
         """Whether the last step covers a time, a bit."""
 
     @abstractmethod
-    def aim(self, place: Operand) -> None:
+    def aim(self, index: Operand) -> None:
         """Make a time the target of ``advance``."""
 
     @abstractmethod
@@ -578,7 +578,7 @@ class Following(ABC):
         head, inside, step, sample, out = map(b.append_basic_block, ("head", "in", "step", "at", "out"))
         b.branch(head)
         b.position_at_end(head)
-        done, taken = (code.load_one(self.progress, place) for place in range(2))
+        done, taken = (code.load_one(self.progress, index) for index in range(2))
         running = code.load_one(self.counts, self.status) == 0
         left = (done < self.times_count) & (taken < self.most)
         b.cbranch(running & left, inside, out)

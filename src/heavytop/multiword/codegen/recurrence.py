@@ -132,12 +132,12 @@ class Coefficients:
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     """The coefficients of the field, exactly, for exact parameters."""
     exactly = p.mapped(mpq)  # quicker than Fractions, and as exact
-    given = coefficients_of(system, lambda y: system.field(exactly, y), mpq(1, 2))
+    coefficients = coefficients_of(system, lambda y: system.field(exactly, y), mpq(1, 2))
     if not attitude:
-        return given
+        return coefficients
     # ξ' = ξ × ω turns as γ does
-    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in given.vectors[0]]
-    return replace(given, vectors=(given.vectors[0], tuple(_eight(row) for row in third)))
+    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in coefficients.vectors[0]]
+    return replace(coefficients, vectors=(coefficients.vectors[0], tuple(_eight(row) for row in third)))
 
 
 def coefficients_of(system: System, rates: Callable[[Sequence[Any]], Sequence[Any]], turning: mpq) -> Coefficients:
@@ -162,25 +162,25 @@ def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
     return tuple(Fraction(int(c.numerator), int(c.denominator)) for c in row) + (Fraction(0),) * (8 - len(row))
 
 
-def rates(system: System, given: Coefficients, y: Sequence[Any]) -> list[Any]:
+def rates(system: System, coefficients: Coefficients, y: Sequence[Any]) -> list[Any]:
     """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly for exact numbers of any kind."""
-    return series_rates(system, given, [y])
+    return series_rates(system, coefficients, [y])
 
 
-def series_rates(system: System, given: Coefficients, series: Sequence[Sequence[Any]]) -> list[Any]:
+def series_rates(system: System, coefficients: Coefficients, series: Sequence[Sequence[Any]]) -> list[Any]:
     """Coefficient n of the derivative of a motion whose Taylor coefficients from 0 to n these are."""
-    lanes = [[[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(given.vectors)] for y in series]
+    lanes = [[[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(coefficients.vectors)] for y in series]
     right = [_side(y[0], RIGHT) for y in reversed(lanes)]
-    found: list[Any] = []
-    for vector, (first, *linear) in enumerate(given.vectors):
+    rates: list[Any] = []
+    for vector, (first, *linear) in enumerate(coefficients.vectors):
         left, state = [_side(y[vector], LEFT) for y in lanes], lanes[-1][vector]
         products = [sum(a[k] * b[k] for a, b in zip(left, right, strict=True)) for k in range(8)]
         gathered = [sum(sign * products[lane] for lane, sign in column) for column in zip(*GATHERED, strict=True)]
         derivative = [a * s for a, s in zip(first, gathered, strict=False)]
         for row, permutation in zip(linear, permutations(system), strict=True):
             derivative = [d + b * state[lane] for d, b, lane in zip(derivative, row, permutation, strict=False)]
-        found += derivative[3 * vector :]
-    return found
+        rates += derivative[3 * vector :]
+    return rates
 
 
 def _side(y: Sequence[Any], which: Sum) -> list[Any]:
@@ -262,9 +262,9 @@ class Recurrence:
         """Where the row of order n begins."""
         return self.code.address(self.scratch, self.code.integer(n) * self.layout.row)
 
-    def pair(self, row: Operand, place: int) -> Pair:
+    def pair(self, row: Operand, offset: int) -> Pair:
         """Both words of what lies there."""
-        return self.code.load(row, place), self.code.load(row, place + 8)
+        return self.code.load(row, offset), self.code.load(row, offset + 8)
 
     def _side_pair(self, y: Pair, which: Sum) -> Pair:
         first = [self.code.shuffle(word, self.code.zero, which.first) for word in y]
@@ -283,9 +283,9 @@ class Recurrence:
         for vector in self.vectors:
             places.append((self._side_pair(y[vector], LEFT), self.layout.left(vector)))
             places.append((y[vector], self.layout.value(vector)))
-        for pair, place in places:
+        for pair, offset in places:
             for word in range(2):
-                self.code.store(pair[word], row, place + 8 * word)
+                self.code.store(pair[word], row, offset + 8 * word)
 
     def _put_plain(self, n: Index, y: list[Operand]) -> list[Operand]:
         """Store a row; gives R, each L and each y."""
@@ -301,11 +301,11 @@ class Recurrence:
     def _accumulate_pairs(self, m: Index, other: Index, sums: list[Operand]) -> list[Operand]:
         """Σ L_m R_other in words (s, c), c unordered."""
         code, left, right = self.code, self.row(m), self.row(other)
-        found: list[Any] = []
+        added: list[Any] = []
         for vector in self.vectors:
             total = (sums[2 * vector], sums[2 * vector + 1])
-            found += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
-        return found
+            added += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
+        return added
 
     def _accumulate(self, m: Index, other: Index, sums: list[Operand]) -> list[Operand]:
         left, right = self.row(m), self.row(other)
@@ -328,21 +328,21 @@ class Recurrence:
 
     def constant(self, vector: int, row: int) -> Constant:
         """A, or B of a row from 1 on."""
-        place = 24 * ((1 + self.layout.linear) * vector + row)
-        return (*self.pair(self.table, place), self.code.load(self.table, place + 16))
+        offset = 24 * ((1 + self.layout.linear) * vector + row)
+        return (*self.pair(self.table, offset), self.code.load(self.table, offset + 16))
 
     def gathered(self, total: Operand) -> Operand:
         """The sums of products that the field needs, where they are exact."""
-        found = self._anywhere(total, 0) * self.code.constant(_signs(0))
+        result = self._anywhere(total, 0) * self.code.constant(_signs(0))
         for k in range(1, len(GATHERED)):
-            found = self.code.fma(self._anywhere(total, k), self.code.constant(_signs(k)), found)
-        return found
+            result = self.code.fma(self._anywhere(total, k), self.code.constant(_signs(k)), result)
+        return result
 
     def divisor(self, n: Index) -> Pair:
         """n + 1 and its inverse, doubles."""
         base = self._table_row(n)
-        found = [self.code.spread(self.code.load_one(base, k)) for k in range(2)]
-        return found[0], found[1]
+        words = [self.code.spread(self.code.load_one(base, k)) for k in range(2)]
+        return words[0], words[1]
 
     def _table_row(self, n: Index) -> Operand:
         offset = self.code.integer(n) * self.layout.table_row
@@ -406,7 +406,7 @@ class Recurrence:
     def plain_orders(self, low_order: Operand, order: Operand, last: list[Operand]) -> None:
         """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
         code, b, row = self.code, self.code.builder, self.row(low_order)
-        sides = [code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
+        sides = [code.load(row, offset) for offset in (0, *map(self.layout.left, self.vectors))]
         after = b.append_basic_block("summed")
         switch, before = b.switch(low_order, after), b.block
         entry, incoming = before, None

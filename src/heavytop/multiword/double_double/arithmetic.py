@@ -123,13 +123,13 @@ def polynomials(
         return [code.fma(total, at, high) for total, (at, high) in zip(sums, both, strict=True)]
 
     def term(k: Operand, words: list[Operand]) -> list[Operand]:
-        found: list[Operand] = []
+        result: list[Operand] = []
         coefficients = row(low_order - k)
         for at in places:
             for coefficient in coefficients:
-                total = multiply(code, (words[len(found)], words[len(found) + 1]), at)
-                found += code.quick_two_sum(*add(code, total, coefficient))
-        return found
+                total = multiply(code, (words[len(result)], words[len(result) + 1]), at)
+                result += code.quick_two_sum(*add(code, total, coefficient))
+        return result
 
     sums = code.loop(0, order - low_order, plain, [code.zero] * (count * len(places)))
     begin = [word for total in sums for word in (total, code.zero)]

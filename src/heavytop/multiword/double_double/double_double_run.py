@@ -148,8 +148,8 @@ class Floating(ResumableRun):
     def time(self) -> Fraction:
         return self._time(dd.TIME)
 
-    def _time(self, place: int) -> Fraction:
-        return Fraction(self.clock[place]) + Fraction(self.clock[place + 1])
+    def _time(self, index: int) -> Fraction:
+        return Fraction(self.clock[index]) + Fraction(self.clock[index + 1])
 
     @property
     def state(self) -> tuple[Fraction, ...]:
@@ -168,9 +168,9 @@ class Floating(ResumableRun):
     def words_at(self, time: Fraction) -> Doubles:
         """The words of the state at ``time``, inside the last step."""
         behind = time - self._time(dd.BEGAN)
-        series, found = self.sampling
+        series, words = self.sampling
         orders = int(self.counts[dd.USED]), self.order
-        self.machine.functions["sample"](series, *orders, *split(behind if self.forwards else -behind), found)
+        self.machine.functions["sample"](series, *orders, *split(behind if self.forwards else -behind), words)
         return self.found.copy()
 
     @property
@@ -184,7 +184,7 @@ class Floating(ResumableRun):
         one.
         """
         row, progress = 16 * self.layout.vectors, numpy.zeros(2, numpy.int64)
-        found = doubles(row * (min(len(highs), _SAMPLES_AT_ONCE) + dd.AT_ONCE))
+        samples = doubles(row * (min(len(highs), _SAMPLES_AT_ONCE) + dd.AT_ONCE))
         own = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         for first in range(0, len(highs), _SAMPLES_AT_ONCE):
             times = [words[first : first + _SAMPLES_AT_ONCE] for words in (highs, lows)]
@@ -192,13 +192,13 @@ class Floating(ResumableRun):
             progress[:] = 0
             while progress[0] < count and self.status is Status.OK:
                 done, taken = progress
-                self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, pointer(found))
+                self.machine.functions["follow"](*arrays, count, taken + _STEPS_AT_ONCE, pointer(samples))
                 if self.status is Status.OK and tuple(progress) == (done, taken):  # a time that takes exact numbers
                     time = Fraction(times[0][done]) + Fraction(times[1][done])
-                    found[row * done : row * (done + 1)] = self.words_at(time)
+                    samples[row * done : row * (done + 1)] = self.words_at(time)
                     progress[0] += 1
             self.steps += int(progress[1])
-            yield found[: row * progress[0]].reshape(-1, row)
+            yield samples[: row * progress[0]].reshape(-1, row)
             if self.status is not Status.OK:
                 return
 
@@ -229,9 +229,9 @@ class Floating(ResumableRun):
         units = self.words[self.layout.units + 8 * self.layout.vectors :]
         return (*map(str, counts), *(float(word).hex() for word in (*clock, *self._row(0), *units)))
 
-    def restore(self, place: tuple[str, ...], steps: int) -> None:
-        self.counts[[dd.LOW_ORDER, dd.TRIES, dd.SLOPE]] = [int(text) for text in place[:3]]
-        words = [float.fromhex(text) for text in place[3:]]
+    def restore(self, numbers: tuple[str, ...], steps: int) -> None:
+        self.counts[[dd.LOW_ORDER, dd.TRIES, dd.SLOPE]] = [int(text) for text in numbers[:3]]
+        words = [float.fromhex(text) for text in numbers[3:]]
         self.clock[[dd.TIME, dd.TIME_LOW]] = words[:2]
         self.words[: len(words) - 2] = words[2:]
         self.steps = steps
@@ -241,13 +241,13 @@ def _state_words(state: tuple[Fraction, ...], layout: Layout) -> Doubles:
     words = doubles(layout.state)
     words[layout.units :] = FIRST_UNITS
     for index, value in enumerate(state):
-        place = index if index < 6 else 16 + index - 3
-        words[place], words[place + 8] = split(value)
+        offset = index if index < 6 else 16 + index - 3
+        words[offset], words[offset + 8] = split(value)
     return words
 
 
 def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
-    return tuple(Fraction(words[place]) + Fraction(words[place + 8]) for place in PLACES[:size])
+    return tuple(Fraction(words[offset]) + Fraction(words[offset + 8]) for offset in PLACES[:size])
 
 
 def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
@@ -349,15 +349,15 @@ class LaneOrders:
             return sums(group)
 
         def two() -> list[Operand]:
-            found = sums(group[:2])
-            return [*found, *[self.code.zero] * (len(found) // 2)]
+            pair = sums(group[:2])
+            return [*pair, *[self.code.zero] * (len(pair) // 2)]
 
         return self.code.either(self.absent[2], two, lambda: sums(group))
 
     def _quotient(self, n: Operand) -> Pair:
         """1/(n + 1) in every lane."""
-        place = self.code.address(self.quotients, n << 1)
-        words = [self.code.load_one(place, i) for i in range(2)]
+        address = self.code.address(self.quotients, n << 1)
+        words = [self.code.load_one(address, i) for i in range(2)]
         return self.code.spread(words[0]), self.code.spread(words[1])
 
     def _pair_order(self, n: Operand, _: list[Operand]) -> None:
@@ -390,16 +390,18 @@ class LaneOrders:
 
     def _pair_products(self, n: Operand, group: Products, m: Operand, words: list[Operand]) -> list[Operand]:
         left, right = self.row(m), self.row(n - m)
-        found: list[Any] = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
+        products: list[Any] = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
                 c, c_low = -c, -c_low
             at = 2 * (component % 3)
             x, y = (a, a_low), (c, c_low)
-            total = found[at], found[at + 1]
-            found[at : at + 2] = multiply(self.code, x, y) if total[0] is None else accumulated(self.code, total, x, y)
-        return found
+            total = products[at], products[at + 1]
+            products[at : at + 2] = (
+                multiply(self.code, x, y) if total[0] is None else accumulated(self.code, total, x, y)
+            )
+        return products
 
     def _split_row(self, m: Operand, peaks: list[Operand]) -> list[Operand]:
         """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
@@ -407,7 +409,7 @@ class LaneOrders:
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
     def _put_parts(self, m: Operand, y: list[Pair], peaks: list[Operand]) -> list[Operand]:
-        code, row, found = self.code, self.row(m), []
+        code, row, stored = self.code, self.row(m), []
         up, down = rises(code, m, code.load(self.units, 16))
         for k, (rows, _) in enumerate(_GROUPS):
             big, largest = code.load(self.units, 8 * k) * up, code.zero
@@ -416,14 +418,14 @@ class LaneOrders:
                 largest = code.larger(code.absolute(y[i][0]), largest)
                 code.store(coarse, row, COARSE + LANES * i)
                 code.store(fine, row, OK + LANES * i)
-            found.append(code.larger(largest * down, peaks[k]))
-        return found
+            stored.append(code.larger(largest * down, peaks[k]))
+        return stored
 
     def _split_order(self, n: Operand, peaks: list[Operand]) -> list[Operand]:
         """y_(n+1) from split coefficients."""
         y, following = self.row(n), self.row(n + 1)
         divisor = self.code.spread((n + 1).to_double()), self._quotient(n)[0]
-        found = []
+        halves = []
         for rows, group in _GROUPS:
             words = self._sums(group, partial(self._split_sums, n))
             for i in rows:
@@ -435,8 +437,8 @@ class LaneOrders:
                         factors.append((self._coefficient(k), self.pair(y, source)))
                 pair = quotient(self.code, None if i < 3 else total, factors, divisor)
                 self._put(following, i, pair)
-                found.append(pair)
-        return self._put_parts(n + 1, found, peaks)
+                halves.append(pair)
+        return self._put_parts(n + 1, halves, peaks)
 
     def _split_sums(self, n: Operand, group: Products) -> list[Operand]:
         zeros = [self.code.zero] * 3 * (1 + group[-1][2] % 3)
@@ -444,7 +446,7 @@ class LaneOrders:
 
     def _split_products(self, n: Operand, group: Products, m: Operand, sums: list[Operand]) -> list[Operand]:
         code, left, right = self.code, self.row(m), self.row(n - m)
-        found = list(sums)
+        result = list(sums)
         for first, second, component, sign in group:
             a, rest = (code.load(left, part + LANES * first) for part in (COARSE, OK))
             coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, OK))
@@ -453,8 +455,8 @@ class LaneOrders:
             at = 3 * (component % 3)
             whole = code.load(right, LANES * second)
             for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
-                found[at + k] = code.fma(one, factor, found[at + k])
-        return found
+                result[at + k] = code.fma(one, factor, result[at + k])
+        return result
 
     def _plain_orders(self, start: Operand, stop: Operand, omega: Products) -> list[Operand]:
         """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
@@ -507,11 +509,11 @@ class LaneOrders:
 
     def _plain(self, group: Products, y: list[Operand], omega: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums with the products of Ω and of the same part of y."""
-        code, found = self.code, list(sums)
+        code, result = self.code, list(sums)
         for first, second, component, sign in group:
             factor = y[first] if sign > 0 else -y[first]
-            found[component % 3] = code.fma(factor, omega[second], found[component % 3])
-        return found
+            result[component % 3] = code.fma(factor, omega[second], result[component % 3])
+        return result
 
     def _plain_rates(self, n: Operand, components: Sequence[int], sums: list[Operand]) -> None:
         """Components of y_(n+1) from their sums."""

@@ -127,8 +127,8 @@ class _Round:
         units = self.code.address(self.clock, 8 * UNITS)
         self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), units)
 
-    def _clock(self, place: int) -> Operand:
-        return self.code.load(self.clock, 8 * place)
+    def _clock(self, index: int) -> Operand:
+        return self.code.load(self.clock, 8 * index)
 
     def write(self) -> None:
         """The loop of rounds."""
@@ -142,9 +142,9 @@ class _Round:
         b.cbranch(taken < self.most, body, out)
         b.position_at_end(body)
         first = self.series.row(0)
-        for place, table in ((0, 0), (ROW, LOW)):
+        for offset, table in ((0, 0), (ROW, LOW)):
             for at in range(0, ROW, LANES):
-                code.store(code.load(self.state, place + at), first, table + at)
+                code.store(code.load(self.state, offset + at), first, table + at)
         splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
         some = self._finish(peaks, splitting)
         code.add_incoming([taken], [taken + 1])
@@ -153,10 +153,10 @@ class _Round:
         b.ret(taken)
 
     def _norm(self, n: Operand) -> Operand:
-        row, found = self.series.row(n), self.code.zero
+        row, largest = self.series.row(n), self.code.zero
         for i in range(6):
-            found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
-        return log2(found)
+            largest = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), largest)
+        return log2(largest)
 
     def _length(self, start: Operand) -> Operand:
         """Each lane's h > 0, as in :mod:`heavytop.multiword.double_double.steps`."""
@@ -176,10 +176,10 @@ class _Round:
             return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
         def pairs(k: Operand, words: list[Operand]) -> list[Operand]:
-            row, found = self.series.row(self.low_order - k), list[Operand]()
+            row, sums = self.series.row(self.low_order - k), list[Operand]()
             for i in range(6):
-                found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
-            return found
+                sums += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
+            return sums
 
         totals = code.loop(0, self.order - self.low_order, plain, [code.zero] * 6)
         begin = [word for total in totals for word in (total, code.zero)]
@@ -205,8 +205,8 @@ class _Round:
         old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
         old += [(self.clock, 8 * LEFT, left - 1)]
-        for base, place, value in old:
-            code.store(code.select(going, value, code.load(base, place)), base, place)
+        for base, offset, value in old:
+            code.store(code.select(going, value, code.load(base, offset)), base, offset)
         self._follow(peaks, length, going, again)
         return code.any_of(going | again)
 
@@ -237,8 +237,8 @@ class _Round:
         either = going | again
         tries = code.select(again, self._clock(TRIES) + 1, code.zero)
         values = [next_unit(code, self._clock(UNITS + k), peak)[1] for k, peak in enumerate(peaks)]
-        for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
-            code.store(code.select(either, value, self._clock(place)), self.clock, 8 * place)
+        for offset, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
+            code.store(code.select(either, value, self._clock(offset)), self.clock, 8 * offset)
 
     def _judged(self, start: Operand, length: Operand, results: list[Pair], moves: Operand, tried: Operand) -> Operand:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
@@ -252,14 +252,14 @@ class _Round:
         def flag(condition: Operand, value: int) -> Operand:
             return code.select(condition, value, 0)
 
-        place = b.bitcast(self.flags, INT_VECTOR.as_pointer())
-        known = code.value(b.load(place, align=8))
-        found = flag(~finite, NON_FINITE) | flag(~moves, TOO_SMALL)
-        found |= flag((rounding > limit) | tried, LARGER_N0)
+        flags = b.bitcast(self.flags, INT_VECTOR.as_pointer())
+        known = code.value(b.load(flags, align=8))
+        status = flag(~finite, NON_FINITE) | flag(~moves, TOO_SMALL)
+        status |= flag((rounding > limit) | tried, LARGER_N0)
         alive = self._clock(LEFT) > 0
-        found = known | code.select(alive, found, 0)
-        b.store(found, place, align=8)
-        return found
+        status = known | code.select(alive, status, 0)
+        b.store(status, flags, align=8)
+        return status
 
 
 _NO_LIMIT = 2.0**53
@@ -305,8 +305,8 @@ class Eight:
         for i, value in enumerate(problem.state):
             self.words[LANES * i + lane], self.words[ROW + LANES * i + lane] = split(value)
         rows = problem.coefficients.vectors[0]
-        given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
-        for k, value in enumerate(given):
+        sources = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
+        for k, value in enumerate(sources):
             self.constants[24 * k + lane : 24 * (k + 1) : LANES] = split_constant(value)
         self.flags[lane] = OK
         self.signs[lane] = 1 if forwards else -1
@@ -331,7 +331,7 @@ class Eight:
 
     def sample_all(self, targets: Any) -> Doubles:
         """The states of eight motions forwards at doubles |τ| inside their next steps: (12, 8)."""
-        behind, found = self.behind, self.sampled
+        behind, sampled = self.behind, self.sampled
         first, second = self.clock[:LANES], self.clock[LANES : 2 * LANES]
         total = targets - first
         part = total - targets
@@ -339,7 +339,7 @@ class Eight:
         behind[:LANES] = total + low
         behind[LANES:] = low - (behind[:LANES] - total)
         self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
-        return found.reshape(12, LANES).copy()
+        return sampled.reshape(12, LANES).copy()
 
     def left_all(self) -> Doubles:
         """The steps that each lane may still take."""
@@ -390,7 +390,7 @@ class Eight:
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
-        tables = [self.scratch[place + ROW * n : place + ROW * (n + 1)] for place in (0, LOW)]
+        tables = [self.scratch[offset + ROW * n : offset + ROW * (n + 1)] for offset in (0, LOW)]
         return exact_state(numpy.concatenate(tables)[lane::LANES])
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
@@ -399,11 +399,11 @@ class Eight:
 
     def samples(self, times: dict[int, Fraction]) -> dict[int, Doubles]:
         """The states of some lanes, each at a time |τ| inside its next step: high words, then low ones, shape (12,)."""
-        behind, found = doubles(2 * LANES), doubles(12 * LANES)
+        behind, samples = doubles(2 * LANES), doubles(12 * LANES)
         for lane, time in times.items():
             behind[lane], behind[LANES + lane] = self._behind(lane, time)
-        self.functions["sample"](self.tables[2], self.schedule.order, pointer(behind), pointer(found))
-        return {lane: found[lane::LANES] for lane in times}
+        self.functions["sample"](self.tables[2], self.schedule.order, pointer(behind), pointer(samples))
+        return {lane: samples[lane::LANES] for lane in times}
 
     def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
         """τ of a time |τ| after the beginning of a lane's next step."""

@@ -90,10 +90,10 @@ _ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
 def splits(code: Code, units: list[Operand], slope: Operand) -> Operand:
     """Whether there are such units, a bit; units: 1.5 · 2^52 of them, lane by lane."""
     steepest = STEEPEST << SLOPE_BITS
-    found = code.unsigned_less(slope + steepest, 2 * steepest)
+    splits = code.unsigned_less(slope + steepest, 2 * steepest)
     for unit in units:
-        found &= code.all_of(in_range(unit))
-    return found
+        splits &= code.all_of(in_range(unit))
+    return splits
 
 
 def in_range(unit: Operand) -> Operand:
@@ -147,9 +147,9 @@ def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]
             total = high, total[1] + (rest + lost)
     assert total is not None
     whole, inverse = divisor
-    found = total[0] * inverse
-    rest = code.fma(-found, whole, total[0]) + total[1]
-    return code.quick_two_sum(found, rest * inverse)
+    quotient = total[0] * inverse
+    rest = code.fma(-quotient, whole, total[0]) + total[1]
+    return code.quick_two_sum(quotient, rest * inverse)
 
 
 def first_split(code: Code, units: list[Operand], slope: Operand, reach: Operand, depth: Operand) -> Operand:
@@ -158,11 +158,11 @@ def first_split(code: Code, units: list[Operand], slope: Operand, reach: Operand
     depth: log2 of the state and how many bits below it the products of the units of Ω and the largest may be.
     """
     lanes = [(units[0], 0), *((unit, 3) for unit in units)]
-    found = [code.lane(unit, lane).bits() for unit, lane in lanes]
-    largest = found[0]
-    for bits in found[1:]:
+    lanes_bits = [code.lane(unit, lane).bits() for unit, lane in lanes]
+    largest = lanes_bits[0]
+    for bits in lanes_bits[1:]:
         largest = code.larger(bits, largest)
-    both = found[0].unsigned_shift(_FRACTION_BITS) + largest.unsigned_shift(_FRACTION_BITS)
+    both = lanes_bits[0].unsigned_shift(_FRACTION_BITS) + largest.unsigned_shift(_FRACTION_BITS)
     units_bits = both.to_double() - 2.0 * (_BIAS + _FRACTION_BITS)
     length = reach - slope.to_double() * 2.0**-SLOPE_BITS
     fall = -SLACK - reach
@@ -239,7 +239,7 @@ class SplitOrders:
             return [*(word for pair in following for word in pair), *self._put(after, following, values[-width:])]
 
         row = series.row(start)
-        sides = [code.load(row, place) for place in self._places]
+        sides = [code.load(row, offset) for offset in self._places]
         values = code.loop(start, stop, order, [*last, *sides, *largest])
         return values[: 2 * width], values[-width:]
 
@@ -247,7 +247,7 @@ class SplitOrders:
     def _places(self) -> list[int]:
         """Where R and its parts are in a row, and the parts of each L."""
         lefts = (self.series.layout.left(v) for v in self.series.vectors)
-        return [0, 16, 24, *(place + k for place in lefts for k in (16, 24))]
+        return [0, 16, 24, *(offset + k for offset in lefts for k in (16, 24))]
 
     def _rise(self, m: Operand) -> Pair:
         """2^(e_m - e_0) and its inverse."""
@@ -269,12 +269,12 @@ class SplitOrders:
             split = parts(y[v], big)
             right = [series.side(part, RIGHT) for part in split] if v == 0 else []
             left = [series.side(part, LEFT) for part in split]
-            for part, place in ((right, 0), (left, series.layout.left(v))):
+            for part, offset in ((right, 0), (left, series.layout.left(v))):
                 if part:
-                    sides += [part[0] + part[1], *part][place > 0 :]
-                    code.store(part[0] + part[1], row, place)
+                    sides += [part[0] + part[1], *part][offset > 0 :]
+                    code.store(part[0] + part[1], row, offset)
                     for k, word in enumerate(part):
-                        code.store(word, row, place + 16 + 8 * k)
+                        code.store(word, row, offset + 16 + 8 * k)
         return sides + peaks
 
     def _products(self, n: Operand, sides: list[Operand]) -> list[Pair]:
@@ -283,7 +283,7 @@ class SplitOrders:
 
         def row(m: Index) -> list[Operand]:
             at = self.series.row(m)
-            return [code.load(at, place) for place in self._places]
+            return [code.load(at, offset) for offset in self._places]
 
         def both(m: Operand, sums: list[Operand]) -> list[Operand]:
             one, other = row(m), row(n - m)
@@ -300,12 +300,12 @@ class SplitOrders:
     def _added(self, one: list[Operand], other: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums of each vector, with the products of L of one order and R of another."""
         whole, coarse, fine = other[:3]
-        found = []
+        result = []
         for v in self.series.vectors:
             a, rest = one[3 + 2 * v : 5 + 2 * v]
             for left, right, total in zip((a, a, rest), (coarse, fine, whole), sums[3 * v : 3 * v + 3], strict=True):
-                found.append(self.series.code.fma(left, right, total))
-        return found
+                result.append(self.series.code.fma(left, right, total))
+        return result
 
     def _next(self, n: Operand, vector: int, sums: Pair, y: Pair) -> Pair:
         """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
@@ -379,8 +379,8 @@ def _put_samples(rows: Recurrence, orders: Pair, times: Sequence[Pair], result: 
     """
 
     def row(n: Operand) -> list[Pair]:
-        place = rows.row(n)
-        return [rows.pair(place, rows.layout.value(v)) for v in rows.vectors]
+        address = rows.row(n)
+        return [rows.pair(address, rows.layout.value(v)) for v in rows.vectors]
 
     spread = [(rows.code.spread(high), rows.code.spread(low)) for high, low in times]
     words = [word for sample in polynomials(rows.code, orders, spread, len(rows.vectors), row) for word in sample]
@@ -398,11 +398,11 @@ class _Follow(Following):
         self.times, self.layout = (code.arguments[5], code.arguments[6]), layout
         self.rows = Recurrence(code, layout, system, code.null, self.arrays[-1])
 
-    def covered(self, place: Operand) -> Operand:
-        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(place))
+    def covered(self, index: Operand) -> Operand:
+        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(index))
 
-    def aim(self, place: Operand) -> None:
-        for word, at in zip(self._target(place), (TARGET, TARGET_LOW), strict=True):
+    def aim(self, index: Operand) -> None:
+        for word, at in zip(self._target(index), (TARGET, TARGET_LOW), strict=True):
             self.code.store_one(word, self.arrays[1], at)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
@@ -419,25 +419,25 @@ class _Follow(Following):
         began, put = (self._clock(BEGAN), self._clock(BEGAN_LOW)), b.append_basic_block("put")
         sure, times, end = code.true, [], done
         for k in range(count):
-            place = code.smaller(done + k, self.times_count - 1)
-            at, known = behind(code, self._target(place), began, self._clock(SIGN))
-            is_covered = self.covered(place)
+            index = code.smaller(done + k, self.times_count - 1)
+            at, known = behind(code, self._target(index), began, self._clock(SIGN))
+            is_covered = self.covered(index)
             sure &= known | ~is_covered
             end += is_covered.extended()
             times.append(at)
         b.cbranch(sure, put, otherwise)
         b.position_at_end(put)
         result = code.address(self.result, done * (16 * self.layout.vectors))
-        low_order, order = (code.load_one(self.arrays[2], place) for place in (USED, ORDER))
+        low_order, order = (code.load_one(self.arrays[2], offset) for offset in (USED, ORDER))
         _put_samples(self.rows, (low_order, order), times, result)
         code.store_one(code.smaller(end, self.times_count), self.progress, 0)
         b.branch(head)
 
-    def _target(self, place: Operand) -> Pair:
-        return self.code.load_one(self.times[0], place), self.code.load_one(self.times[1], place)
+    def _target(self, index: Operand) -> Pair:
+        return self.code.load_one(self.times[0], index), self.code.load_one(self.times[1], index)
 
-    def _clock(self, place: int) -> Operand:
-        return self.code.load_one(self.arrays[1], place)
+    def _clock(self, index: int) -> Operand:
+        return self.code.load_one(self.arrays[1], index)
 
 
 class _Step(Stepping):
@@ -501,10 +501,10 @@ class _Step(Stepping):
         return (fits & near(slope, asked)) | ~split
 
     def _norm(self, n: Index) -> Operand:
-        row, found = self.series.row(n), self.code.zero
+        row, largest = self.series.row(n), self.code.zero
         for v in self.series.vectors:
-            found = self.code.larger(self.code.absolute(self.code.load(row, self.layout.value(v))), found)
-        return self.code.largest(found)
+            largest = self.code.larger(self.code.absolute(self.code.load(row, self.layout.value(v))), largest)
+        return self.code.largest(largest)
 
     def _length(self, order: Operand, start: Operand) -> Operand:
         """h > 0, from log2 |y_0| and the last two coefficients."""
@@ -535,21 +535,21 @@ class _Step(Stepping):
 
         def pairs(k: Operand, words: list[Operand]) -> list[Operand]:
             at = low_top - k
-            found: list[Operand] = []
+            sums: list[Operand] = []
             for index, (i, v) in enumerate(places):
                 total = times(code, (words[2 * index], words[2 * index + 1]), h4)
-                found += add(code, total, series.pair(row(at, i), self.layout.value(v)))
-            return found
+                sums += add(code, total, series.pair(row(at, i), self.layout.value(v)))
+            return sums
 
         sums = code.loop(0, top - low_top, plain, [code.zero] * len(places))
         words = code.loop(0, low_top + 1, pairs, [w for s in sums for w in (s, code.zero)])
-        quarter = {place: (words[2 * k], words[2 * k + 1]) for k, place in enumerate(places)}
-        found = []
+        quarter = {offset: (words[2 * k], words[2 * k + 1]) for k, offset in enumerate(places)}
+        result = []
         for v in series.vectors:
             even = add(code, times(code, quarter[2, v], h2), quarter[0, v])
             odd = add(code, times(code, quarter[3, v], h2), quarter[1, v])
-            found.append(code.quick_two_sum(*add(code, times(code, odd, h), even)))
-        return found
+            result.append(code.quick_two_sum(*add(code, times(code, odd, h), even)))
+        return result
 
     def _judge(self, length: Operand, low_order: Operand, start: Operand, result: list[Pair]) -> Operand:
         """Whether the step stands; sets the status, and the n0 of what comes next."""
@@ -597,6 +597,6 @@ class _Step(Stepping):
                 for word in range(2):
                     code.store(pair[word], self.state, 16 * vector + 8 * word)
             total, rest = later(code, (time, low), length)
-            for value, place in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
-                code.store_one(value, self.clock, place)
+            for value, offset in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
+                code.store_one(value, self.clock, offset)
             self.set_count(low_order, USED)

@@ -201,7 +201,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> ir.Fun
         total = Accumulator(code, grid, base, list(values[:-1]), values[-1])
         at = code.address(left, m * row)
         against = code.address(right, m * -row)
-        a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
+        a, c = ([code.load(base, 8 * i) for i in range(count)] for base in (at, against))
         # where a leading word is small in some lane, these would be left out alike at every step
         total.add_product(a, c, below=count == 2 and not grid.whole)
         return [*total.sums, total.seen]
@@ -232,8 +232,8 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
     left, right, terms, sums, seen, levels = code.arguments
     last, centre = levels - 1, _bits(grid.coarse(0))
 
-    def look(found: Operand, total: Operand) -> Operand:
-        return found | (total.bits() ^ centre)
+    def look(largest: Operand, total: Operand) -> Operand:
+        return largest | (total.bits() ^ centre)
 
     def exact_product(a: Operand, c: Operand, values: list[Operand]) -> list[Operand]:
         total = code.fma(a, c, values[0])
@@ -247,37 +247,37 @@ def write_long_kernel(module: ir.Module, grid: Grid, row: int) -> ir.Function:
         ahead = code.address(left, m * row)
         behind = code.address(right, m * -row)
 
-        def level(k: Operand, product: Callable[..., list[Operand]], found: list[Operand]) -> list[Operand]:
+        def level(k: Operand, product: Callable[..., list[Operand]], values: list[Operand]) -> list[Operand]:
             end, count = k * LANES, k + 1
 
-            def some(start: Operand, width: int, found: list[Operand]) -> list[Operand]:
+            def some(start: Operand, width: int, values: list[Operand]) -> list[Operand]:
                 for j in range(width):
-                    place = (start + j) * LANES
-                    pair = code.load(ahead, place), code.load(behind, end - place)
-                    found = product(*pair, found)
-                return found
+                    offset = (start + j) * LANES
+                    pair = code.load(ahead, offset), code.load(behind, end - offset)
+                    values = product(*pair, values)
+                return values
 
             groups = count // _UNROLLED
             whole = groups * _UNROLLED
-            found = code.loop(0, groups, lambda g, v: some(g * _UNROLLED, _UNROLLED, v), found)
-            return code.loop(whole, count, lambda i, v: some(i, 1, v), found)
+            values = code.loop(0, groups, lambda g, v: some(g * _UNROLLED, _UNROLLED, v), values)
+            return code.loop(whole, count, lambda i, v: some(i, 1, v), values)
 
         def exact_level(k: Operand, values: list[Operand]) -> list[Operand]:
-            place = k * LANES
-            total, lows = level(k, exact_product, [code.load(sums, place), code.zero])
-            found = look(values[1], total)
+            offset = k * LANES
+            total, lows = level(k, exact_product, [code.load(sums, offset), code.zero])
+            largest = look(values[1], total)
             total = code.fma(values[0], grid.apart, total)
-            code.store(total, sums, place)
-            return [lows, look(found, total)]
+            code.store(total, sums, offset)
+            return [lows, look(largest, total)]
 
-        lows, found = code.loop(0, last, exact_level, [code.zero, values[0]])
+        lows, largest = code.loop(0, last, exact_level, [code.zero, values[0]])
         low = level(last, rounded_product, [lows * grid.apart])[0]
-        place = last * LANES
-        code.store(code.load(sums, place) + low, sums, place)
-        return [found]
+        offset = last * LANES
+        code.store(code.load(sums, offset) + low, sums, offset)
+        return [largest]
 
-    found = code.loop(0, terms, term, [code.load(seen, 0).bits()])[0]
-    code.store(found.of_bits(), seen, 0)
+    total = code.loop(0, terms, term, [code.load(seen, 0).bits()])[0]
+    code.store(total.of_bits(), seen, 0)
     code.builder.ret_void()
     return made
 
@@ -292,21 +292,21 @@ def bounded_product(code: Code, grid: Grid, a: list[Operand], b: list[Operand], 
     2^3 + 2^2 + 2 (k − 1): less than 2^51 units for 24 words of 45 bits.
     """
     last = grid.words - 1
-    found, lows = [], [list[Operand]() for _ in range(grid.words)]
+    products, lows = [], [list[Operand]() for _ in range(grid.words)]
     for k in range(last):
         centre = total = code.constant(grid.centre(k))
         for i in range(k + 1 - zeros):
             after = code.fma(a[i], b[k - i], total)
             lows[k + 1].append(code.fma(a[i], b[k - i], -(after - total)))
             total = after
-        found.append(total - centre)
+        products.append(total - centre)
     total = code.zero
     # those of the level below the last first: where a leading word is 0 they are what is left
     for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
         if j >= zeros:
             total = code.fma(a[i], b[j], total)
-    found.append(total)
-    return [found[0], *(found[k] + in_pairs(lows[k]) if lows[k] else found[k] for k in range(1, last + 1))]
+    products.append(total)
+    return [products[0], *(products[k] + in_pairs(lows[k]) if lows[k] else products[k] for k in range(1, last + 1))]
 
 
 def passed_on(code: Code, grid: Grid, left: Operand, word: Operand) -> Operand:
@@ -336,11 +336,11 @@ def carried(code: Code, grid: Grid, words: list[Operand]) -> list[Operand]:
     for k in range(1, grid.words):
         big = code.constant(grid.coarse(k - 1))
         carries.append(words[k] + big - big)
-    found = []
+    result = []
     for k, word in enumerate(words):
         value = word if k == 0 else word - carries[k - 1]
-        found.append(carried_over(code, grid, carries[k], value) if k + 1 < grid.words else value)
-    return found
+        result.append(carried_over(code, grid, carries[k], value) if k + 1 < grid.words else value)
+    return result
 
 
 # Exact numbers as words on fixed grids, and which grid serves a number of bits.
@@ -378,13 +378,13 @@ def digits(value: Fraction, grid: Grid) -> list[float]:
 
 def words_of(whole: int, grid: Grid) -> list[float]:
     """So many of the last unit, as words."""
-    found = []
+    words = []
     for k in range(grid.words):
         shift = grid.bits * (grid.words - 1 - k)
         digit = (whole + (1 << shift >> 1)) >> shift if k < grid.words - 1 else whole
         whole -= digit << shift
-        found.append(float(digit) * grid.unit(k))
-    return found
+        words.append(float(digit) * grid.unit(k))
+    return words
 
 
 def exact(words: Doubles) -> Fraction:
@@ -434,8 +434,8 @@ def machine(grid: Grid, vectors: int) -> Machine:
             value = size = far = code.zero
             for k in reversed(range(words)):
                 y = component(code, side[words * (1 + v) + k])
-                magnitude, place = code.absolute(y), 8 * (words * v + k)
-                code.store(code.load(added, place) + magnitude, added, place)
+                magnitude, offset = code.absolute(y), 8 * (words * v + k)
+                code.store(code.load(added, offset) + magnitude, added, offset)
                 value, size = (carried_over(code, grid, *pair) for pair in ((value, y), (size, magnitude)))
                 far = size if k == FIRST_BEHIND else far
             here = (n * vectors + v) * 8

@@ -128,12 +128,12 @@ class WordSeries:
     def scaled(self, rate: int) -> Doubles:
         """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
         exponents = rate * numpy.arange(len(self.sizes))
-        found: Doubles = numpy.ldexp(self.sizes, exponents)
+        sizes: Doubles = numpy.ldexp(self.sizes, exponents)
         if self.behind is not None:
             grid = self.certified.grid
             far = numpy.ldexp(self.behind, exponents - grid.bits * (arithmetic.FIRST_BEHIND + 1))
-            found = numpy.where(self.sizes < _BEHIND_ALONE, far, found)
-        return found
+            sizes = numpy.where(self.sizes < _BEHIND_ALONE, far, sizes)
+        return sizes
 
     def rounded(self, orders: int) -> Doubles:
         """b_0 to b_orders of ``nearest``, as many as there are."""
@@ -194,10 +194,10 @@ class CertifiedSeries:
             .rows[: size_of(grid, self.vectors).row * length]
             .reshape(length, 1 + self.vectors, grid.words, 8)
         )
-        found = components(table[:, 1])
+        parts = components(table[:, 1])
         if self.vectors == 2:
-            found += components(table[:, 2])[3:]
-        return [in_ulps(component, grid).tolist() for component in found]
+            parts += components(table[:, 2])[3:]
+        return [in_ulps(component, grid).tolist() for component in parts]
 
     def computed(self, centre: Sequence[int], halvings: int) -> int:
         """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
@@ -210,8 +210,8 @@ class CertifiedSeries:
             scratch.state[:] = centre.words
         else:
             scratch.state[self.places] = [words_of(value, self.grid) for value in centre]
-        found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
-        return int(found)
+        status = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
+        return int(status)
 
     def scratch(self) -> _Scratch:
         """This thread's."""
@@ -242,7 +242,7 @@ class CertifiedSeries:
             (max(state[1:]), 2.0 ** (grid.bits + 2)),
             (once, 2.0 ** (grid.bits + _carried_bits(grid) - 53)),
         )
-        if not all(found <= limit for found, limit in limits):
+        if not all(size <= limit for size, limit in limits):
             return None
         harmonic = 1 + log(max(1, orders))
         alone = (2 * once + self._of_constants[fields - 1]) * harmonic
@@ -255,8 +255,8 @@ class CertifiedSeries:
         constants[0] = 2.0**grid.bits
         sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0 ** _carried_bits(grid)))
         sources[0] = 2.0**51
-        each, once = _error(grid, _levels(grid, constants, sources)[1], count)
-        return count * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
+        error, once = _error(grid, _levels(grid, constants, sources)[1], count)
+        return count * (error + 2.0 ** (50 - grid.bits) * 1.01) + once
 
 
 def _largest(sizes: Doubles, length: int, size: int) -> Doubles:

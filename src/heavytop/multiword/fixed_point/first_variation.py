@@ -226,7 +226,7 @@ class CertifiedColumns:
         self.certified, self.data = certified, bool(slopes)
         problem, grid = certified.problem, certified.grid
         self.machine = machine(grid, problem.system, self.data)
-        rows = [row for given in slopes for row in given.vectors[0]]
+        rows = [row for slope in slopes for row in slope.vectors[0]]
         words = words_of_rows(rows, grid, Fraction(1, 2**certified.excess)) if rows else doubles(0)
         size = 8 * grid.words * (1 + len(permutations(problem.system)))
         self._words = words
@@ -244,9 +244,9 @@ class CertifiedColumns:
         row, most, reached = len(rows) // (most_orders(certified.grid) + 2), most_orders(certified.grid), order
         while True:
             rows[row * (order + 1) : row * (reached + 1)] = 0  # what the motion has no coefficients for
-            found = self._of_order(own, widest, reached, halvings, values)
-            if found is None or reached == most or found.ends_small(certified.grid):
-                return found
+            columns = self._of_order(own, widest, reached, halvings, values)
+            if columns is None or reached == most or columns.ends_small(certified.grid):
+                return columns
             reached = min(most, reached + reached // 2 + 8)
 
     def _of_order(self, own: _Scratch, widest: Doubles, order: int, halvings: int, values: bool) -> WordColumns | None:
@@ -305,8 +305,8 @@ class _Scratch:
         room = WordRows.size(grid, 1, orders)
         self.state, self.rows = doubles(8 * grid.words), doubles(room.rows)
         gathered, places = doubles(16 * grid.words * orders), numpy.zeros(room.places + grid.words, numpy.int64)
-        given, sums = [self.state, certified.constants, certified.inverses, self.rows], doubles(room.sums)
-        kept: list[Doubles | Integers] = [*given, sums, places, doubles(8)]
+        inputs, sums = [self.state, certified.constants, certified.inverses, self.rows], doubles(room.sums)
+        kept: list[Doubles | Integers] = [*inputs, sums, places, doubles(8)]
         self.pointers, self.gathered = [pointer(array) for array in kept], pointer(gathered)
         nearest = doubles(8 * orders)
         self._kept = [*kept, gathered, nearest]
@@ -323,11 +323,11 @@ class _Scratch:
     def of_motion(self, certified: CertifiedSeries, order: int) -> Doubles:
         """The largest words of R and L of the motion."""
         certified.extents(certified.scratch().pointers[3], order, *self.measures[0])
-        found: Doubles = self.widest[0].copy()
-        return found
+        sizes: Doubles = self.widest[0].copy()
+        return sizes
 
     def values(self, certified: CertifiedSeries, order: int) -> list[list[int]]:
         """Every v_n of each component."""
         grid = certified.grid
         left = self.rows[: 16 * grid.words * (order + 1)].reshape(order + 1, 2, grid.words, 8)[:, 1]
-        return [in_ulps(each, grid).tolist() for each in components(left)]
+        return [in_ulps(part, grid).tolist() for part in components(left)]

@@ -37,36 +37,36 @@ machine = once(steps.build)
 
 def excess(problem: Scaled) -> int:
     """e, so that the coefficients over 2^e are at most 1: as many bits are lost in products with them."""
-    largest, found = problem.coefficients.largest, 0
-    while largest > 2**found:
-        found += 1
-    return found
+    largest, excess = problem.coefficients.largest, 0
+    while largest > 2**excess:
+        excess += 1
+    return excess
 
 
 def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fraction(1)) -> Doubles:
     """The words of the coefficients times ``factor``, over 2^over."""
-    given = problem.coefficients
-    flat = [row for vector in (given.paired if grid.bounded else given.vectors) for row in vector]
+    coefficients = problem.coefficients
+    flat = [row for vector in (coefficients.paired if grid.bounded else coefficients.vectors) for row in vector]
     return words_of_rows(flat, grid, factor / 2**over)
 
 
 def words_of_rows(rows: Sequence[Sequence[Fraction]], grid: Grid, share: Fraction) -> Doubles:
     """The words of eight exact numbers a row, times ``share``."""
-    found = doubles(8 * grid.words * len(rows))
-    table = found.reshape(len(rows), grid.words, 8)
+    result = doubles(8 * grid.words * len(rows))
+    table = result.reshape(len(rows), grid.words, 8)
     words = {c: digits(c * share, grid) for c in {c for row in rows for c in row}}
     for index, row in enumerate(rows):
         for lane, c in enumerate(row):
             if c:
                 table[index, :, lane] = words[c]
-    return found
+    return result
 
 
 def inverses(grid: Grid) -> Doubles:
     """1/(n + 1) for every order that a step may take."""
-    found = doubles(most_orders(grid) + 1)
-    found[:] = 1 / numpy.arange(1, most_orders(grid) + 2)
-    return found
+    values = doubles(most_orders(grid) + 1)
+    values[:] = 1 / numpy.arange(1, most_orders(grid) + 2)
+    return values
 
 
 def spread(problem: Scaled) -> int:
@@ -107,8 +107,8 @@ class Fixed(ResumableRun):
         size, scratch = 8 * grid.words * self.vectors, size_of(grid, self.vectors)
         self.excess = excess(problem)
         self.words, self.result = doubles(size), doubles(2 * size)
-        for place, value in zip(self._places, problem.state, strict=True):
-            self.words[place : place + 8 * grid.words : 8] = digits(value, grid)
+        for offset, value in zip(self._places, problem.state, strict=True):
+            self.words[offset : offset + 8 * grid.words : 8] = digits(value, grid)
         self.inverses = inverses(grid)
         self.rows, self.sums, self.seen = doubles(scratch.rows), doubles(scratch.sums), doubles(8)
         self.places = numpy.zeros(scratch.places, numpy.int64)
@@ -144,7 +144,7 @@ class Fixed(ResumableRun):
         return self._exact(self.words)
 
     def _exact(self, words: Doubles) -> tuple[Fraction, ...]:
-        return tuple(exact(words[place : place + 8 * self.grid.words : 8]) for place in self._places)
+        return tuple(exact(words[offset : offset + 8 * self.grid.words : 8]) for offset in self._places)
 
     def advance(self, target: Fraction, steps_at_most: int) -> Status:
         return self._advance(_not_before(min(target, _LARGEST_TIME)), steps_at_most)
@@ -164,9 +164,9 @@ class Fixed(ResumableRun):
             return None
         at = doubles(self.grid.words)
         at[:] = digits((time - self._began) / length, self.grid)
-        found = doubles(sample_row(self.grid, self.vectors))
-        self._samples((pointer(self.rows), pointer(at), pointer(found)), 0, 1)
-        return self.exact_state(found, time)
+        row = doubles(sample_row(self.grid, self.vectors))
+        self._samples((pointer(self.rows), pointer(at), pointer(row)), 0, 1)
+        return self.exact_state(row, time)
 
     @property
     def _began(self) -> Fraction:
@@ -184,14 +184,14 @@ class Fixed(ResumableRun):
         are_doubles = isinstance(times, numpy.ndarray)
         ceilings = times if isinstance(times, numpy.ndarray) else numpy.array([_not_before(time) for time in times])
         count, status, limit, words = len(times), Status.OK, most_of(self.grid), self.grid.words
-        at, found = doubles(words * count), doubles(sample_row(self.grid, self.vectors) * count)
-        pointers = pointer(self.rows), pointer(at), pointer(found)
-        table, others = found.reshape(count, -1), dict[int, tuple[Fraction, ...] | None]()
+        at, rows = doubles(words * count), doubles(sample_row(self.grid, self.vectors) * count)
+        pointers = pointer(self.rows), pointer(at), pointer(rows)
+        table, others = rows.reshape(count, -1), dict[int, tuple[Fraction, ...] | None]()
         progress = numpy.zeros(2, numpy.int64)
         while progress[0] < count and status is Status.OK:
             done, taken = map(int, progress)
             if are_doubles:
-                status = self._follow(ceilings, at, progress, found)
+                status = self._follow(ceilings, at, progress, rows)
                 if [*map(int, progress)] != [done, taken] or status is not Status.OK:
                     continue
             covered = int(ceilings.searchsorted(self.clock[steps.TIME], "right")) if self.steps else 0
@@ -206,18 +206,18 @@ class Fixed(ResumableRun):
             progress[0] = covered
         return status, self._components(table[: progress[0]]), others
 
-    def _follow(self, times: Doubles, at: Doubles, progress: Any, found: Doubles) -> Status:
+    def _follow(self, times: Doubles, at: Doubles, progress: Any, samples: Doubles) -> Status:
         """Some steps and their samples, as far as doubles tell."""
         before, arrays = int(progress[1]), [pointer(array) for array in (times, at, progress)]
         follow = self.machine.functions["follow"]
-        follow(*self.arrays, *arrays, len(times), before + _STEPS_AT_ONCE, pointer(found))
+        follow(*self.arrays, *arrays, len(times), before + _STEPS_AT_ONCE, pointer(samples))
         self.steps += int(progress[1]) - before
         return Status(int(self.counts[steps.STATUS]))
 
     def _samples(self, pointers: tuple[Any, Any, Any], first: int, last: int) -> None:
         """Samples of the last step from one to before another; pointers: to its rows, their words of x, the result."""
-        order, (rows, at, found) = int(self.counts[steps.ORDERS]), pointers
-        self.machine.functions["samples"](rows, order, at, first, last, found)
+        order, (rows, at, samples) = int(self.counts[steps.ORDERS]), pointers
+        self.machine.functions["samples"](rows, order, at, first, last, samples)
 
     def _inside(self, times: Sequence[Fraction]) -> list[float]:
         """The words of (time − began)/h for times in the last step."""
@@ -234,15 +234,15 @@ class Fixed(ResumableRun):
         table = rows.reshape(len(rows), -1, 8)
         left = [table[:, count * v : count * (v + 1)] for v in range(self.vectors)]
         lanes = [[words[:, :, lane] for lane in range(6)] for words in left]
-        found = numpy.zeros((len(rows), count + 1, len(self.problem.state)))
-        for place, value in enumerate(state_of_left(lanes)):
-            found[:, :count, place] = value
+        components = numpy.zeros((len(rows), count + 1, len(self.problem.state)))
+        for index, value in enumerate(state_of_left(lanes)):
+            components[:, :count, index] = value
         for v, words in enumerate(left):
             whole, half = words[:, -1, 4:2:-1], words[:, -1, 5:6] / 2
             total = whole - half
             part = total - whole
-            found[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (whole - (total - part)) - (half + part)
-        return found
+            components[:, -1, 3 + 3 * v : 6 + 3 * v : 2] = (whole - (total - part)) - (half + part)
+        return components
 
     def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
         """The state out of a row of samples, at ``time`` in the last step."""
@@ -255,13 +255,13 @@ class Fixed(ResumableRun):
 
     def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
         """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
-        found, rows = doubles(len(words)), doubles(len(self.rows))
+        moved, rows = doubles(len(words)), doubles(len(self.rows))
         arrays = [words, *self._scratch(constants(self.problem, self.grid, self.excess, span), rows)]
         factor, raises = steps.raises_of(self.excess)
-        call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(found)]
+        call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(moved)]
         orders = self.machine.functions["series"](*call)
         if orders >= 0:
-            return found
+            return moved
         half = None if halvings == 0 else self._moved(words, span / 2, halvings - 1)
         return None if half is None else self._moved(half, span / 2, halvings - 1)
 
@@ -281,9 +281,9 @@ class Fixed(ResumableRun):
         words = (self.clock[steps.BEGAN], *self._before())
         return (str(halvings), *(float(word).hex() for word in words))
 
-    def restore(self, place: tuple[str, ...], steps_before: int) -> None:
-        self.counts[steps.HALVINGS] = int(place[0])
-        words = [float.fromhex(text) for text in place[1:]]
+    def restore(self, numbers: tuple[str, ...], steps_before: int) -> None:
+        self.counts[steps.HALVINGS] = int(numbers[0])
+        words = [float.fromhex(text) for text in numbers[1:]]
         self.clock[steps.TIME] = words[0]
         self.words[:] = words[1:]
         self.steps = steps_before
@@ -291,11 +291,11 @@ class Fixed(ResumableRun):
 
 def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
     """Components out of L of each vector: Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, or the last three with ξ for γ."""
-    found: list[Any] = []
+    state: list[Any] = []
     for vector, left in enumerate(lanes):
         middle = left[5] / 2
-        found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
-    return tuple(found)
+        state += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
+    return tuple(state)
 
 
 def _nearest(value: int, shift: int) -> int:

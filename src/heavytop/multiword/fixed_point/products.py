@@ -141,9 +141,9 @@ _PRODUCTS = 120
 _ROUND = 1.5 * 2.0**52
 
 
-def rounded(code: Code, value: Operand, place: int = 0) -> Operand:
+def rounded(code: Code, value: Operand, bit: int = 0) -> Operand:
     """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
-    big = code.constant(_ROUND * 2.0**place)
+    big = code.constant(_ROUND * 2.0**bit)
     return value + big - big
 
 
@@ -180,16 +180,16 @@ def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> ir
     begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
 
     def order(m: Operand, values: list[Operand]) -> list[Operand]:
-        at, found = code.load_one(where, m), list(values)
+        at, sums = code.load_one(where, m), list(values)
         one, other = code.address(left, at), code.address(right, -at)
         a = [code.load(one, LANES * i) for i in range(side)]
         for j in range(side):
             c = code.load(other, LANES * j)
             for i in range(side):
                 if i + j < levels:
-                    place = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
-                    found[place] = code.multiply_add(a[i], c, found[place])
-        return found
+                    index = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
+                    sums[index] = code.multiply_add(a[i], c, sums[index])
+        return sums
 
     def group(g: Operand, _: list[Operand]) -> None:
         start = g * most
@@ -211,9 +211,9 @@ def _add_levels(code: Code, sums: Operand, begins: list[int], values: list[Opera
         carries.append(rounded(code, first, BITS))
         rest.append(first - carries[-1])
     for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
-        place = LANES * level
-        total = code.load(sums, place) + value
-        code.store(code.multiply_add(carry, 2.0**-BITS, total), sums, place)
+        offset = LANES * level
+        total = code.load(sums, offset) + value
+        code.store(code.multiply_add(carry, 2.0**-BITS, total), sums, offset)
 
 
 def write_sums(module: ir.Module, wide: bool) -> ir.Function:
@@ -327,7 +327,7 @@ class DigitRows(Rows):
     def stored(self, n: Operand, vector: int) -> list[Operand]:
         code, grid, count = self.code, self.grid, digits_of(self.grid)
         at = code.address(self.rows, n * self.size(grid, self.vectors, 1).row)
-        found = [code.zero] * grid.words
+        words = [code.zero] * grid.words
         for j in range(count):
             exponent = _HEAD - BITS * (j + 1)
             digit = code.load(at, LANES * (_BEFORE + count * (1 + vector) + j))
@@ -336,18 +336,18 @@ class DigitRows(Rows):
             if k:  # what is large beside that unit goes to the word before
                 big = code.constant(grid.centre(k - 1))
                 high = value + big - big
-                found[k - 1] += high
+                words[k - 1] += high
                 value -= high
-            found[k] += value
-        return found
+            words[k] += value
+        return words
 
     def begin(self, y: list[Operand], wide: Operand) -> Operand:
         return self.keep(0, y, self.code.integer(0), wide)[2]
 
     def keep(self, n: Index, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand, Operand]:
         code, grid = self.code, self.grid
-        for place, word in enumerate(y):
-            wide = self.watch(wide, word, place % grid.words, grid.most_bits(place % grid.words))
+        for index, word in enumerate(y):
+            wide = self.watch(wide, word, index % grid.words, grid.most_bits(index % grid.words))
         count, start = digits_of(grid), code.integer(n) * self.size(grid, self.vectors, 1).row
         at = code.address(self.rows, start)
         for part, words in enumerate(self.sides(y)):
@@ -405,8 +405,8 @@ class DigitRows(Rows):
 
         level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
         limit = level + _BEFORE
-        again, found = b.append_basic_block("again"), b.append_basic_block("found")
-        b.cbranch(largest > limit, again, found)
+        again, exit_block = b.append_basic_block("again"), b.append_basic_block("found")
+        b.cbranch(largest > limit, again, exit_block)
         b.position_at_end(again)
 
         def clip(m: Operand, _: list[Operand]) -> None:
@@ -415,24 +415,24 @@ class DigitRows(Rows):
         code.loop(0, n + 1, clip, [])
         code.add_incoming([largest], [limit])
         b.branch(search)
-        b.position_at_end(found)
+        b.position_at_end(exit_block)
         return level
 
     def _digits(self, words: list[Operand]) -> list[Operand]:
         """The digits of words, the last rounded."""
         code, grid, count = self.code, self.grid, digits_of(self.grid)
-        found: list[Any] = [None] * count
+        digits: list[Any] = [None] * count
         for k, word in enumerate(words):
             rest = _times(code, word, _raised(grid))
             for j in range(self._first_digit(k), count):
                 exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
                 piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
-                found[j] = piece if found[j] is None else found[j] + piece
+                digits[j] = piece if digits[j] is None else digits[j] + piece
                 if exact:
                     break
                 rest -= piece
-        carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
-        carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
+        carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(digits[1:])), None]
+        carried = [self._carried(*three) for three in zip(digits, carries, carries[1:], strict=False)]
         return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
     def _carried(self, digit: Operand, out: Operand | None, into: Operand | None) -> Operand:
@@ -450,18 +450,18 @@ class DigitRows(Rows):
     def _words(self, sums: list[Operand]) -> list[Operand]:
         """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
         code, grid = self.code, self.grid
-        found: list[Any] = [None] * grid.words
+        words: list[Any] = [None] * grid.words
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
             rest = _times(code, sums[index], unit + _raised(grid))
             for k in range(min(grid.words - 1, max(0, (3 - unit - SUM_BITS) // grid.bits)), grid.words):
                 exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
                 piece = rest if exact else rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
-                found[k] = piece if found[k] is None else found[k] + piece
+                words[k] = piece if words[k] is None else words[k] + piece
                 if exact:
                     break
                 rest -= piece
-        return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in found]
+        return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in words]
 
 
 def _raised(grid: Grid) -> int:
@@ -555,15 +555,15 @@ class WordRows(Rows):
         code, b, words = self.code, self.code.builder, self.grid.words
         row = self.size(self.grid, self.vectors, 1).row
 
-        def place(rows: WordRows, k: Operand) -> Operand:
+        def offset(rows: WordRows, k: Operand) -> Operand:
             return code.load_one(rows.places, k)
 
         def left(u: Operand, _: list[Operand]) -> None:
-            begin, end = place(lefts[0], u), place(lefts[0], u + 1)
+            begin, end = offset(lefts[0], u), offset(lefts[0], u + 1)
 
             def right(w: Operand, _: list[Operand]) -> None:
-                low = code.larger(code.larger(begin, n - place(rights[0], w + 1) + 1), 0)
-                high = code.smaller(code.smaller(end, n - place(rights[0], w) + 1), n + 1)
+                low = code.larger(code.larger(begin, n - offset(rights[0], w + 1) + 1), 0)
+                high = code.smaller(code.smaller(end, n - offset(rights[0], w) + 1), n + 1)
                 count = high - low
                 with b.if_then(count > 0):
                     at = low * row + u * 8
@@ -585,11 +585,11 @@ class WordRows(Rows):
     def end_sums(self) -> list[Operand]:
         """S as K words, not carried, after a look at each."""
         code, words, seen = self.code, self.grid.words, self.seen
-        found = [code.load(self.sums, 8 * k) for k in range(words)]
-        watched = Accumulator(code, self.grid, 0, found, code.load(seen, 0).bits())
+        sums = [code.load(self.sums, 8 * k) for k in range(words)]
+        watched = Accumulator(code, self.grid, 0, sums, code.load(seen, 0).bits())
         watched.look_at_all()
         code.store(watched.seen.of_bits(), seen, 0)
-        return summed(code, self.grid, found)
+        return summed(code, self.grid, sums)
 
     def _call(self, skipped: Operand, arguments: list[Operand]) -> None:
         """The kernel for the levels behind ``skipped`` leading zero words."""
@@ -622,11 +622,11 @@ class WordRows(Rows):
     def _folded(self, y: list[Operand], zeros: Operand, wide: Operand) -> tuple[list[Operand], Operand]:
         """Words that count as 0 and are not: added to the first that does not."""
         code = self.code
-        found, left = [], code.zero
+        folded, left = [], code.zero
         for k, word in enumerate(y):
             value = passed_on(code, self.grid, left, word)
             wide = self.watch(wide, value, k, self.grid.most_bits(k))
             skipped = code.integer(k) < zeros
-            found.append(code.select(skipped, code.zero, value))
+            folded.append(code.select(skipped, code.zero, value))
             left = code.select(skipped, value, code.zero)
-        return found, wide
+        return folded, wide

@@ -117,8 +117,8 @@ class SeriesCode:
             one = carried(code, self.grid, carried(code, self.grid, one))
             for k, word in enumerate(one):
                 code.store(word, result, 8 * (words * v + k))
-        found = code.select(settled, orders, UNSETTLED)
-        b.ret(code.select(quiet, found, FIRED))
+        count = code.select(settled, orders, UNSETTLED)
+        b.ret(code.select(quiet, count, FIRED))
         return made
 
     def _orders(self, first: list[Operand]) -> tuple[Operand, Operand, Operand, list[Operand]]:
@@ -140,8 +140,8 @@ class SeriesCode:
         b.cbranch((n < most_orders(self.grid)) & (small < 2), body, out)
         b.position_at_end(body)
         after = n + 1
-        found, wide_after = self._order(n, zeros, wide, y)
-        following, zeros_after, wide_after = self.rows.keep(after, found, zeros, wide_after)
+        status, wide_after = self._order(n, zeros, wide, y)
+        following, zeros_after, wide_after = self.rows.keep(after, status, zeros, wide_after)
         size = self.rows.largest_sum(following)
         counted = small + 1
         small_after = code.select(size <= self.grid.smallest, counted, 0)
@@ -159,14 +159,14 @@ class SeriesCode:
     def _order(self, n: Operand, zeros: Operand, wide: Operand, y: list[Operand]) -> tuple[list[Operand], Operand]:
         """y_(n+1) and the largest word over its limit."""
         words = self.grid.words
-        found: list[Operand] = []
+        order: list[Operand] = []
         for v in range(self.vectors):
             products = self.rows.products(n, zeros, v)
             rates, wide = self._rates(v, products, y[words * v : words * (v + 1)], wide)
             raised, wide = self._raised(rates, wide)
             quotient, wide = self._divided(n, self._times(raised), wide)
-            found += quotient
-        return found, wide
+            order += quotient
+        return order, wide
 
     def _rates(
         self, vector: int, sums: list[Operand], y: list[Operand], wide: Operand
@@ -184,20 +184,20 @@ class SeriesCode:
 
     def _bounded_rates(self, vector: int, gathered: list[Operand], y: list[Operand]) -> list[Operand]:
         code, grid, (pairs, second) = self.code, self.grid, paired_permutations(self.system)
-        place = (1 + len(pairs)) * vector
-        found = bounded_product(code, grid, self._constants(place), gathered)
+        offset = (1 + len(pairs)) * vector
+        rates = bounded_product(code, grid, self._constants(offset), gathered)
         if vector and second:
-            return found  # neither weight nor rotor turns an attitude
+            return rates  # neither weight nor rotor turns an attitude
         for k, lanes in enumerate(pairs, 1):
             moved = [code.shuffle(word, code.zero, lanes) for word in y]
-            linear = bounded_product(code, grid, self._constants(place + k), moved)
+            linear = bounded_product(code, grid, self._constants(offset + k), moved)
             if second:
                 parts = [[code.shuffle(word, code.zero, half) for half in _HALVES] for word in linear]
                 linear = [one + other for one, other in parts]
             if k > 1:  # sums of more products than two beside the first would outgrow their words
-                found = carried(code, grid, found)
-            found = [a + b for a, b in zip(found, linear, strict=True)]
-        return found
+                rates = carried(code, grid, rates)
+            rates = [a + b for a, b in zip(rates, linear, strict=True)]
+        return rates
 
     def _watched_rates(self, vector: int, gathered: list[Operand], y: list[Operand]) -> list[Operand]:
         code, grid, seen = self.code, self.grid, self.code.arguments[6]
@@ -219,7 +219,7 @@ class SeriesCode:
 
     def _gathered(self, total: list[Operand]) -> list[Operand]:
         code, zero = self.code, self.code.zero
-        found = []
+        gathered = []
         for word in total:
             parts = [
                 code.shuffle(word, zero, [*(lane if sign else _NONE for lane, sign in column), _NONE, _NONE])
@@ -227,8 +227,8 @@ class SeriesCode:
             ]
             third, fourth = (code.constant([*(sign for _, sign in column), 0, 0]) for column in GATHERED[2:])
             others = code.fma(parts[3], fourth, parts[2] * third)
-            found.append(parts[0] + parts[1] + others)
-        return found
+            gathered.append(parts[0] + parts[1] + others)
+        return gathered
 
     def _raised(self, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
         """Multiplied by 16 as often as is asked; seldom at all."""
@@ -245,32 +245,32 @@ class SeriesCode:
 
     def _times(self, words: list[Operand]) -> list[Operand]:
         """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
-        code, found, left = self.code, [], None
+        code, products, left = self.code, [], None
         factor = code.spread(self.code.arguments[7])
         for k, word in enumerate(words):
             big = code.constant(self.grid.centre(k))
             high = code.fma(word, factor, big) - big
             low = code.fma(word, factor, -high)
-            found.append(high if left is None else passed_on(code, self.grid, left, high))
+            products.append(high if left is None else passed_on(code, self.grid, left, high))
             left = low
-        return found
+        return products
 
     def _divided(self, n: Operand, words: list[Operand], wide: Operand) -> tuple[list[Operand], Operand]:
         """Divided by n + 1, digit by digit: each remainder is exact and goes to the next word."""
         code = self.code
         after = (n + 1).to_double()
         divisor, inverse = code.spread(after), code.spread(code.load_one(self.code.arguments[2], n))
-        found, rests = [], list[Operand]()
+        quotients, rests = [], list[Operand]()
         for k, word in enumerate(words):
             value = passed_on(code, self.grid, rests[-1], word) if rests else word
             wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else WIDEST)
             big = code.constant(self.grid.centre(k))
             quotient = code.fma(value, inverse, big) - big
             rests.append(code.fma(-quotient, divisor, value))
-            found.append(quotient)
+            quotients.append(quotient)
         if not self.grid.whole:
-            found[-1] = code.fma(rests[-1], inverse, found[-1])
-        return found, wide
+            quotients[-1] = code.fma(rests[-1], inverse, quotients[-1])
+        return quotients, wide
 
 
 # The polynomial of a step on a grid of K words, at times inside the step: the function ``samples``.
@@ -316,21 +316,21 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
     def several(block: Operand, _: list[Operand]) -> None:
         begin = first + block * count
         places = [code.smaller(begin + i, last - 1) for i in range(count)]
-        starts = [code.address(at, place * words) for place in places]
+        starts = [code.address(at, offset * words) for offset in places]
         x = [[code.spread(code.load_one(start, k)) for k in range(words)] for start in starts]
 
         def term(zeros: int, k: Operand, values: list[Operand]) -> list[Operand]:
-            rows, found = [kept.stored(order - k, v) for v in range(vectors)], []
+            rows, results = [kept.stored(order - k, v) for v in range(vectors)], []
             for i in range(count):
                 sums, largest = [], values[width * (i + 1) - 1]
                 for v, row in enumerate(rows):
-                    place = width * i + words * v
-                    product = bounded_product(code, grid, x[i], values[place : place + words], zeros)
+                    offset = width * i + words * v
+                    product = bounded_product(code, grid, x[i], values[offset : offset + words], zeros)
                     total = carried(code, grid, [one + other for one, other in zip(product, row, strict=True)])
                     largest = code.larger(code.absolute(total[0]), largest)
                     sums += total
-                found += [*sums, largest]
-            return found
+                results += [*sums, largest]
+            return results
 
         def vanish(zeros: int, values: list[Operand]) -> Operand:
             begins = [width * i + words * v for i in range(count) for v in range(vectors)]
@@ -342,8 +342,8 @@ def write_samples(module: ir.Module, grid: Grid, vectors: int) -> ir.Function:
         for zeros in reversed(range(0, words, -(-words // _PARTS))):
             holds = partial(vanish, zeros) if zeros else None
             k, values = code.loop_while(k, order + 1, holds, partial(term, zeros), values)
-        for i, place in enumerate(places):
-            row = code.address(result, place * (8 * width))
+        for i, offset in enumerate(places):
+            row = code.address(result, offset * (8 * width))
             for index, value in enumerate(values[width * i : width * (i + 1)]):
                 code.store(value, row, 8 * index)
 
@@ -466,11 +466,11 @@ class _Follow(Following):
         self.grid, self.row, self.samples = grid, sample_row(grid, vectors), samples
         self.times, self.at = code.arguments[10:12]
 
-    def covered(self, place: Operand) -> Operand:
-        return self.code.load_one(self.times, place) <= self._clock(TIME)
+    def covered(self, index: Operand) -> Operand:
+        return self.code.load_one(self.times, index) <= self._clock(TIME)
 
-    def aim(self, place: Operand) -> None:
-        self.code.store_one(self.code.load_one(self.times, place), self.arrays[8], TARGET)
+    def aim(self, index: Operand) -> None:
+        self.code.store_one(self.code.load_one(self.times, index), self.arrays[8], TARGET)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         code = self.code
@@ -487,23 +487,23 @@ class _Follow(Following):
         entry, head, body, out = b.block, *map(b.append_basic_block, ("while", "holds", "so_far"))
         b.branch(head)
         b.position_at_end(head)
-        place = code.phi(INT)
-        code.add_incoming([place], [start], entry)
-        b.cbranch(place < stop, body, out)
+        index = code.phi(INT)
+        code.add_incoming([index], [start], entry)
+        b.cbranch(index < stop, body, out)
         b.position_at_end(body)
-        found, after = holds(place), place + 1
-        code.add_incoming([place], [after])
-        b.cbranch(found, head, out)
+        condition, after = holds(index), index + 1
+        code.add_incoming([index], [after])
+        b.cbranch(condition, head, out)
         b.position_at_end(out)
-        return place
+        return index
 
-    def _is_known(self, place: Operand) -> Operand:
+    def _is_known(self, index: Operand) -> Operand:
         """Whether a time is in the last step and its words are exact, a bit; puts them.
 
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
         code, grid = self.code, self.grid
-        time, began, end = code.load_one(self.times, place), self._clock(BEGAN), self._clock(TIME)
+        time, began, end = code.load_one(self.times, index), self._clock(BEGAN), self._clock(TIME)
         rest = (time - began) / (end - began)
         near = time <= began + began
         known = (time <= end) & (near | (began == 0))
@@ -512,18 +512,18 @@ class _Follow(Following):
             low = code.floor(digits)
             above = digits - low >= 0.5
             word = (low + code.select(above, 1.0, 0.0)) * grid.unit(k)
-            code.store_one(word, self.at, place * grid.words + k)
+            code.store_one(word, self.at, index * grid.words + k)
             rest -= word
         return known & (rest == 0)
 
-    def _is_in_range(self, place: Operand) -> Operand:
+    def _is_in_range(self, index: Operand) -> Operand:
         """Whether the partial sums of a sample were in their range, a bit."""
-        row = self.code.address(self.result, place * self.row)
+        row = self.code.address(self.result, index * self.row)
         largest = self.code.load(row, self.row - 8)
         return self.code.all_of(largest <= most_of(self.grid))
 
-    def _clock(self, place: int) -> Operand:
-        return self.code.load_one(self.arrays[8], place)
+    def _clock(self, index: int) -> Operand:
+        return self.code.load_one(self.arrays[8], index)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:

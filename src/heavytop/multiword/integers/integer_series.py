@@ -180,13 +180,13 @@ def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
     """Component -> coefficient, of the linear part of one component's rate."""
     first = component < 6
     lane, own = (component, 0) if first else (component - 3, 3)
-    found: dict[int, Fraction] = {}
+    terms: dict[int, Fraction] = {}
     table = problem.coefficients.vectors[0 if first else 1][1:]
     for row, permutation in zip(table, permutations(problem.system), strict=True):
         source, c = permutation[lane], row[lane]
         if c and source != ZERO:
-            found[source + own] = found.get(source + own, Fraction(0)) + c
-    return found
+            terms[source + own] = terms.get(source + own, Fraction(0)) + c
+    return terms
 
 
 def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) -> QuadraticComponent:
@@ -265,10 +265,10 @@ class IntegerMotion(ResumableRun):
         before = (component[0] for component in self._series)
         return (str(self._taken), str(self._began), *(f"{int(value):x}" for value in before))
 
-    def restore(self, place: tuple[str, ...], steps: int) -> None:
-        self._halvings = int(place[0])
-        self._time = Fraction(place[1])
-        self._state = [mpz(int(text, 16)) for text in place[2:]]
+    def restore(self, numbers: tuple[str, ...], steps: int) -> None:
+        self._halvings = int(numbers[0])
+        self._time = Fraction(numbers[1])
+        self._state = [mpz(int(text, 16)) for text in numbers[2:]]
         self.steps = steps
 
 

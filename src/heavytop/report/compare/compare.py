@@ -77,7 +77,7 @@ class Differences:
             "findings": self.sentences,
             "rows": [finding.to_json() for finding in self.findings],
             "environment": [{"name": n, "baseline": a, "candidate": b} for n, a, b in self.environment],
-        } | ({"surveys": [each.to_json() for each in self.motions]} if self.motions else {})
+        } | ({"surveys": [survey.to_json() for survey in self.motions]} if self.motions else {})
 
 
 def compare(
@@ -114,26 +114,26 @@ def compare(
             missing.append((len(findings_by_row), row))
             lacking = Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")
             findings_by_row.append([lacking])
-    for place, row in missing:
+    for index, row in missing:
         if (match := others.take_elsewhere(row.identity)) is not None:
-            findings_by_row[place] = rows.compare(row, match)[:1]
-        changes.add(row, match, findings_by_row[place])
+            findings_by_row[index] = rows.compare(row, match)[:1]
+        changes.add(row, match, findings_by_row[index])
     for row in others.left():
         if not rows.ignores(row):
             new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
             findings_by_row.append(changes.add(None, row, [new]))
     excused = changes.excused()
-    findings = [each.as_same() if excused(each) else each for each in chain.from_iterable(findings_by_row)]
+    findings = [finding.as_same() if excused(finding) else finding for finding in chain.from_iterable(findings_by_row)]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
-    joined = [each for each in motions if each is not None]
+    joined = [motion for motion in motions if motion is not None]
     return Differences(
         findings,
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
         rows.same,
-        [*sentences(changes, same, rows.failed), *(each.sentence for each in joined if each.sentence)],
+        [*sentences(changes, same, rows.failed), *(motion.sentence for motion in joined if motion.sentence)],
         changes.worst_first,
         joined,
     )
@@ -162,8 +162,8 @@ class _Others:
         """The one row, of those that are left, that differs in its horizon alone; called when all are passed."""
         if self._elsewhere is None:
             self._elsewhere = {}
-            for each in self._passed:
-                self._elsewhere.setdefault(each.elsewhere, []).append(each)
+            for row in self._passed:
+                self._elsewhere.setdefault(row.elsewhere, []).append(row)
         near = self._elsewhere.get(identity.elsewhere, [])
         return self.take(near.pop()) if len(near) == 1 else None
 
@@ -185,8 +185,7 @@ def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
 def _alike(old: dict[str, Any], new: dict[str, Any]) -> bool:
     """Whether processor and versions agree, that of this program apart, which is what is compared."""
     first, second = (
-        {name: version for name, version in each.get("packages", {}).items() if name != "heavytop"}
-        for each in (old, new)
+        {name: version for name, version in row.get("packages", {}).items() if name != "heavytop"} for row in (old, new)
     )
     known = (*_MACHINE, *_VERSIONS)
     return first == second and all(name in old and old[name] == new.get(name) for name in known)

@@ -64,8 +64,8 @@ class Allowance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.loss_bits is not None and self.loss_digits is not None:
             raise InputError("A policy gives both loss_bits and loss_digits.", "Give one of them.")
         for name in ("floor", "loss_bits", "loss_digits", "noise", "duration", "value"):
-            if (given := getattr(self, name)) is not None:
-                _not_negative(name, given)
+            if (value := getattr(self, name)) is not None:
+                _not_negative(name, value)
 
 
 class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -205,9 +205,9 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
     )
 
 
-def _not_negative(name: str, given: str | float) -> None:
-    if physical(exact(given), name) < 0:
-        shown = f"{given:g}" if isinstance(given, float) else given
+def _not_negative(name: str, value: str | float) -> None:
+    if physical(exact(value), name) < 0:
+        shown = f"{value:g}" if isinstance(value, float) else value
         raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
 
 
@@ -319,7 +319,7 @@ class RoundingBound:
         """log10 of the size of the terms of a first integral."""
         assert self._case is not None
         top, start, which, p = self._case
-        integral = next((each for each in holding(top, start, which) if each.name == name), None)
+        integral = next((integral for integral in holding(top, start, which) if integral.name == name), None)
         size = Fraction(0) if integral is None else largest(integral, p, self._rate)
         return (log10(size) or 0.0) if size else 0.0
 
@@ -360,8 +360,10 @@ def of_starts(metric: Metric, row: Row) -> Metric:
         return metric
     band = metric.band
     if metric.quantity is not None and metric.quantity.name == SOLUTION_ERROR:
-        parts = (each for each in row.metrics.values() if each.quantity and each.quantity.name == SOLUTION_ERROR)
-        band = max(each.band or 0.0 for each in parts)
+        parts = (
+            metric for metric in row.metrics.values() if metric.quantity and metric.quantity.name == SOLUTION_ERROR
+        )
+        band = max(metric.band or 0.0 for metric in parts)
     return msgspec.structs.replace(metric, band=min(band, math.log10(row.starts) / 2))
 
 

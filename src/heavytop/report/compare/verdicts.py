@@ -231,7 +231,7 @@ def judge_repeated(
     if missing := [name for name in ("run", "least", BAND) if name not in new]:
         yield missing[0], (Verdict.INCOMPARABLE, "its runs are no longer repeated for a comparison")
         return
-    if not all(math.isfinite(seconds) for each in (old, new) for seconds in each.values()):
+    if not all(math.isfinite(seconds) for seconds_of_rows in (old, new) for seconds in seconds_of_rows.values()):
         yield "run", (Verdict.INCOMPARABLE, "no finite time")
         return
     resolved = old.get(UNRESOLVED_SECONDS, 0.0), new.get(UNRESOLVED_SECONDS, 0.0)
@@ -344,16 +344,22 @@ def weaker(old: Against, new: Against) -> str:
 
 
 def _certified_less(old: Sequence[Certified], new: Sequence[Certified]) -> str:
-    digits, after = ([math.inf if each.digits is None else each.digits for each in part] for part in (old, new))
+    digits, after = (
+        [math.inf if certificate.digits is None else certificate.digits for certificate in part] for part in (old, new)
+    )
     if not _kept(digits, after, lambda before, after: after >= _DIGITS_KEPT * before):
         known, lacking = (
-            " and ".join("all" if math.isinf(each) else str(each) for each in part) or "no" for part in (digits, after)
+            " and ".join("all" if math.isinf(digits) else str(digits) for digits in part) or "no"
+            for part in (digits, after)
         )
         return f"the reference is certified to {lacking} digits, not {known}"
-    starts = [next((each.starts for each in part if each.starts is not None), None) for part in (old, new)]
+    starts = [
+        next((certificate.starts for certificate in part if certificate.starts is not None), None)
+        for part in (old, new)
+    ]
     if starts[0] is not None and (starts[1] or 0) < _TIME_KEPT * starts[0]:
         return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
-    times, earlier = ([log_of(each.time) for each in part] for part in (old, new))
+    times, earlier = ([log_of(certificate.time) for certificate in part] for part in (old, new))
     if not _kept(times, earlier, lambda before, after: after >= before + math.log10(_TIME_KEPT)):
         return "the reference is certified at an earlier time"
     return ""

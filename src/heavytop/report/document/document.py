@@ -158,8 +158,8 @@ def logarithm(value: str | None) -> float | None:
 
 def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
     """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
-    found = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
-    pairs = [(x + math.log10(scale), y - shift) for x, y in found if x is not None and y is not None]
+    points = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
+    pairs = [(x + math.log10(scale), y - shift) for x, y in points if x is not None and y is not None]
     return [x for x, _ in pairs], [y for _, y in pairs]
 
 
@@ -171,17 +171,17 @@ class Keys:
 
     def key(self, label: str, source: str = "") -> Key:
         """The entry of a curve of that label in the report ``source``."""
-        place = self._places.setdefault(label, len(self._places))
-        return numbered(f"{label}, {source}" if source else label, place, source == "baseline")
+        index = self._places.setdefault(label, len(self._places))
+        return numbered(f"{label}, {source}" if source else label, index, source == "baseline")
 
 
-def numbered(label: str, place: int, old: bool = False) -> Key:
-    """The entry of the curve that is the ``place``-th: no two of the first thirty-six look alike; further ones, from
+def numbered(label: str, index: int, old: bool = False) -> Key:
+    """The entry of the curve that is the ``index``-th: no two of the first thirty-six look alike; further ones, from
     one turn through the colours to the next, differ in their dashes.
     """
-    turn = place // len(COLOURS)
-    marker = MARKERS[(place + turn) % len(MARKERS)]
-    return Key(clip(label, 50), place % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
+    turn = index // len(COLOURS)
+    marker = MARKERS[(index + turn) % len(MARKERS)]
+    return Key(clip(label, 50), index % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
 
 
 def draw(axes: Axes, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:

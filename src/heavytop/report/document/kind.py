@@ -107,7 +107,7 @@ def document(report: Report, kinds: Kinds, shown: In) -> dict[str, list[Block]]:
     }
 
 
-def headlines(found: Document, kinds: Kinds) -> list[Headline]:
+def headlines(blocks: Document, kinds: Kinds) -> list[Headline]:
     """The headlines of a document, in the order of the places of their kinds."""
-    order = sorted(found, key=lambda name: kinds[name].place)
-    return [block for name in order for block in found[name] if isinstance(block, Headline)]
+    order = sorted(blocks, key=lambda name: kinds[name].place)
+    return [block for name in order for block in blocks[name] if isinstance(block, Headline)]

@@ -35,7 +35,7 @@ class WorseMotion(msgspec.Struct, frozen=True):
     @property
     def text(self) -> str:
         """``motion 531: digits right 14.2 → 9.1``."""
-        digits = ["-" if each is None else f"{each:.1f}" for each in (self.before, self.after)]
+        digits = ["-" if value is None else f"{value:.1f}" for value in (self.before, self.after)]
         ended = "" if self.outcome == Outcome.SUCCESS.value else f", {self.outcome}"
         return f"motion {self.index}: digits right {digits[0]} → {digits[1]}{ended}"
 
@@ -64,5 +64,5 @@ class WorseMotions(msgspec.Struct, frozen=True):
 
     def to_json(self) -> dict[str, Any]:
         """One of the surveys of `compare --json`."""
-        found = {"joined": self.joined, "worse": self.worse, "reason": self.reason}
-        return self.row.named | found | {"motions": [msgspec.structs.asdict(each) for each in self.first]}
+        document = {"joined": self.joined, "worse": self.worse, "reason": self.reason}
+        return self.row.named | document | {"motions": [msgspec.structs.asdict(motion) for motion in self.first]}

@@ -30,12 +30,12 @@ def comparison(result: Differences, full: bool = False) -> RenderableType:
     parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
     if result.rows:
         parts += [Text(), *(_metrics(result) if full else _rows(result))]
-    for each in result.motions:
-        parts += _motions(each)
+    for motions in result.motions:
+        parts += _motions(motions)
     if result.environment:
         parts += [Text(), Text("Environments differ:", style="bold")]
         changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
-        parts += [Text(each) for change in changes for each in wrapped(change, "    ", "  ")]
+        parts += [Text(line) for change in changes for line in wrapped(change, "    ", "  ")]
     return Group(*parts)
 
 
@@ -44,8 +44,8 @@ def _rows(result: Differences) -> Iterator[RenderableType]:
     for change in result.rows[:_MOST]:
         verdict = change.verdict.value
         lines = wrapped(printable(f"{verdict:12}  {row_name(change.identity)}: {line(change)}"), " " * 14)
-        for number, each in enumerate(lines):
-            shown = Text(each)
+        for number, entry in enumerate(lines):
+            shown = Text(entry)
             shown.stylize(_STYLE.get(change.verdict, ""), 0, 0 if number else len(verdict))
             yield shown
     if len(result.rows) > _MOST:
@@ -53,19 +53,20 @@ def _rows(result: Differences) -> Iterator[RenderableType]:
     yield Text("Every metric: --full", style="dim")
 
 
-def _motions(found: WorseMotions) -> Iterator[RenderableType]:
+def _motions(motions: WorseMotions) -> Iterator[RenderableType]:
     """The motions of a row that lost most, each with its command, to paste into a shell."""
-    if not found.first:
+    if not motions.first:
         return
     yield Text()
     yield Text(
-        printable(f"Motions of {row_name(found.row)} that got worse: {found.worse} of {found.joined}"), style="bold"
+        printable(f"Motions of {row_name(motions.row)} that got worse: {motions.worse} of {motions.joined}"),
+        style="bold",
     )
-    for motion in found.first:
+    for motion in motions.first:
         yield Text(f"  {motion.text}")
         yield Text(" \\\n".join(wrapped(printable(motion.command), "      ", "    ", 78)), style="dim")
-    if found.worse > len(found.first):
-        yield Text(f"  and {found.worse - len(found.first)} more")
+    if motions.worse > len(motions.first):
+        yield Text(f"  and {motions.worse - len(motions.first)} more")
 
 
 def _metrics(result: Differences) -> Iterator[RenderableType]:

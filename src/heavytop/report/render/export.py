@@ -98,9 +98,9 @@ def _named(report: Report, kinds: Kinds) -> Iterator[tuple[str, Row | None, list
     """Each row's name and numbers, and the count of the rows that have none."""
     lost = 0
     for row in report.rows:
-        found = list(measures(row))
+        quantities = list(measures(row))
         lost += _is_lost(row, kinds)
-        yield printable(row_name(row.identity)), row, found
+        yield printable(row_name(row.identity)), row, quantities
     yield _TOTAL, None, [Measure(LOST, float(lost), "rows")]
 
 
@@ -112,25 +112,25 @@ def _is_lost(row: Row, kinds: Kinds) -> bool:
 
 def bencher(report: Report, kinds: Kinds) -> str:
     """Bencher Metric Format: benchmark -> measure -> value with its limits."""
-    found: dict[str, dict[str, dict[str, float]]] = {}
+    benchmarks: dict[str, dict[str, dict[str, float]]] = {}
     for name, _, numbers in _named(report, kinds):
-        for each in numbers:
-            limits = {"lower_value": each.low, "upper_value": each.high}
-            entry = {"value": each.value} | {key: limit for key, limit in limits.items() if limit is not None}
-            found.setdefault(name, {})[each.slug] = entry
-    return _json(found)
+        for number in numbers:
+            limits = {"lower_value": number.low, "upper_value": number.high}
+            entry = {"value": number.value} | {key: limit for key, limit in limits.items() if limit is not None}
+            benchmarks.setdefault(name, {})[number.slug] = entry
+    return _json(benchmarks)
 
 
 def github_action_benchmark(report: Report, kinds: Kinds) -> str:
     """`customSmallerIsBetter` of github-action-benchmark: a list of name, unit, value."""
-    found = []
+    entries = []
     for name, row, numbers in _named(report, kinds):
-        for each in numbers:
-            entry: dict[str, Any] = {"name": f"{name}: {each.name}", "unit": each.unit, "value": each.value}
-            if each.low is not None and each.high is not None:
-                entry["range"] = f"{each.low:.3f} to {each.high:.3f}"
-            found.append(entry | ({"extra": printable(row.against)} if row is not None else {}))
-    return _json(found)
+        for number in numbers:
+            entry: dict[str, Any] = {"name": f"{name}: {number.name}", "unit": number.unit, "value": number.value}
+            if number.low is not None and number.high is not None:
+                entry["range"] = f"{number.low:.3f} to {number.high:.3f}"
+            entries.append(entry | ({"extra": printable(row.against)} if row is not None else {}))
+    return _json(entries)
 
 
 def asv(report: Report, kinds: Kinds) -> str:
@@ -143,8 +143,8 @@ def asv(report: Report, kinds: Kinds) -> str:
     }
     results = {}
     for name, row, numbers in _named(report, kinds):
-        for each in numbers:
-            results[f"{name}: {each.name}"] = [[each.value], [], version()]
+        for number in numbers:
+            results[f"{name}: {number.name}"] = [[number.value], [], version()]
         if row is not None and not numbers and _is_lost(row, kinds):
             results[f"{name}: log10 of the error"] = [[None], [], version()]
     return _json(
@@ -179,7 +179,7 @@ def junit(report: Report, kinds: Kinds) -> str:
         elif _is_lost(row, kinds):
             ElementTree.SubElement(case, "error", message=printable(row.against), type=row.outcome)
         if numbers := list(measures(row)):
-            text = "\n".join(f"{each.name}: {each.value:.6g} {each.unit}" for each in numbers)
+            text = "\n".join(f"{number.name}: {number.value:.6g} {number.unit}" for number in numbers)
             ElementTree.SubElement(case, "system-out").text = printable(text)
     ElementTree.indent(suite)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
@@ -277,12 +277,12 @@ def _metrics(result: Differences) -> list[str]:
     """What changed in each row, largest, rms and last value of one quantity in one line; folded."""
     head = ["<details><summary>Every quantity that changed</summary>", ""]
     head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
-    found = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
+    changes = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
     cells = (
         (c.verdict.value, row_name(c.identity), statistics(c, name, group), *values(group[0]), group[0].reason)
-        for c, name, group in found
+        for c, name, group in changes
     )
-    lines = ["| " + " | ".join(map(escaped_cell, each)) + " |" for each in cells]
+    lines = ["| " + " | ".join(map(escaped_cell, row)) + " |" for row in cells]
     more = ["", f"and {len(lines) - _MOST_METRICS} more."] if len(lines) > _MOST_METRICS else []
     return [*head, *lines[:_MOST_METRICS], *more, "", "</details>", ""]
 
@@ -303,8 +303,8 @@ def escaped(text: str) -> str:
 
 def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
     """The blocks of each kind, without charts: a cell is text, or an object that says what it is."""
-    found = document(report, kinds, In.FULL)
-    said = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in found.items()]
+    blocks = document(report, kinds, In.FULL)
+    said = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
     return {"plan": report.plan, "measurements": len(report.rows), "kinds": said}
 
 
@@ -323,7 +323,7 @@ def _block(block: Block) -> dict[str, Any]:
             }
         case Card():
             inside: list[Block] = [*block.lines, *([block.table] if block.table else [])]
-            return name | {"title": block.title, "note": block.note, "blocks": [_block(each) for each in inside]}
+            return name | {"title": block.title, "note": block.note, "blocks": [_block(block) for block in inside]}
     raise TypeError(block)
 
 
@@ -342,10 +342,10 @@ def _cell(cell: Cell) -> Any:
 
 def to_markdown(report: Report, kinds: Kinds) -> str:
     """GitHub-flavoured Markdown: the headlines, then the notes, tables and cards of each kind."""
-    found = document(report, kinds, In.FULL)
+    kinds_blocks = document(report, kinds, In.FULL)
     plan = f"### Plan {escaped(report.plan.get('name', '?'))}: {plural(len(report.rows), 'measurement')}"
-    lines = [plan, "", *(f"- {_said(each)}" for each in headlines(found, kinds)), ""]
-    for blocks in found.values():
+    lines = [plan, "", *(f"- {_said(headline)}" for headline in headlines(kinds_blocks, kinds)), ""]
+    for blocks in kinds_blocks.values():
         lines += [line for block in blocks if not isinstance(block, Headline) for line in _markdown(block)]
     return "\n".join(lines) + "\n"
 
@@ -359,7 +359,7 @@ def _markdown(block: Block) -> Iterator[str]:
         case Note():
             yield from (_said(block), "")
         case Card():
-            yield from (f"#### {escaped(block.title)}", "", *(f"- {_said(each)}" for each in block.lines), "")
+            yield from (f"#### {escaped(block.title)}", "", *(f"- {_said(line)}" for line in block.lines), "")
             if block.table:
                 yield from _markdown(block.table)
         case Table():
@@ -367,7 +367,7 @@ def _markdown(block: Block) -> Iterator[str]:
                 yield from (f"#### {escaped(block.title)}", "")
             yield from (line for note in block.notes for line in (escaped(note), ""))
             yield _row([escaped_cell(column) for column in block.columns])
-            yield _row(["---" if place < block.words else "---:" for place in range(len(block.columns))])
+            yield _row(["---" if index < block.words else "---:" for index in range(len(block.columns))])
             yield from (_row([escaped_cell(cell_text(cell)) for cell in row]) for row in block.rows)
             yield ""
 

@@ -84,7 +84,7 @@ class MotionTable:
 
         Of more lines than a page has it is a longtable.
         """
-        body = [self._tex_lines(place) for place in range(len(self.times))]
+        body = [self._tex_lines(index) for index in range(len(self.times))]
         long = sum(map(len, body)) > _LINES
         rows = ("\n" + r"\addlinespace" + "\n").join("\n".join(lines) for lines in body)
         packages = "siunitx, booktabs" + (", longtable" if long else "")
@@ -101,15 +101,15 @@ class MotionTable:
             parts += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
         return "\n".join([*head, *parts]) + "\n"
 
-    def _tex_lines(self, place: int) -> list[str]:
+    def _tex_lines(self, row: int) -> list[str]:
         """The lines of one time."""
-        found = []
-        for index, (column, (value, radius)) in enumerate(zip(self.columns, self.values[place], strict=True)):
-            first = _tex_number(self.times[place]) if index == 0 else ""
+        lines = []
+        for index, (column, (value, radius)) in enumerate(zip(self.columns, self.values[row], strict=True)):
+            first = _tex_number(self.times[row]) if index == 0 else ""
             parts = _tex_parts(value, radius)
-            found.append(rf"{first} & ${column.tex}$ & {parts[0]} \\")
-            found += [rf" & & {part} \\" for part in parts[1:]]
-        return found
+            lines.append(rf"{first} & ${column.tex}$ & {parts[0]} \\")
+            lines += [rf" & & {part} \\" for part in parts[1:]]
+        return lines
 
 
 def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
@@ -130,21 +130,21 @@ def of_motion(motion: Motion, command: str, version: str) -> MotionTable:
     return MotionTable((*facts, *_outputs_of(motion.outputs)), columns, tuple(motion.written_times), values)
 
 
-def of_reference(found: Reference, outputs: Sequence[Output], command: str, version: str) -> MotionTable:
+def of_reference(reference: Reference, outputs: Sequence[Output], command: str, version: str) -> MotionTable:
     """The table of a known motion: states, ξ where asked for, outputs, each with its radius."""
-    columns, parts = _states(), [found.states]
-    if found.attitude is not None:
-        columns, parts = (*columns, *_xi()), [*parts, found.attitude]
+    columns, parts = _states(), [reference.states]
+    if reference.attitude is not None:
+        columns, parts = (*columns, *_xi()), [*parts, reference.attitude]
     for output in outputs:
         columns = (*columns, *_columns_of(output))
-        parts.append([list(_flat(value)) for value in found.balls(output)])
-    facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(found)), ("system", found.system)]
-    facts += [("precision", _wide_format(found)), ("digits", str(found.digits)), ("method", found.method)]
-    if found.attitude_method not in (None, found.method):
-        facts.append(("method of the attitude", str(found.attitude_method)))
+        parts.append([list(_flat(value)) for value in reference.balls(output)])
+    facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(reference)), ("system", reference.system)]
+    facts += [("precision", _wide_format(reference)), ("digits", str(reference.digits)), ("method", reference.method)]
+    if reference.attitude_method not in (None, reference.method):
+        facts.append(("method of the attitude", str(reference.attitude_method)))
     lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
     values = tuple(tuple((ball.value, ball.radius) for ball in line) for line in lines)
-    return MotionTable((*facts, *_outputs_of(outputs)), columns, tuple(map(str, found.times)), values)
+    return MotionTable((*facts, *_outputs_of(outputs)), columns, tuple(map(str, reference.times)), values)
 
 
 _ANGLES = (("phi", "φ"), ("theta", "θ"), ("psi", "ψ"))
@@ -182,7 +182,7 @@ def _tex_mark(mark: str) -> str:
 
 def _flat(value: Any) -> list[Any]:
     """The numbers of a nested list."""
-    return [part for each in value for part in _flat(each)] if isinstance(value, list) else [value]
+    return [part for item in value for part in _flat(item)] if isinstance(value, list) else [value]
 
 
 def _made_by(command: str, version: str) -> list[tuple[str, str]]:
@@ -191,34 +191,34 @@ def _made_by(command: str, version: str) -> list[tuple[str, str]]:
 
 def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
     """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key tells it."""
-    found = [(key, document[key]) for key in _DATA if document.get(key) is not None]
-    if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in found):
+    facts = [(key, document[key]) for key in _DATA if document.get(key) is not None]
+    if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in facts):
         x, y, z = (exact(part) for part in document["gamma"])
         xi = tuple(exact(part) for part in document["xi"])
         if x * x + y * y + z * z == dot(xi, xi) == 1 and xi != perpendicular((x, y, z)):
-            found.append(("start_matrix", [exact_text(part) for row in rows_of((x, y, z), xi) for part in row]))
-    return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in found]
+            facts.append(("start_matrix", [exact_text(part) for row in rows_of((x, y, z), xi) for part in row]))
+    return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in facts]
 
 
 def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
     """What makes an output definite: sequence, point, pivot."""
-    found = []
+    result = []
     for output in outputs:
         if output.name == "euler":
-            found.append(("sequence", output.sequence))
+            result.append(("sequence", output.sequence))
         if output.name == "position":
-            for key, place in (("point", output.point), ("pivot", output.pivot if any(output.pivot) else None)):
-                found += [] if place is None else [(key, ", ".join(map(str, place)))]
-    return found
+            for key, vector in (("point", output.point), ("pivot", output.pivot if any(output.pivot) else None)):
+                result += [] if vector is None else [(key, ", ".join(map(str, vector)))]
+    return result
 
 
-def _wide_format(found: Reference) -> str:
+def _wide_format(reference: Reference) -> str:
     """A format in which data and times are rounded so little that the numbers of a reference do not show it.
 
     `heavytop score` rounds the data of a file to the format that the file names.
     """
-    last = max((abs(exact(str(time))) for time in found.times), default=exact(0))
-    bits = bits_of(found.digits) + _MORE_BITS + 2 * int(last).bit_length()
+    last = max((abs(exact(str(time))) for time in reference.times), default=exact(0))
+    bits = bits_of(reference.digits) + _MORE_BITS + 2 * int(last).bit_length()
     return f"real:{min(bits, REAL_BITS[-1])}"
 
 
@@ -269,14 +269,14 @@ def _tex_parts(value: str, radius: str | None) -> list[str]:
 # Proven derivatives of a motion as lines for people: one a derivative, so that nothing is cut at 80 columns.
 
 
-def derivative_lines(times: Sequence[str], found: Derivatives) -> list[RenderableType]:
+def derivative_lines(times: Sequence[str], derivatives: Derivatives) -> list[RenderableType]:
     """The method, then the derivatives at each time, each with its radius, and the Lyapunov exponent."""
-    parts: list[RenderableType] = [Text(), Text(f"derivatives: {found.method}")]
+    parts: list[RenderableType] = [Text(), Text(f"derivatives: {derivatives.method}")]
     for index, time in enumerate(times):
-        for matrices, columns in ((found.start, STARTS), (found.data, PARAMETERS)):
+        for matrices, columns in ((derivatives.start, STARTS), (derivatives.data, PARAMETERS)):
             if matrices is not None:
                 parts += [Text(), _entries(time, matrices[index], columns)]
-        exponent = None if found.lyapunov is None else found.lyapunov[index]
+        exponent = None if derivatives.lyapunov is None else derivatives.lyapunov[index]
         if exponent is not None:
             parts += [Text(), Text(f"finite-time Lyapunov exponent {exponent.value} ± {exponent.radius}")]
     return parts
@@ -304,8 +304,10 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         why = f" {run.integrator} says: {printable(run.flags['failure'])}" if "failure" in run.flags else ""
         parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.{why}", style="bold")]
     elif motion.drift:
-        found = [(metric.quantity, metric) for metric in motion.drift.values()]
-        worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
+        quantities = [(metric.quantity, metric) for metric in motion.drift.values()]
+        worst = [
+            (quantity.component, metric) for quantity, metric in quantities if quantity and quantity.statistic == "max"
+        ]
         drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
     if (steady := run.stability) is not None:
@@ -315,14 +317,14 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
     return Group(*parts, *_undefined(table))
 
 
-def reference_text(found: Reference, table: MotionTable) -> RenderableType:
+def reference_text(reference: Reference, table: MotionTable) -> RenderableType:
     """Proven states, and what was asked for beside them, with the radius of each number."""
-    parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
-    if found.attitude_method not in (None, found.method):
-        parts.append(Text(f"attitude: {found.attitude_method}"))
-    parts += [Text(found.stability.text())] if found.stability else []
+    parts: list[RenderableType] = [Text(f"{reference.system}, {reference.digits} digits; {reference.method}")]
+    if reference.attitude_method not in (None, reference.method):
+        parts.append(Text(f"attitude: {reference.attitude_method}"))
+    parts += [Text(reference.stability.text())] if reference.stability else []
     parts += _attitude_at_start(table)
-    derivatives = [] if found.derivatives is None else derivative_lines(found.times, found.derivatives)
+    derivatives = [] if reference.derivatives is None else derivative_lines(reference.times, reference.derivatives)
     return Group(*parts, *_at_each_time(table), *_undefined(table), *derivatives)
 
 

@@ -67,13 +67,13 @@ def report_page(report: Report, kinds: Kinds) -> str:
     """The page of ``report``; the same report gives the same bytes."""
     rows, left_out = detailed(report.rows)
     failures = [row for row in report.rows if failed(row, kinds)]
-    found = document(report, kinds, In.PAGE)
-    blocks = [block for blocks in found.values() for block in blocks]
+    blocks_by_kind = document(report, kinds, In.PAGE)
+    blocks = [block for blocks in blocks_by_kind.values() for block in blocks]
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
     return render(
         "report.html.j2",
         report=report,
-        headlines=headlines(found, kinds)
+        headlines=headlines(blocks_by_kind, kinds)
         or [Headline(f"{plural(len(report.rows), 'measurement')}, {len(failures)} of which failed.")],
         notes=[block for block in blocks if isinstance(block, Note)],
         cards=[block for block in blocks if isinstance(block, Card)],
@@ -121,7 +121,7 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Differences
         changed=comparison.rows[:MOST_CHANGED],
         left_out=max(0, len(comparison.rows) - MOST_CHANGED),
         sections=sections(sources, kinds, dict.fromkeys(change.identity.case for change in comparison.rows)),
-        differences=[[clip(part, 200) for part in each] for each in comparison.environment],
+        differences=[[clip(part, 200) for part in line] for line in comparison.environment],
         environment=candidate.environment,
     )
 
@@ -143,10 +143,10 @@ def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[
             made = [make(_only(sources, names), first) for make, names in asked.items()]
     elif asked:
         made = [Section("charts", "Charts", [f"Charts need the extra plots: {install('plots')}"])]
-    found = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
-    for section in found:
+    ordered = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
+    for section in ordered:
         section.drop_empty_columns()
-    return found
+    return ordered
 
 
 def _only(sources: Sources, names: Container[str]) -> Sources:
@@ -172,10 +172,10 @@ def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
 
 
 def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    found: dict[str, list[Row]] = {}
+    rows_of_kind: dict[str, list[Row]] = {}
     for row in rows:
-        found.setdefault(row.key.kind or "other", []).append(row)
-    return found
+        rows_of_kind.setdefault(row.key.kind or "other", []).append(row)
+    return rows_of_kind
 
 
 def _badness(row: Row) -> tuple[bool, bool, float]:
@@ -212,12 +212,12 @@ def quantities(changed: Change) -> list[list[Cell]]:
     """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
     return [
         [
-            clip(statistics(changed, name, found) or "whole row", 80),
-            Word(found[0].verdict.value),
-            *(clip(short(value or "–"), 40) for value in (found[0].baseline, found[0].candidate)),
-            clip(found[0].reason, 200),
+            clip(statistics(changed, name, metrics) or "whole row", 80),
+            Word(metrics[0].verdict.value),
+            *(clip(short(value or "–"), 40) for value in (metrics[0].baseline, metrics[0].candidate)),
+            clip(metrics[0].reason, 200),
         ]
-        for name, found in folded(changed)
+        for name, metrics in folded(changed)
     ]
 
 
@@ -336,12 +336,12 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], show
         return []
     in_order = sorted(rows, key=lambda row: (0, "") if one_format else (row.bits, row.precision))
     columns = list(dict.fromkeys(row.key.subject.name if one_format else row.precision for row in in_order))
-    cells = [[found.get(column, "-") for column in columns] for found in lines.values()]
+    cells = [[line.get(column, "-") for column in columns] for line in lines.values()]
     widest = max(13, min(39, 62 // len(columns) - 2))
     columns = [clip(column, widest) for column in columns]
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
     room = min(max(room, 16), 39)
-    named_cells = [line for name, found in zip(lines, cells, strict=True) for line in _in_lines(name, found, room)]
+    named_cells = [line for name, parts in zip(lines, cells, strict=True) for line in _in_lines(name, parts, room)]
     return [Table(title, ["", *columns], named_cells, shown=shown)]
 
 
@@ -357,12 +357,12 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
     """Digits right at every sample, each with its time; of two horizons the longer."""
     known: dict[tuple[str, str, str], Row] = {}
     for row in rows:
-        place = row.key.case, row.key.subject.name, row.precision
-        if digits_kept(row) is not None and (place not in known or _end(row) >= _end(known[place])):
-            known[place] = row
-    found = list(known.values())
-    more = "; of the attitude" if any(map(_attitude_asked, found)) else ""
-    return in_columns(f"Digits right, to |t|{more}", digits_until, found)
+        column = row.key.case, row.key.subject.name, row.precision
+        if digits_kept(row) is not None and (column not in known or _end(row) >= _end(known[column])):
+            known[column] = row
+    columns = list(known.values())
+    more = "; of the attitude" if any(map(_attitude_asked, columns)) else ""
+    return in_columns(f"Digits right, to |t|{more}", digits_until, columns)
 
 
 def attitude_columns(rows: Sequence[Row]) -> list[Table]:
@@ -379,8 +379,8 @@ _ATTITUDE, _POSITION = (ATTITUDE_ERROR, "", "max"), (POSITION_ERROR, "", "max")
 
 
 def _attitude_errors(row: Row) -> str:
-    found = [str(Value(metric, 2)) for each in (_ATTITUDE, _POSITION) if (metric := row.metric(*each))]
-    return ", ".join(found) or NOT_CARRIED["attitude"]
+    errors = [str(Value(metric, 2)) for quantity in (_ATTITUDE, _POSITION) if (metric := row.metric(*quantity))]
+    return ", ".join(errors) or NOT_CARRIED["attitude"]
 
 
 def _until(row: Row) -> str:
@@ -388,8 +388,8 @@ def _until(row: Row) -> str:
 
 
 def _end(row: Row) -> float:
-    found = logarithm(_until(row))
-    return -math.inf if found is None else found
+    end = logarithm(_until(row))
+    return -math.inf if end is None else end
 
 
 def digits_until(row: Row) -> str:
@@ -455,9 +455,9 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     if not laws:
         return ""
     most, *next_to_it = laws.most_common(2)
-    both = [most, *(each for each in next_to_it if 3 * each[1] >= of > 1)]
+    both = [most, *(pair for pair in next_to_it if 3 * pair[1] >= of > 1)]
     # regular motions before those that amplify every error
-    (growth, count), *others = sorted(both, key=lambda each: each[0] == "exponential")
+    (growth, count), *others = sorted(both, key=lambda pair: pair[0] == "exponential")
     law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
     law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
     name = rows[0].key.subject.name
@@ -467,14 +467,14 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
 
 def _laws(row: Row, drifts: bool) -> list[Law]:
     """Of the error along the flow, or of the first integrals; what is exactly 0 has none."""
-    found = [(law, law.quantity) for law in row.laws.values() if law.exponent is not None or law.growth != "bounded"]
+    laws = [(law, law.quantity) for law in row.laws.values() if law.exponent is not None or law.growth != "bounded"]
     if drifts:
-        return [law for law, quantity in found if quantity and quantity.name == DRIFT]
-    return [law for law, quantity in found if quantity == _ALONG]
+        return [law for law, quantity in laws if quantity and quantity.name == DRIFT]
+    return [law for law, quantity in laws if quantity == _ALONG]
 
 
 def _told(row: Row, healthy: Sequence[Row]) -> bool:
     """Whether a law of the faulty ensemble is another than the healthy one of the same motion."""
-    same = [each for each in healthy if (each.case, each.precision) == (row.case, row.precision)]
-    expected = {law.growth for each in same for law in _laws(each, drifts=False)}
+    same = [peer for peer in healthy if (peer.case, peer.precision) == (row.case, row.precision)]
+    expected = {law.growth for row in same for law in _laws(row, drifts=False)}
     return any(law.growth not in {*expected, "unresolved"} for law in _laws(row, drifts=False)) if expected else False

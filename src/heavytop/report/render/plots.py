@@ -60,9 +60,13 @@ class _Column(NamedTuple):
 
     def of(self, row: Row) -> dict[Quantity, Series]:
         """The series of a row that it may draw."""
-        found = {series.quantity: series for series in row.series.values() if series.quantity}
+        series_by_quantity = {series.quantity: series for series in row.series.values() if series.quantity}
         wanted = self.quantity
-        return {q: s for q, s in found.items() if q.name == wanted.name and wanted.component in ("", q.component)}
+        return {
+            q: s
+            for q, s in series_by_quantity.items()
+            if q.name == wanted.name and wanted.component in ("", q.component)
+        }
 
 
 _COLUMNS = (
@@ -167,19 +171,19 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     section.rows.append([case, key.label, named, short(held.times[-1]), short(held.values[-1]), *_law_words(law)])
 
 
-def _largest(found: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
+def _largest(series: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
     """Of several series the one whose last number is the largest."""
 
     def end(pair: tuple[Quantity, Series]) -> float:
         size = logarithm(pair[1].values[-1])
         return -math.inf if size is None else size
 
-    return max(((q, series) for q, series in found.items() if series.values), key=end, default=None)
+    return max(((q, series) for q, series in series.items() if series.values), key=end, default=None)
 
 
 def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
-    found = (metrics.get(quantity.over(part).text) for part in ("max", "rms", "final"))
-    return next((metric.band for metric in found if metric and metric.band), None)
+    statistics = (metrics.get(quantity.over(part).text) for part in ("max", "rms", "final"))
+    return next((metric.band for metric in statistics if metric and metric.band), None)
 
 
 def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float]) -> bool:
@@ -187,7 +191,7 @@ def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float
     if law.exponent is None or law.growth == "unresolved":
         return False
     ends = [logarithm(end) for end in (law.first, law.last)]
-    low, high = (given if given is not None else other for given, other in zip(ends, (x[0], x[-1]), strict=True))
+    low, high = (bound if bound is not None else other for bound, other in zip(ends, (x[0], x[-1]), strict=True))
     fitted = [(a, b) for a, b in zip(x, y, strict=True) if low - 1e-9 <= a <= high + 1e-9]
     if len(fitted) < 2:
         return False
@@ -289,15 +293,15 @@ def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]]
     texts = {lane: f"{lane}: {_right(members[-1][1], digits_until)}" for lane, members in lanes.items()}
     axes = new_axes(f"digits right, of {most:.0f}", "", 0.75 + 0.19 * max(3, len(lanes)), room(texts.values()))
     ends = []
-    for place, (lane, members) in enumerate(lanes.items()):
+    for index, (lane, members) in enumerate(lanes.items()):
         for source, row in members:
             kept, band = _kept(row), row.metrics[RELATIVE.text].band or 0.0
             key = Key(source, 0, "x" if kept is None else "o", old=source == "baseline", line=False)
             if source and kept is not None:
                 section.key(key)
-            draw(axes, key, [kept or 0.0], [-place], 5)
-            axes.plot([(kept or 0.0) - band, (kept or 0.0) + band], [-place] * 2, color=COLOURS[0], lw=3, alpha=0.3)
-        ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -place))
+            draw(axes, key, [kept or 0.0], [-index], 5)
+            axes.plot([(kept or 0.0) - band, (kept or 0.0) + band], [-index] * 2, color=COLOURS[0], lw=3, alpha=0.3)
+        ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
     axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
     axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
     said = spoken([f"{text}." for text in texts.values()], 24)
@@ -328,11 +332,11 @@ def _cells(lane: str, source: str, row: Row) -> list[str]:
 
 def draw_report(report: Report, directory: Path, kinds: Kinds) -> list[Path]:
     """The files written into ``directory``, two a picture of the page; raises InputError where it has none."""
-    found = [(section, picture) for section in sections([("", report)], kinds) for picture in section.pictures]
-    if not found:
+    pictures = [(section, picture) for section in sections([("", report)], kinds) for picture in section.pictures]
+    if not pictures:
         raise InputError("The report has no row that is drawn.", "`heavytop run --plan smoke` makes some.")
     directory.mkdir(parents=True, exist_ok=True)
-    return [file for section, picture in found for file in _save(section, picture, directory / picture.name)]
+    return [file for section, picture in pictures for file in _save(section, picture, directory / picture.name)]
 
 
 def _save(section: Section, picture: Picture, stem: Path) -> list[Path]:
@@ -356,8 +360,8 @@ def _legend(picture: Picture, keys: Sequence[Key]) -> None:
         Line2D([], [], color=COLOURS[key.colour], marker=key.marker, ms=5, ls=_dash(key), label=key.label)
         for key in keys
     ]
-    place = {"loc": "upper left", "bbox_to_anchor": (0, 0), "borderaxespad": 0}
-    picture.axes.figure.legend(handles=handles, ncols=2, fontsize=8.5, frameon=False, **place)
+    legend = {"loc": "upper left", "bbox_to_anchor": (0, 0), "borderaxespad": 0}
+    picture.axes.figure.legend(handles=handles, ncols=2, fontsize=8.5, frameon=False, **legend)
 
 
 def _dash(key: Key) -> str:

@@ -39,10 +39,10 @@ _STYLES = {"soft": "dim", "big": "bold"}
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
     """What every kind of measurement says of its rows, then those that failed."""
-    found = document(report, kinds, In.FULL)
+    blocks_by_kind = document(report, kinds, In.FULL)
     parts: list[RenderableType] = [head(report, len(report.rows))]
-    parts += [_Sentence(each.text, each.word) for each in headlines(found, kinds)]
-    for blocks in found.values():
+    parts += [_Sentence(headline.text, headline.word) for headline in headlines(blocks_by_kind, kinds)]
+    for blocks in blocks_by_kind.values():
         parts += [Text(), *_shown([block for block in blocks if not isinstance(block, Headline)])]
     others = Counter(row.key.kind for row in report.rows if row.outcome not in UNMEASURED and row.key.kind not in kinds)
     said = [
@@ -86,7 +86,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
                 yield _Sentence(block.text, block.word, getattr(block, "style", ""), indent)
             case Card():
                 yield title(block.title)
-                yield from (_Sentence(each.text, each.word, each.style, indent) for each in block.lines)
+                yield from (_Sentence(line.text, line.word, line.style, indent) for line in block.lines)
             case Table():
                 if block.title and not brief:
                     yield title(block.title)
@@ -111,9 +111,9 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     failures: list[str] = []
     number = bad = 0
 
-    def seen(given: Iterable[Row]) -> Iterable[Row]:
+    def seen(rows: Iterable[Row]) -> Iterable[Row]:
         nonlocal number, bad
-        for row in given:
+        for row in rows:
             number += 1
             if failed(row, kinds):
                 bad += 1
@@ -123,9 +123,9 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
 
     if len(first) <= MOST_ROWS:
         held = list(seen(first))
-        found = document(replace(report, rows=held), kinds, In.SHORT)
-        answers: list[Block] = [*headlines(found, kinds)]
-        others = ([block for block in blocks if block not in answers] for blocks in found.values())
+        blocks = document(replace(report, rows=held), kinds, In.SHORT)
+        answers: list[Block] = [*headlines(blocks, kinds)]
+        others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
     else:
@@ -134,7 +134,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     head += f"{bad} failed:" if bad else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
-    lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]
+    lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
     return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
 
 
@@ -150,10 +150,10 @@ def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
     sizes = [len(part) for part in parts]
     while sum(sizes) > most and max(sizes) > _FEWEST:
         sizes[sizes.index(max(sizes))] -= 1
-    found: list[str] = []
+    words: list[str] = []
     for part, length in zip(parts, sizes, strict=True):
-        found += part if length == len(part) else _without_middle(part, length)
-    return found[:most]
+        words += part if length == len(part) else _without_middle(part, length)
+    return words[:most]
 
 
 def _without_middle(part: Sequence[str], size: int) -> list[str]:
@@ -221,11 +221,11 @@ def laws_in_short(rows: Sequence[Row]) -> list[Block]:
         runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
         cases.setdefault((runs, *growths), []).append(case)
     cells = [[f"{runs}: {', '.join(motions)}", *said] for (runs, *said), motions in cases.items()]
-    found: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
+    blocks: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
     others = [row for row in rows if row.key.subject.name not in _OWN]
     ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
     said = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
-    return [*found, *(Note(sentence, shown=In.SHORT) for sentence in said)]
+    return [*blocks, *(Note(sentence, shown=In.SHORT) for sentence in said)]
 
 
 def _united(row: Row) -> tuple[str, ...]:
@@ -261,7 +261,7 @@ def _meaning(row: Row) -> str:
 
 def _larger(row: Row, ours: Row) -> str:
     """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
-    error, known = (each.metric(SOLUTION_ERROR, "along", "final") for each in (row, ours))
+    error, known = (row.metric(SOLUTION_ERROR, "along", "final") for row in (row, ours))
     if error is None or known is None or size(error) - size(known) < _FAR:
         return ""
     return f" At the end it is {short(error.value)}, heyoka's {short(known.value)}."
@@ -279,5 +279,5 @@ def _lately(series: Series | None) -> str:
 
 def _either(growths: Iterable[str], width: int) -> str:
     """The laws of several quantities: by name where there is room."""
-    found = list(growths)
-    return " or ".join(found) or "-" if len(" or ".join(found)) <= width else f"{len(found)} laws"
+    words = list(growths)
+    return " or ".join(words) or "-" if len(" or ".join(words)) <= width else f"{len(words)} laws"

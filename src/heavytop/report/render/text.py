@@ -150,20 +150,20 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Cell | Text]], words: 
 
 def both(lines: Iterable[tuple[Row, Sequence[Cell]]]) -> list[list[Cell]]:
     """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
-    found: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
+    groups: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
     for row, cells in lines:
         same = row.key.case, computed_by(row), *map(cell_text, cells)
-        found.setdefault(same, ([], cells))[0].append(row)
+        groups.setdefault(same, ([], cells))[0].append(row)
     return [
         [(rows[0].key.case if len(rows) > 1 else rows[0].case) + computed_by(rows[0]), *cells]
-        for rows, cells in found.values()
+        for rows, cells in groups.values()
     ]
 
 
 def drifts(row: Row) -> list[tuple[str, Metric]]:
     """The largest drift of each first integral."""
-    found = [(metric.quantity, metric) for metric in row.metrics.values() if metric.quantity]
-    return [(q.component, metric) for q, metric in found if (q.name, q.statistic) == (DRIFT, "max")]
+    quantities = [(metric.quantity, metric) for metric in row.metrics.values() if metric.quantity]
+    return [(q.component, metric) for q, metric in quantities if (q.name, q.statistic) == (DRIFT, "max")]
 
 
 # The summary of a report with more rows than anybody reads.
@@ -184,7 +184,7 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
     for row in rows:
         group = row.key.kind, row.precision
         counts.setdefault(group, Counter())[row.outcome] += 1
-        found = largest.setdefault(group, {})
+        metrics = largest.setdefault(group, {})
         if (kept := digits_kept(row)) is not None:
             fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
         for name, metric in row.metrics.items():
@@ -193,10 +193,10 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
             if metric.log10 is None and metric.value != "0":
                 words.setdefault((*group, name), Counter())[metric.value] += 1
             size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
-            if name not in found or size > found[name][0]:
-                found[name] = size, metric, row.case
+            if name not in metrics or size > metrics[name][0]:
+                metrics[name] = size, metric, row.case
     parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
-    for group, found in largest.items():
+    for group, metrics in largest.items():
         outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
         parts += [
             Text(),
@@ -209,7 +209,7 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
                 case,
                 ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items()),
             ]
-            for name, (_, metric, case) in found.items()
+            for name, (_, metric, case) in metrics.items()
         ]
         if group in fewest:
             lines.append(["digits right, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])

@@ -81,10 +81,10 @@ def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
         *same, starts = (getattr(row, name) for name in _OF_ROW)
         data = _data(row)
         for name, metric in row.metrics.items():
-            yield *same, starts, name, *(getattr(metric, each) for each in _OF_METRIC), *no_law, *data
+            yield *same, starts, name, *(getattr(metric, field) for field in _OF_METRIC), *no_law, *data
         for name, law in row.laws.items():
             as_metric = "law", law.growth, None, None, None
-            yield *same, law.starts, name, *as_metric, *(getattr(law, each) for each in _OF_LAW), *data
+            yield *same, law.starts, name, *as_metric, *(getattr(law, field) for field in _OF_LAW), *data
         if not (row.metrics or row.laws):
             yield *same, starts, None, *no_metric, *no_law, *data
 

@@ -103,8 +103,8 @@ class _Rows:
             try:
                 rows.extend(map(self._decode, self._rows[start : start + _CHUNK]))
             except _UNREADABLE as error:
-                place = f"row {start + len(rows) + 1}: {error}"
-                raise InputError(f"{self._file} is not a whole report: {place}.", REMEDY) from None
+                where = f"row {start + len(rows) + 1}: {error}"
+                raise InputError(f"{self._file} is not a whole report: {where}.", REMEDY) from None
             check_rows(self._file, rows, self._kinds)
             hashes = {hash(row.identity) for row in rows}
             if len(hashes) < len(rows) or hashes & seen:

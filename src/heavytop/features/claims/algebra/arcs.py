@@ -116,7 +116,7 @@ class Arcs:
         if not places:
             raise Unprovable("No place to look at.")
         try:
-            values = [evaluate(field.meaning(index), place, NUMBER_BITS) for place in places]
+            values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in places]
         except KeyError:
             raise Unprovable("No value at a place.") from None
         if not all(value.is_finite() for value in values):
@@ -195,10 +195,10 @@ def _pi() -> arb:
 def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
     """Small integers with which the values add up to 0, in each of their components, as far as can be seen."""
     with working_precision(NUMBER_BITS):
-        found = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
-    if any(value is None for row in found for value in row):  # not finite, or too large to be told
+        matrix = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
+    if any(value is None for row in matrix for value in row):  # not finite, or too large to be told
         return None
-    scaled = [[int(value) for value in row] for row in found]
+    scaled = [[int(value) for value in row] for row in matrix]
     count = len(values)
     rows = [[int(i == j) for j in range(count)] + row for i, row in enumerate(scaled)]
     for short in fmpz_mat(rows).lll().tolist():

@@ -22,11 +22,11 @@ def nonnegative_combination(target: Mapping[Monomial, Any], columns: Sequence[Ma
     monomials = list(dict.fromkeys([*wanted, *(monomial for j in kept for monomial in parts[j])]))
     rows = [[parts[j].get(m, Fraction(0)) for j in kept] + [wanted.get(m, Fraction(0))] for m in monomials]
     rows = [row if row[-1] >= 0 else [-value for value in row] for row in rows]
-    found = _feasible(rows, len(kept))
-    if found is None:
+    combination = _feasible(rows, len(kept))
+    if combination is None:
         return None
     weights = [Fraction(0)] * len(columns)
-    for j, weight in zip(kept, found, strict=True):
+    for j, weight in zip(kept, combination, strict=True):
         weights[j] = weight
     return weights
 

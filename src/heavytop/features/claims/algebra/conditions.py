@@ -141,20 +141,20 @@ def _is_plain(need: Need) -> bool:
 
 def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
     """The conditions of sympy expressions, as they stand: what has been simplified away is not seen."""
-    found: set[Need] = set()
+    needs: set[Need] = set()
     for part in {node for e in expressions for node in sympy.preorder_traversal(e)}:
         if isinstance(part, sympy.exp):
             continue
         if part.is_Pow:
             base, exponent = part.args
             if exponent.is_Rational and exponent.q % 2 == 0:
-                found |= condition("sqrt", (base,))
+                needs |= condition("sqrt", (base,))
             if exponent.is_negative:
-                found |= condition("/", (base,))
+                needs |= condition("/", (base,))
         elif part.is_Function:
             name = "/" if type(part).__name__ == "sign" else type(part).__name__
-            found |= condition(name, part.args)
-    return frozenset(found)
+            needs |= condition(name, part.args)
+    return frozenset(needs)
 
 
 def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction]) -> bool | None:
@@ -346,11 +346,11 @@ def solve_relations(
     for relation in relations:
         if relation.free_symbols <= set(parameters):
             try:
-                found = _solve(relation, replace(known, solved=tuple(solutions)), parameters)
+                solution = _solve(relation, replace(known, solved=tuple(solutions)), parameters)
             except Unprovable:
                 continue
-            if found is not None:
-                solutions.append(found)
+            if solution is not None:
+                solutions.append(solution)
     return tuple(solutions)
 
 

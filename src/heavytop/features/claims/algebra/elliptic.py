@@ -46,10 +46,10 @@ class Analytic(sympy.Function):  # type: ignore[misc]
     @classmethod
     def eval(cls, *arguments: sympy.Expr) -> sympy.Expr | None:
         """What it is at 0, at −u, and as the inverse of another."""
-        place = cls.moving - 1
-        u, m = arguments[place], arguments[-1]
+        last = cls.moving - 1
+        u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
-            return cls.parity * cls(*arguments[:place], -u, *arguments[place + 1 :])
+            return cls.parity * cls(*arguments[:last], -u, *arguments[last + 1 :])
         if cls.parity and u == 0:
             return sympy.Integer(cls.parity > 0)
         inverse = _INVERSE.get(cls.__name__)

@@ -71,10 +71,10 @@ class Assumptions:
         """Expressions that are > 0 or >= 0, in the symbols that are not solved."""
         solved = {solution.symbol for solution in self.solved}
         greater = [symbol - bound for symbol, bound in self.greater]
-        found = [*self.facts, *self.weak, *greater, *solved.intersection(self.positive)]
+        conditions = [*self.facts, *self.weak, *greater, *solved.intersection(self.positive)]
         for solution in self.solved:
-            found = [bound.xreplace({solution.symbol: solution.value}) for bound in found]
-        return found
+            conditions = [bound.xreplace({solution.symbol: solution.value}) for bound in conditions]
+        return conditions
 
 
 class Field:
@@ -235,15 +235,15 @@ class Field:
     def _where_zero(self, relations: list[fmpq_mpoly], index: int) -> list[fmpq_mpoly]:
         """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
         signs, zero = self.tower.signs, self.tower.context.constant(0)
-        found = [self.tower.gens[index]]
+        zeros = [self.tower.gens[index]]
         for relation in relations:
             if self._is_of_parameters(relation):
                 product = self.tower.one
                 for factor, _ in self.tower.by_power(relation, index).get(0, zero).factor()[1]:
                     product = product if signs.of(factor).strict else product * factor
                 relation = product if self.tower.by_power(relation, index).get(0, zero) else zero
-            found.append(relation)
-        return [relation for relation in found if relation]
+            zeros.append(relation)
+        return [relation for relation in zeros if relation]
 
     def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
         """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
@@ -412,8 +412,8 @@ class Regularity:
         if index in tower.signs.numbers:
             return "" if tower.signs.numbers[index].is_finite() else f"{g.meaning} is no real number"
         for argument in g.arguments:
-            if found := self.obstacle(argument, analytic=analytic):
-                return found
+            if obstacle := self.obstacle(argument, analytic=analytic):
+                return obstacle
         if g.kind == "defined":
             return f"the definition of {g.meaning} is too large for the algebra"
         if g.kind in ("wp", "wpinverse", "wzeta"):

@@ -67,7 +67,7 @@ class Region:
         self._statement = statement
         self._setting = setting
         self._flow = statement.flow
-        self.places = [place for place in places if self._holds(place)]
+        self.places = [point for point in places if self._holds(point)]
         self._thin: dict[str, bool] = {}
         self._thin_for_each: dict[str, bool] = {}
         self._kept: dict[str, bool] = {}
@@ -78,9 +78,9 @@ class Region:
         self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
         self._arcs = Arcs(field, self.everywhere, self.places, self.is_connected)
 
-    def _holds(self, place: Place) -> bool:
+    def _holds(self, point: Place) -> bool:
         a = self.field.assumptions
-        value = place[a.variable] * a.variable_sign
+        value = point[a.variable] * a.variable_sign
         return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
 
     def vanishes(self, expression: sympy.Expr) -> bool:
@@ -173,7 +173,7 @@ class Region:
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
         if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
-        return any(self._is_nonzero_at(p, place) for place in self.places)
+        return any(self._is_nonzero_at(p, point) for point in self.places)
 
     def _has_parameters(self, p: fmpq_mpoly) -> bool:
         inside = set().union(*(self.field.meaning(index).free_symbols for index in used(p)))
@@ -213,10 +213,10 @@ class Region:
         except Unprovable:
             return False
 
-    def _is_nonzero_at(self, p: fmpq_mpoly, place: Place) -> bool:
+    def _is_nonzero_at(self, p: fmpq_mpoly, point: Place) -> bool:
         meanings = {index: self.field.meaning(index) for index in used(p)}
         try:
-            balls = {index: evaluate(meaning, place, NUMBER_BITS) for index, meaning in meanings.items()}
+            balls = {index: evaluate(meaning, point, NUMBER_BITS) for index, meaning in meanings.items()}
         except (KeyError, Unprovable):
             return False
         with working_precision(NUMBER_BITS):
@@ -374,11 +374,11 @@ class Region:
         """The obstacle to the values being real and continuous all over the region."""
         for value in values:
             try:
-                found = self.regularity.obstacle(self.field.enter(value))
+                obstacle = self.regularity.obstacle(self.field.enter(value))
             except Unprovable as error:
-                found = error.cause
-            if found:
-                return found
+                obstacle = error.cause
+            if obstacle:
+                return obstacle
         return ""
 
     def divisors(self, *, forced: bool) -> Iterator[str]:
@@ -536,7 +536,7 @@ class Prover:
         places = self.places(statement)
         if not places:
             return Condition(_SAMPLE, False, self._why_no_place(statement))
-        if any(self.is_defined(statement, place) for place in places):
+        if any(self.is_defined(statement, point) for point in places):
             return Condition(_SAMPLE, True, "checked in balls")
         return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
 
@@ -550,19 +550,19 @@ class Prover:
             return f"the relations exclude each other{within}: no motion lies on them"
         return _missed(statement, setting)
 
-    def is_defined(self, statement: Statement, place: Place) -> bool:
+    def is_defined(self, statement: Statement, point: Place) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
         formulas = statement.formulas
-        if not all(need.is_met(place) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
+        if not all(need.is_met(point) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
             return False
         # a derivative of |u| is none where u is 0
         if any(
-            Need(ConditionKind.NONZERO, kink.args[0]).is_met(place) is not True
+            Need(ConditionKind.NONZERO, kink.args[0]).is_met(point) is not True
             for kink in statement.residual.atoms(sympy.sign)
         ):
             return False
         try:
-            return bool(evaluate(statement.residual, place, NUMBER_BITS).is_finite())
+            return bool(evaluate(statement.residual, point, NUMBER_BITS).is_finite())
         except Unprovable:
             return False
 
@@ -583,17 +583,17 @@ class Prover:
         moving = [value for value in f.values if not _is_kept(value, statement)]
         against = whole.obstacle(moving), inner.obstacle(f.attitude)
         continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
-        found = {
+        needed = {
             need: whole.discharge(need)
             or (KEPT if _is_kept(need.expression, statement) and whole.is_met_for_each(need) else "")
             for need in _sorted(f.needs | f.angle_needs)
         }
-        for need, how in found.items():
+        for need, how in needed.items():
             if not how and need not in f.needs and inner.discharge(need) and continuous:
-                found[need] = _AT_THE_END
+                needed[need] = _AT_THE_END
             elif not how and continuous and inner.is_removable(need):
-                found[need] = _REMOVABLE
-        conditions = [_condition(need, how, whole) for need, how in found.items()]
+                needed[need] = _REMOVABLE
+        conditions = [_condition(need, how, whole) for need, how in needed.items()]
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
@@ -622,9 +622,9 @@ def _missed(statement: Statement, setting: Setting) -> str:
     """Which relation the first sample of a body misses, or bounds of the variable all points; for whom wrote them."""
     on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
     for sample in setting.samples:
-        place = {setting.variable: statement.domain.points[0], **sample}
+        point = {setting.variable: statement.domain.points[0], **sample}
         for zero in setting.zeros:
-            if is_exactly_zero(zero, place) is False:
+            if is_exactly_zero(zero, point) is False:
                 used = ", ".join(
                     f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols
                 )

@@ -42,11 +42,11 @@ def denested(tower: Tower, p: fmpq_mpoly, depth: int = _DEPTH) -> Quotient | Non
         return None
     for index in roots:
         try:
-            found = _as_sum(tower, p, index, depth)
+            roots_sum = _as_sum(tower, p, index, depth)
         except Unprovable:
             continue
-        if found is not None:
-            return found
+        if roots_sum is not None:
+            return roots_sum
     return _through_conjugate(tower, p) if roots else None
 
 

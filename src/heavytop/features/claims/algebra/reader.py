@@ -116,13 +116,13 @@ class Descent:
     def __init__(self, text: str) -> None:
         self._tokens: list[str] = []
         self._position = self._depth = 0
-        place, text = 0, text.rstrip()
-        while place < len(text):
-            match = self.token.match(text, place)
+        position, text = 0, text.rstrip()
+        while position < len(text):
+            match = self.token.match(text, position)
             if match is None:
-                raise self._no_token(text[place : place + 20])
+                raise self._no_token(text[position : position + 20])
             self._tokens.append(match[0].strip())
-            place = match.end()
+            position = match.end()
 
     def _next(self) -> str:
         return self._tokens[self._position] if self._position < len(self._tokens) else ""
@@ -150,11 +150,11 @@ class Descent:
     def _arguments(self, one: Callable[[], Part]) -> list[Part]:
         """The arguments in parentheses, between commas."""
         self._require("(")
-        found = [one()]
+        arguments = [one()]
         while self._take(","):
-            found.append(one())
+            arguments.append(one())
         self._require(")")
-        return found
+        return arguments
 
     def end(self) -> None:
         """Raises an error if anything is left."""

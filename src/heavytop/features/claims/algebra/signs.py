@@ -142,11 +142,11 @@ class Signs:
     def never_zero(self, relations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
         """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
         indices = set().union(*map(used, relations))
-        found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
-        found += [self._ring.gens[index] for index in sorted(indices) if self._ring.generators[index].strict]
+        nonzero = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
+        nonzero += [self._ring.gens[index] for index in sorted(indices) if self._ring.generators[index].strict]
         factors = [factor for relation in relations for factor, _ in self.factors(relation)[1]]
-        found += [factor for factor in factors if self.of(factor).strict]
-        return list({str(p): p for p in found}.values())
+        nonzero += [factor for factor in factors if self.of(factor).strict]
+        return list({str(p): p for p in nonzero}.values())
 
     def factors(self, p: fmpq_mpoly) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -191,19 +191,19 @@ class Signs:
             if (known.value and known.strict) or depth <= self._depth:
                 return known
         self._left -= 1
-        found = UNKNOWN
+        sign_of_factor = UNKNOWN
         for rule in self._rules(p):
             try:
                 one = rule(p)
             except Unprovable:  # too large for this rule
                 continue
             # a rule may tell the sign, another that it is never 0
-            found = Sign(found.value or one.value, found.strict or one.strict)
-            if found.value and found.strict:
+            sign_of_factor = Sign(sign_of_factor.value or one.value, sign_of_factor.strict or one.strict)
+            if sign_of_factor.value and sign_of_factor.strict:
                 break
         # what was abandoned for lack of time may be found when it is asked first
-        self._known[key] = found, self._depth if self._left > 0 else _DEPTH
-        return found
+        self._known[key] = sign_of_factor, self._depth if self._left > 0 else _DEPTH
+        return sign_of_factor
 
     def _rules(self, p: fmpq_mpoly) -> Iterator[Callable[[fmpq_mpoly], Sign]]:
         yield from (self._by_facts, self._by_number, self._by_terms, self._by_forms)
@@ -217,13 +217,13 @@ class Signs:
     # --- rules ------------------------------------------------------------------------------------------------------
 
     def _by_facts(self, p: fmpq_mpoly) -> Sign:
-        found = UNKNOWN
+        result = UNKNOWN
         for fact, sign in self._facts:
             ratio = p.leading_coefficient() / fact.leading_coefficient()
             if p == fact * ratio:
                 one = sign.times(Sign(1 if ratio > 0 else -1, True))
-                found = Sign(found.value or one.value, found.strict or one.strict)
-        return found
+                result = Sign(result.value or one.value, result.strict or one.strict)
+        return result
 
     def ball(self, p: fmpq_mpoly) -> arb | None:
         """The ball of a polynomial in numbers; None where another generator occurs."""
@@ -349,14 +349,14 @@ class Signs:
 
     def _by_generators(self, p: fmpq_mpoly) -> Sign:
         """As a polynomial in one of its generators, with coefficients of known sign."""
-        found = UNKNOWN
+        result = UNKNOWN
         for index in sorted(used(p), reverse=True):
             parts = self._ring.by_power(p, index)
             for one in self._as_polynomial_in(index, p, parts):
-                found = Sign(found.value or one.value, found.strict or one.strict)
-                if found.value and found.strict:
-                    return found
-        return found
+                result = Sign(result.value or one.value, result.strict or one.strict)
+                if result.value and result.strict:
+                    return result
+        return result
 
     def _as_polynomial_in(self, index: int, p: fmpq_mpoly, parts: dict[int, Any]) -> Iterator[Sign]:
         g, degree = self._ring.generators[index], max(parts)
@@ -440,15 +440,15 @@ class Signs:
                 quotient, rest = divmod(p, part)
                 if quotient and rest and len(rest) < len(p) + len(fact):
                     fact_sign = sign if part is fact else Sign(-sign.value, sign.strict)
-                    found = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
-                    if found.value:
-                        return found
+                    bound = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
+                    if bound.value:
+                        return bound
         return UNKNOWN
 
     def _at_once(self, p: fmpq_mpoly) -> Sign:
         """The sign of ``p`` by the rules that ask for no other sign."""
-        found = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
-        return next((sign for sign in found if sign.value), UNKNOWN)
+        signs = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
+        return next((sign for sign in signs if sign.value), UNKNOWN)
 
     def _by_squares(self, p: fmpq_mpoly) -> Sign:
         """With a generator g ≥ 0 written as R², where there is a root R of g."""
@@ -507,14 +507,14 @@ class Signs:
 
     def _products_of(self, atoms: list[tuple[fmpq_mpoly, bool]], degree: int) -> list[tuple[fmpq_mpoly, bool]]:
         """1 and the products of up to ``degree`` atoms, as many as are tried."""
-        found = level = [(self._ring.one, True, 0)]
+        products = level = [(self._ring.one, True, 0)]
         for _ in range(degree):
             level = [
                 (self._ring.times(product, atom), strict and also, i)
                 for product, strict, first in level
                 for i, (atom, also) in enumerate(atoms[first:], first)
             ]
-            if len(found) + len(level) > _MAX_PRODUCTS:
+            if len(products) + len(level) > _MAX_PRODUCTS:
                 break
-            found = found + level
-        return [(self._ring.reduce(product), strict) for product, strict, _ in found]
+            products = products + level
+        return [(self._ring.reduce(product), strict) for product, strict, _ in products]

@@ -171,8 +171,8 @@ class Setting:
             if not all(need.is_met(sample) for need in self.bodies):
                 continue
             for point in statement.domain.points:
-                place = {self.variable: point, **sample}
-                if not all(Need(ConditionKind.POSITIVE, fact).is_met(place) for fact in statement.domain.facts):
+                sample_point = {self.variable: point, **sample}
+                if not all(Need(ConditionKind.POSITIVE, fact).is_met(sample_point) for fact in statement.domain.facts):
                     continue
-                if all(is_exactly_zero(relation, place) for relation in self.zeros):
-                    yield place
+                if all(is_exactly_zero(relation, sample_point) for relation in self.zeros):
+                    yield sample_point

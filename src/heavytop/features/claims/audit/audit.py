@@ -119,11 +119,11 @@ def _path(name: str) -> Path:
     path = Path(name)
     if path.suffix == ".toml":
         return path
-    found = file_of(name)
-    if found is None:
+    chosen = file_of(name)
+    if chosen is None:
         remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
         raise InputError(f"Unknown claim {name[:60]!r}.", remedy)
-    return found
+    return chosen
 
 
 def audit(
@@ -177,20 +177,20 @@ def would_decide(
     if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
         return ()
     missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
-    found: list[tuple[str, str]] = []
+    deciding: list[tuple[str, str]] = []
     began = perf_counter()
     for bound in dict.fromkeys([*missing, *(f"{name} > 0" for name in claim.unassumed)]):
-        if perf_counter() - began + 2 * seconds > _SEARCH or len(found) == _MOST_FOUND:
+        if perf_counter() - began + 2 * seconds > _SEARCH or len(deciding) == _MOST_FOUND:
             break
-        if (bound.replace(">", "!="), "holds") in found:  # more than is needed
+        if (bound.replace(">", "!="), "holds") in deciding:  # more than is needed
             continue
         try:
             verdict = verdict_of(_rows(claim.assuming(bound), about))
         except HeavyTopError:  # a sample breaks it, or the formula is none that may be assumed
             continue
         if verdict != "undecided":
-            found.append((bound, verdict))
-    return tuple(found)
+            deciding.append((bound, verdict))
+    return tuple(deciding)
 
 
 def require_branch(branch: str) -> None:
@@ -235,16 +235,16 @@ def audited(entry: Entry, system: str = "") -> tuple[Judged, Audit | None]:
     """The audit of an entry; undecided, with None, where it is stopped or its file cannot be judged."""
     began = perf_counter()
     try:
-        found = in_time(str(FOLDER / f"{entry.id}.toml"), system, SECONDS)
+        audit = in_time(str(FOLDER / f"{entry.id}.toml"), system, SECONDS)
     except AuditEnded:
         raise
     except HeavyTopError as error:
         return Judged("undecided", perf_counter() - began, error.cause), None
-    return Judged(_verdict(found), perf_counter() - began), found
+    return Judged(_verdict(audit), perf_counter() - began), audit
 
 
-def _verdict(found: Audit) -> Verdict:
-    return "holds" if found.verdict == "holds" else "refuted" if found.verdict == "refuted" else "undecided"
+def _verdict(audit: Audit) -> Verdict:
+    return "holds" if audit.verdict == "holds" else "refuted" if audit.verdict == "refuted" else "undecided"
 
 
 @cache
@@ -264,12 +264,12 @@ def judged(entries: Iterable[Entry], *, anew: bool = False, done: Done = lambda:
     todo = list(entries)
 
     def one(entry: Entry) -> Judged:
-        found = None if anew else _kept(entry)
-        if found is None:
-            found, _ = audited(entry)
-            _keep(entry, found)
+        judged = None if anew else _kept(entry)
+        if judged is None:
+            judged, _ = audited(entry)
+            _keep(entry, judged)
         done()
-        return found
+        return judged
 
     with ThreadPoolExecutor(max_workers=processors()) as pool:
         return dict(zip((entry.id for entry in todo), pool.map(one, todo), strict=True))
@@ -283,14 +283,14 @@ def _kept(entry: Entry) -> Judged | None:
         return None
 
 
-def _keep(entry: Entry, found: Judged) -> None:
+def _keep(entry: Entry, judged: Judged) -> None:
     """Beside others that write the same at once; a cache that cannot be written is none."""
-    place = _place(entry)
-    part = place.with_suffix(f".{os.getpid()}.part")
+    path = _place(entry)
+    part = path.with_suffix(f".{os.getpid()}.part")
     with suppress(OSError):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(msgspec.json.encode(found))
-        part.replace(place)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(msgspec.json.encode(judged))
+        part.replace(path)
 
 
 def _place(entry: Entry) -> Path:

@@ -136,10 +136,14 @@ class UserComponent(UserIntegral):
             return parse(self._component.reduced, names, "component.reduced")
         if table is None or (table.time is None and table.integrand is None):
             return None
-        given = parse(table.time or table.integrand or "", names, "quadrature")
-        slope = given.expression if table.time is None else rate_along({self._u: sympy.Integer(1)})(given.expression)
+        quadrature = parse(table.time or table.integrand or "", names, "quadrature")
+        slope = (
+            quadrature.expression
+            if table.time is None
+            else rate_along({self._u: sympy.Integer(1)})(quadrature.expression)
+        )
         # the equation without roots says as much where the integrand is real
-        return replace(given, expression=1 / slope**2, needs=_without(given.needs, self._u))
+        return replace(quadrature, expression=1 / slope**2, needs=_without(quadrature.needs, self._u))
 
     def _of(self, name: str, table: object, extra: bool) -> Formula | None:
         text = getattr(table, name, None)
@@ -235,7 +239,7 @@ class UserComponent(UserIntegral):
             return Statement(equation, component, "smooth", domain, residual, text, extra)
 
         first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
-        found = [
+        equations = [
             made("component", 1, first**2 - f.xreplace({u: c}), "u'^2 = f(u) of the function of t"),
             made("component", 2, second - sympy.diff(f, u).xreplace({u: c}) / 2, "u'' = f'(u)/2 of the function of t"),
         ]
@@ -243,8 +247,8 @@ class UserComponent(UserIntegral):
         begin = ((c, self.quantity.expression), (first, self._rate(system)(self.quantity.expression)))
         for component, (ours, theirs) in enumerate(begin, 1):
             residual = at_values(ours, {TIME: sympy.Integer(0)}) - self._at_start(theirs)
-            found.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
-        found.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
+            equations.append(made("start", component, residual, f"u{chr(39) * (component - 1)} at t = 0", at_zero))
+        equations.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
         for index, name in enumerate(_ANGLES, 1):
             angle, claimed = self._of(name, self._component, True), self._of(name, self.content.quadrature, False)
             if angle is not None and claimed is not None:
@@ -252,10 +256,10 @@ class UserComponent(UserIntegral):
                     raise InputError(f"{name} is given in t, and its rate in the state.", f"Give its rate in {u}.")
                 needs = angle.needs | _put(claimed.needs, u, c) | formulas.needs
                 residual = _IN_TIME(angle.expression) - claimed.expression.xreplace({u: c})
-                found.append(
+                equations.append(
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
                 )
-        return found
+        return equations
 
 
 def _put(needs: frozenset[Need], u: sympy.Symbol, value: sympy.Expr) -> frozenset[Need]:
@@ -289,9 +293,9 @@ def _through(
     zeros = [z for z in zeros if z.free_symbols & frozenset(STATE)]
     close = [z for z in zeros if z.free_symbols & frozenset(STATE) <= near]
     for chosen in (close, zeros) if len(close) < len(zeros) else (zeros,):
-        found = _found(u, q, chosen, parts)
-        if found is not None:
-            return found
+        audits = _found(u, q, chosen, parts)
+        if audits is not None:
+            return audits
     return None
 
 
@@ -323,7 +327,7 @@ def _found(
         relations, *order, order="lex", domain=sympy.QQ.frac_field(*names.values()) if names else sympy.QQ
     )
     meanings = {name: value for value, name in names.items()}
-    divisor, found = sympy.Integer(1), []
+    divisor, audits = sympy.Integer(1), []
     for e in wanted:
         above, below = sympy.fraction(sympy.together(basis.reduce(e)[1]))
         if above.free_symbols & frozenset(STATE):
@@ -333,7 +337,7 @@ def _found(
         if not forces_zero(numerators, field_.enter(below * e - above).numerator, radical=False):
             return None
         divisor *= below.xreplace(meanings)
-        found.append((above / below).xreplace(meanings))
+        audits.append((above / below).xreplace(meanings))
     for z in (*zeros, u - q):
         divisor *= sympy.Poly(z, *STATE, u).LC()
-    return found[0], found[1], divisor
+    return audits[0], audits[1], divisor

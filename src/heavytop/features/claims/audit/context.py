@@ -211,7 +211,7 @@ def read_tensor(inertia: Sequence[str | list[str]]) -> TensorTexts:
     if not all(isinstance(part, str) for part in inertia) or len(inertia) not in (3, 6, 9):
         raise InputError(f"top.inertia: {len(inertia)} entries.", _REMEDY)
     texts = tuple(str(part) for part in inertia)
-    return TensorTexts(tuple(texts[place] for place in _ORDER) if len(texts) == 6 else texts)
+    return TensorTexts(tuple(texts[index] for index in _ORDER) if len(texts) == 6 else texts)
 
 
 def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[sympy.Expr, ...]:
@@ -509,9 +509,9 @@ class FileClaim:
 
         Raises InputError where the file names another system, or gives another rotor than the system has.
         """
-        found = of_file(asked, self.content.system, HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT)
-        self.context.parameters(found)
-        return found
+        claim = of_file(asked, self.content.system, HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT)
+        self.context.parameters(claim)
+        return claim
 
 
 # The clock of a claimed motion: the time itself, or a quadrature t = F(u) + constant that is not inverted.
@@ -566,8 +566,8 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     text = table.time or table.integrand
     if text is None or (table.time is not None and table.integrand is not None):
         raise InputError("[quadrature] needs either time or integrand.", "Give F(u) as time, or F'(u) as integrand.")
-    given = parse(text, context.names, "quadrature")
-    integrand = given.expression if table.time is None else rate_along({u: sympy.Integer(1)})(given.expression)
+    clock = parse(text, context.names, "quadrature")
+    integrand = clock.expression if table.time is None else rate_along({u: sympy.Integer(1)})(clock.expression)
     if integrand == 0:
         raise InputError(f"[quadrature]: t = {text[:60]} does not move with {u}.", "Give t as a function of it.")
     links = [link for text in table.where for link in comparisons(text, "where of [quadrature]")]
@@ -575,7 +575,7 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     facts = tuple(above.expression - below.expression for above, below in sides)
     label = ", ".join(table.where) or f"all {u}"
     domain = Domain(label, 0, _points(table, u, facts, context.samples), f"{u} is the variable of [quadrature]", facts)
-    needs = needs_of([given, *(side for pair in sides for side in pair)]) | condition("/", (integrand,))
+    needs = needs_of([clock, *(side for pair in sides for side in pair)]) | condition("/", (integrand,))
     return Clock(u, rate_along({u: 1 / integrand}), domain, (integrand, 1 / integrand), needs)
 
 
@@ -588,12 +588,12 @@ def _points(
     """The points of the file, else some between and beyond the bounds at the samples, on the domain or not."""
     if table.points is not None:
         return tuple(sample_number(point, "quadrature.points") for point in table.points)
-    found = list(_POINTS)
+    points = list(_POINTS)
     for sample in samples:
         ends = sorted(end for fact in facts if (end := _end(fact, u, sample)) is not None)
-        found += [low + (high - low) * part for low, high in pairwise(ends) for part in _BETWEEN]
-        found += [end + sign * step for end in ends for step in _BEYOND for sign in (1, -1)]
-    return tuple(dict.fromkeys(found))
+        points += [low + (high - low) * part for low, high in pairwise(ends) for part in _BETWEEN]
+        points += [end + sign * step for end in ends for step in _BEYOND for sign in (1, -1)]
+    return tuple(dict.fromkeys(points))
 
 
 def _end(fact: sympy.Expr, u: sympy.Symbol, sample: Mapping[sympy.Symbol, Fraction]) -> Fraction | None:

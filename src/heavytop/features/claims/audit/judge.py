@@ -178,8 +178,8 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
     witness = next(_witnesses(statement, setting, prover), None)
     proven, conditions = prover.prove(statement)
     if witness is not None:
-        found = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
-        closed = None if found is None else _closed_form(statement, setting, found)
+        proof = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
+        closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
     for text, rate in statement.flow.kept if statement.flow is not None else ():
         left = next(_witnesses(replace(statement, residual=rate), setting, prover), None)
@@ -215,10 +215,10 @@ def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterat
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
                 value, radius = _texts(ball)
-                place = {str(symbol): str(number) for symbol, number in values.items()}
-                time = place.pop(str(setting.variable))
+                point = {str(symbol): str(number) for symbol, number in values.items()}
+                time = point.pop(str(setting.variable))
                 moving = {} if statement.flow is not None else {str(setting.variable): time}
-                yield {"parameters": place, **moving, "value": value, "radius": radius}
+                yield {"parameters": point, **moving, "value": value, "radius": radius}
 
 
 def _texts(ball: arb) -> tuple[str, str]:
@@ -245,7 +245,7 @@ def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: i
 
 
 def _bound(statement: Statement, prover: Prover) -> str:
-    places = [place for place in prover.places(statement) if prover.is_defined(statement, place)]
+    places = [point for point in prover.places(statement) if prover.is_defined(statement, point)]
     balls = [_ball(statement.residual, values, _BITS[-1]) for values in places]
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
     if not bounds:

@@ -362,19 +362,19 @@ class UserIntegral(FileClaim):
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
         """The states of the file; without them states of our own, on the conditions where such are found."""
-        given = _numbers(self._table.states or _STATES)
+        states = _numbers(self._table.states or _STATES)
         if self._table.states is not None:
-            return given
+            return states
         needs = needs_of([self.value, *self.where])
 
         def serves(state: Place) -> bool:
-            place = {**parameters, **state}
-            return all(is_exactly_zero(c, place) for c in conditions) and all(need.is_met(place) for need in needs)
+            point = {**parameters, **state}
+            return all(is_exactly_zero(c, point) for c in conditions) and all(need.is_met(point) for need in needs)
 
-        if any(serves(state) for state in given):
-            return given
-        found = [*islice(filter(serves, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
-        return found or given
+        if any(serves(state) for state in states):
+            return states
+        samples = [*islice(filter(serves, states_on([*conditions, OFF_SPHERE], STATE, parameters)), _ENOUGH)]
+        return samples or states
 
     def statements(self, system: System) -> list[Statement]:
         """dF/dt = 0 along the field of ``system``, on the conditions."""
@@ -448,8 +448,8 @@ class UserIntegral(FileClaim):
 
     def explain(self, about: System, rows: Sequence[StatementVerdict]) -> tuple[list[ExplanationStep], tuple[str, ...]]:
         """No steps; the systems that keep it, by proof."""
-        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
-        return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
+        judged = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
+        return [], tuple(name for name, rows in judged.items() if verdict_of(rows) == "holds")
 
 
 def _numbers(states: Sequence[Sequence[str]]) -> list[Place]:

@@ -51,7 +51,7 @@ class AuditTable(PlanTable, tag=NAME):
 
         asked = [system(name) for name in self.systems]
         if claim in PAPER:
-            return tuple(paper_claim(claim).about(each).name for each in asked) or (HEAVY_TOP.name,)
+            return tuple(paper_claim(claim).about(system).name for system in asked) or (HEAVY_TOP.name,)
         if asked and claim in library() and (own := own_system(claim)) not in self.systems:
             raise InputError(
                 f"The claim {claim} is about {own}, and systems = {quoted(list(self.systems))}.",
@@ -92,7 +92,9 @@ class AuditKind(Kind):
         if task.key.case not in PAPER:
             return _of_entry(task)
         claim, about = paper_claim(task.key.case), system(task.key.system)
-        asked = [each for each in claim.statements(about) if about is HEAVY_TOP or each.branch == _SMOOTH]
+        asked = [
+            statement for statement in claim.statements(about) if about is HEAVY_TOP or statement.branch == _SMOOTH
+        ]
         metrics = {
             Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain): _value(row.holds)
             for row in judge(asked, claim.setting)
@@ -173,9 +175,9 @@ def _of_entry(task: Task) -> Row:
     from heavytop.features.claims.audit.audit import audited
 
     entry = library()[task.key.case]
-    judged, found = audited(entry)
+    judged, audit = audited(entry)
     metrics: dict[Quantity, Metric] = {}
-    for row in () if found is None else found.rows:
+    for row in () if audit is None else audit.rows:
         where = Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain)
         metrics[where] = _value(row.holds)
         right = (row.figures or {}).get(DIGITS)

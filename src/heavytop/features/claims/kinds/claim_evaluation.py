@@ -65,8 +65,8 @@ class ClaimEvaluation(Kind):
     table = ClaimEvaluationTable
     needed = tuple(
         quantity.text
-        for each in _SUMMED_UP
-        for quantity in (Quantity(EVALUATION_ERROR, each, _WORST), Quantity(_COUNT, each, _SINCE))
+        for what in _SUMMED_UP
+        for quantity in (Quantity(EVALUATION_ERROR, what, _WORST), Quantity(_COUNT, what, _SINCE))
     )
     may_overflow = True
     place = 90
@@ -83,7 +83,7 @@ class ClaimEvaluation(Kind):
         metrics: dict[Quantity, Metric] = {}
         series: dict[str, Series] = {}
         with working_precision(precision.bits + 64):
-            for name in (each.name for each in fields(errors_of.EvaluationError)):
+            for name in (field.name for field in fields(errors_of.EvaluationError)):
                 values = [getattr(error, name) for error in errors]
                 finite = [value for value in values if value.is_finite()]
                 worst = metric(largest(finite)) if finite else Metric("missing", None)
@@ -112,8 +112,13 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
             if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
                 yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
-            found = sizes(series)
-            if worst is not None and worst.log10 is not None and found and abs(max(found) - worst.log10) > CLOSE:
+            sizes_of_series = sizes(series)
+            if (
+                worst is not None
+                and worst.log10 is not None
+                and sizes_of_series
+                and abs(max(sizes_of_series) - worst.log10) > CLOSE
+            ):
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
@@ -136,8 +141,8 @@ class ClaimEvaluation(Kind):
 
 
 def _cells(row: Row) -> list[Cell]:
-    errors = (row.metric(EVALUATION_ERROR, each, _WORST) for each in _SUMMED_UP)
-    times = (row.metric(_COUNT, each, _SINCE) for each in ("psi", "omega"))
+    errors = (row.metric(EVALUATION_ERROR, quantity, _WORST) for quantity in _SUMMED_UP)
+    times = (row.metric(_COUNT, quantity, _SINCE) for quantity in ("psi", "omega"))
     return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
 
 
@@ -145,7 +150,7 @@ def _said(rows: Sequence[Row]) -> str:
     """``is off by up to 6.7e-8 in Ω, not finite from |t| = 37``."""
     errors = [row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text] for row in rows]
     worst = max((error for error in errors if error.log10 is not None), default=None)
-    times = [row.metrics[Quantity(_COUNT, each, _SINCE).text] for row in rows for each in _SUMMED_UP]
+    times = [row.metrics[Quantity(_COUNT, quantity, _SINCE).text] for row in rows for quantity in _SUMMED_UP]
     since = min((time for time in times if time.log10 is not None), default=None)
     off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst.value)} in Ω"
     return off + (", finite throughout" if since is None else f", not finite from |t| = {short(since.value)}")

@@ -93,7 +93,10 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     if not directions:
         return None
     # one direction of time is enough to draw
-    bases = [(case, "forward" if "forward" in found else found[0]) for case, found in directions.items()]
+    bases = [
+        (case, "forward" if "forward" in directions_of_case else directions_of_case[0])
+        for case, directions_of_case in directions.items()
+    ]
     section = Section(
         "claim-error",
         "Error of the claim",
@@ -139,8 +142,8 @@ _LOWEST = -26
 
 def _series(row: Row, name: str) -> dict[str, Series]:
     """The series of a row that are of the quantity of that name, by their components."""
-    found = [(series.quantity, series) for series in row.series.values() if series.quantity and series.times]
-    return {quantity.component: series for quantity, series in found if quantity.name == name}
+    series = [(series.quantity, series) for series in row.series.values() if series.quantity and series.times]
+    return {quantity.component: series for quantity, series in series if quantity.name == name}
 
 
 def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tuple[Key, Series, float, str]]:
@@ -153,17 +156,17 @@ def _claim_parts(rows: Sequence[Row], quantity: str, source: str) -> Iterator[tu
     in_format = "psi" if quantity == "attitude" else quantity
     for row in rows:
         subject, precision = row.key.subject, clip(row.precision, 20)
-        if subject.branch == "smooth" and (found := _series(row, MODEL_ERROR).get(quantity)):
-            yield Key(f"model{suffix}", 1, "s", "", old), found, 1.0, _symbol(quantity)
-        if row.bits == bits and (found := _series(row, EVALUATION_ERROR).get(in_format)):
-            ends = [logarithm(end) for end in (row.horizon, found.times[-1])]
+        if subject.branch == "smooth" and (model_error_series := _series(row, MODEL_ERROR).get(quantity)):
+            yield Key(f"model{suffix}", 1, "s", "", old), model_error_series, 1.0, _symbol(quantity)
+        if row.bits == bits and (model_error_series := _series(row, EVALUATION_ERROR).get(in_format)):
+            ends = [logarithm(end) for end in (row.horizon, model_error_series.times[-1])]
             scale = 10 ** ((ends[0] or 0.0) - (ends[1] or 0.0))
             colour, marker = (3, "D") if subject.form == "printed" else (2, "^")
             label = f"evaluation, {clip(subject.form, 20)} form, {precision}{suffix}"
-            yield Key(label, colour, marker, "", old), found, scale, _symbol(in_format)
-        if row.bits == bits and (found := _series(row, INTEGRATION_ERROR).get(quantity)):
+            yield Key(label, colour, marker, "", old), model_error_series, scale, _symbol(in_format)
+        if row.bits == bits and (model_error_series := _series(row, INTEGRATION_ERROR).get(quantity)):
             label = f"integration, {clip(row.integrator, 20)}, {precision}{suffix}"
-            yield Key(label, 0, "o", "", old), found, 1.0, _symbol(quantity)
+            yield Key(label, 0, "o", "", old), model_error_series, 1.0, _symbol(quantity)
 
 
 def _symbol(quantity: str) -> str:
@@ -256,7 +259,7 @@ class ClaimModel(Kind):
         metrics: dict[Quantity, Metric] = {}
         series = {}
         with working_precision(errors_of.MODEL_BITS):
-            for name in (each.name for each in fields(errors_of.ModelError)):
+            for name in (field.name for field in fields(errors_of.ModelError)):
                 quantity = Quantity(MODEL_ERROR, name)
                 values = {time: getattr(error, name) for time, error in errors.items()}
                 metrics[quantity.over("max")] = metric(largest(values.values()), "value")
@@ -293,7 +296,10 @@ class ClaimModel(Kind):
         smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
         for row in forward:
             if row.case not in smooth or row.key.subject.branch == "smooth":
-                yield _card(row, [each for each in forward if each.case == row.case and each is not row])
+                yield _card(
+                    row,
+                    [alternative for alternative in forward if alternative.case == row.case and alternative is not row],
+                )
         yield Chart(claim_error, of_all=True)
 
 
@@ -301,7 +307,7 @@ def _headline(rows: Sequence[Row]) -> Headline:
     """The first time at which a claimed Ω is off by 1 %."""
     parted = [(time, row) for row in rows if (time := row.metrics[PARTS.text].log10) is not None]
     if parted:
-        _, row = min(parted, key=lambda each: each[0])
+        _, row = min(parted, key=lambda pair: pair[0])
         at, where = f"|t| = {short(row.metrics[PARTS.text].value)}", f"{clip(row.case, 40)}, {row.key.subject.branch}"
         return Headline(f"The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from {at} on ({where}).")
     horizon = short(max((row.horizon.removeprefix("-") for row in rows), key=exact))
@@ -309,11 +315,11 @@ def _headline(rows: Sequence[Row]) -> Headline:
 
 
 def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
-    found: dict[str, dict[str, str]] = {}
+    by_branch: dict[str, dict[str, str]] = {}
     for row in rows:
-        found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
-    branches = list(dict.fromkeys(branch for times in found.values() for branch in times))
-    cells = [[case, *(times.get(branch, "-") for branch in branches)] for case, times in found.items()]
+        by_branch.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
+    branches = list(dict.fromkeys(branch for times in by_branch.values() for branch in times))
+    cells = [[case, *(times.get(branch, "-") for branch in branches)] for case, times in by_branch.items()]
     if cells:
         yield Cells("Ω off by 1 % of α = Ω3(0) I3/I1 at |t|", ["", *branches], cells, shown=In.SHORT)
 
@@ -335,8 +341,8 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
     except OutOfReach:
         if isinstance(known, DeloneHomoclinic):
             raise
-        given = partial(Problem.of, known.top, known.start, xi=CLAIM_XI)
-        (computed,) = compute([given], times, bits)
+        problem_of_system = partial(Problem.of, known.top, known.start, xi=CLAIM_XI)
+        (computed,) = compute([problem_of_system], times, bits)
         return lambda time: (computed.state(time)[:6], computed.state(time)[6:]), computed.against
     if proven is None:
         raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
@@ -364,13 +370,13 @@ def _at(row: Row, component: str, time: str) -> str | None:
 def _card(row: Row, others: Iterable[Row]) -> Card:
     """The branch of a row in full, and when its other branches part from the true motion."""
     horizon, parts_at = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
-    found = row.metric(MODEL_ERROR, "omega", "max")
+    largest = row.metric(MODEL_ERROR, "omega", "max")
     over = f"over {row.samples} samples" if row.samples else "over the samples"
     if parts_at == "never":
         lines = [Note(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
     else:
         said = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
-        largest_error = short(found.value) if found else "missing"
+        largest_error = short(largest.value) if largest else "missing"
         said += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
         lines = [Note(f"|t| = {parts_at}", style="big"), Note(said)]
     for other in others:

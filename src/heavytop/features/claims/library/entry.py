@@ -84,11 +84,11 @@ def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str,
     if "name" in table:
         raise InputError(f"{where}: both name and id are given.", "An entry has an id and a title, and no name.")
     try:
-        found = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
+        entry = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
     claim = {key: value for key, value in table.items() if key not in _KEYS}
-    return found, claim | {"name": found.title[:80], "source": found.source.text[:2_000]}
+    return entry, claim | {"name": entry.title[:80], "source": entry.source.text[:2_000]}
 
 
 def read_entry(path: Path) -> Entry:
@@ -102,16 +102,16 @@ def read_entry(path: Path) -> Entry:
 @cache
 def library() -> dict[str, Entry]:
     """The entries by id, in order of the ids; raises InputError where two claim one name."""
-    found = {entry.id: entry for entry in map(read_entry, sorted(FOLDER.glob("*.toml")))}
+    entries = {entry.id: entry for entry in map(read_entry, sorted(FOLDER.glob("*.toml")))}
     names: dict[str, str] = {}
-    for entry in found.values():
+    for entry in entries.values():
         for name in (entry.id, *entry.aliases):
             if names.setdefault(name, entry.id) != entry.id:
                 raise InputError(f"{name} is the name of {names[name]} and of {entry.id}.", _REMEDY)
         for name in entry.corrected:
-            if name not in found or found[name].expects == "holds":
+            if name not in entries or entries[name].expects == "holds":
                 raise InputError(f"{entry.id} corrects {name}, which is no entry that fails.", _REMEDY)
-    return found
+    return entries
 
 
 def file_of(name: str) -> Path | None:
@@ -122,7 +122,7 @@ def file_of(name: str) -> Path | None:
 
 def require_tag(tag: str) -> str:
     """The tag; raises InputError for one that no entry has."""
-    known = sorted({each for entry in library().values() for each in entry.tags})
+    known = sorted({tag for entry in library().values() for tag in entry.tags})
     if tag not in known:
         raise InputError(f"No claim has the tag {quoted(tag)}.", f"Tags: {', '.join(known)}.")
     return tag

@@ -24,16 +24,16 @@ class Engine:
         self.given, self.simulator = body, None
 
     def build(self, step):
-        given, plant = self.given, MultibodyPlant(step if SCHEME == "discrete" else 0.0)
-        a, b, c, d, e, f = given.about_pivot[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / given.mass
-        self.body = plant.AddRigidBody("top", SpatialInertia(given.mass, given.centre, UnitInertia(a, b, c, d, e, f)))
+        config, plant = self.given, MultibodyPlant(step if SCHEME == "discrete" else 0.0)
+        a, b, c, d, e, f = config.about_pivot[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / config.mass
+        self.body = plant.AddRigidBody("top", SpatialInertia(config.mass, config.centre, UnitInertia(a, b, c, d, e, f)))
         joint = plant.AddJoint(BallRpyJoint("ball", plant.world_frame(), self.body.body_frame()))
-        plant.mutable_gravity_field().set_gravity_vector([0, 0, -given.gravity])
+        plant.mutable_gravity_field().set_gravity_vector([0, 0, -config.gravity])
         plant.Finalize()
         self.plant, self.simulator = plant, Simulator(plant)
         self.context = self.simulator.get_mutable_context()
-        joint.set_angles(self.context, RollPitchYaw(RotationMatrix(Quaternion(given.quaternion))).vector())
-        joint.set_angular_velocity(self.context, given.omega_space)
+        joint.set_angles(self.context, RollPitchYaw(RotationMatrix(Quaternion(config.quaternion))).vector())
+        joint.set_angular_velocity(self.context, config.omega_space)
         if SCHEME != "discrete":
             ResetIntegratorFromFlags(self.simulator, SCHEME, step)
 

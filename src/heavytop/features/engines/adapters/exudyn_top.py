@@ -21,9 +21,9 @@ class Engine:
         about_pivot = make.RigidBodyInertia(body.mass, body.about_pivot, [0, 0, 0])
         about_centre = make.RigidBodyInertia(body.mass, body.inertia, body.centre, inertiaTensorAtCOM=True)
         start = {"referenceRotationMatrix": body.rotation, "initialAngularVelocity": list(body.omega_space)}
-        given = {"inertia": about_pivot if EXPLICIT else about_centre, "nodeType": NODES[NODE]}
+        options = {"inertia": about_pivot if EXPLICIT else about_centre, "nodeType": NODES[NODE]}
         down = [0, 0, 0 if EXPLICIT else -body.gravity]
-        made = system.CreateRigidBody(gravity=down, returnDict=True, **given, **start)
+        made = system.CreateRigidBody(gravity=down, returnDict=True, **options, **start)
         self.node, number, self.system = made["nodeNumber"], made["bodyNumber"], system
         if EXPLICIT:
             centre = system.AddMarker(make.MarkerBodyPosition(bodyNumber=number, localPosition=list(body.centre)))

@@ -11,9 +11,9 @@ LONG = 1e6
 class Engine:
     def __init__(self, body):
         self.centre, self.simulation = body.centre, None
-        place = body.rotation @ body.centre
+        centre = body.rotation @ body.centre
         speed = body.rotation @ np.cross(body.omega, body.centre)
-        start, twist = np.r_[place, body.quaternion], np.r_[speed, body.omega]
+        start, twist = np.r_[centre, body.quaternion], np.r_[speed, body.omega]
         self.body = kernel.NewtonEulerDS(start, twist, body.mass, body.inertia)
         self.weight = np.array([0, 0, -body.mass * body.gravity])
         self.body.setFExtPtr(self.weight)

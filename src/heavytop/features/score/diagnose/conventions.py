@@ -145,13 +145,13 @@ class Suppositions:
             return None
         own = own if numpy.isfinite(own) else 1.0
         if not self.tried:
-            self.tried = [(each, self._left(each)) for each in _suppositions(self)]
-        tried = [(each, each_error) for each, each_error in self.tried if first is None or each.drop == DROP]
-        found = self._best(tried, own, looked, drop)
-        if found is None and first is None and not drop and _forms(self.seen) & set(FORMS):
-            pairs = [(each, self._left(each)) for each in _pairs(self.seen)]
-            found = self._best(pairs, own, looked)
-        return found
+            self.tried = [(attempt, self._left(attempt)) for attempt in _suppositions(self)]
+        tried = [(attempt, each_error) for attempt, each_error in self.tried if first is None or attempt.drop == DROP]
+        best = self._best(tried, own, looked, drop)
+        if best is None and first is None and not drop and _forms(self.seen) & set(FORMS):
+            pairs = [(attempt, self._left(attempt)) for attempt in _pairs(self.seen)]
+            best = self._best(pairs, own, looked)
+        return best
 
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
@@ -159,10 +159,10 @@ class Suppositions:
         off = rates_off(seen, seen.said)
         if off is None or not _CONTRADICTS < (own := float(off.max())) < numpy.inf:
             return None
-        readings = [(name, numbers, rates_off(seen, each)) for name, numbers, each in _readings(seen)]
+        readings = [(name, numbers, rates_off(seen, reading)) for name, numbers, reading in _readings(seen)]
         left, kind, numbers = min(
             ((float(off.max()), kind, numbers) for kind, numbers, off in readings if off is not None),
-            key=lambda each: each[0],
+            key=lambda entry: entry[0],
             default=(own, "", {}),
         )
         return self._told(kind, {**numbers, "of": RATES}, own, left, seen) if left * DROP <= own else None
@@ -186,49 +186,49 @@ class Suppositions:
         growth = _ANISOTROPY * largest[1] / largest[0] if largest[0] else numpy.inf
         return growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP
 
-    def _left(self, each: _Try) -> Array:
+    def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
-        if each.start is not None or each.body is not None or each.shift:
-            early = self._error(each, self.early)
+        if attempt.start is not None or attempt.body is not None or attempt.shift:
+            early = self._error(attempt, self.early)
             if not float(early.max()) <= self._refused:
                 return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
-        return self._error(each, self.courses)
+        return self._error(attempt, self.courses)
 
     @staticmethod
-    def _error(each: _Try, courses: _Courses) -> Array:
-        seen, body = courses.seen, each.body or courses.seen.body
-        course = courses.of(each.start, body, each.shift)
-        if each.body is not None and seen.point is seen.body.centre:
+    def _error(attempt: _Try, courses: _Courses) -> Array:
+        seen, body = courses.seen, attempt.body or courses.seen.body
+        course = courses.of(attempt.start, body, attempt.shift)
+        if attempt.body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
-        if each.rates and course is not None and (plain := courses.of()) is not None:
+        if attempt.rates and course is not None and (plain := courses.of()) is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
-        if each.still:
+        if attempt.still:
             seen = replace(seen, columns={k: v for k, v in seen.columns.items() if not k.startswith("omega")})
-        return errors(seen, course, each.columns or seen.said, body)
+        return errors(seen, course, attempt.columns or seen.said, body)
 
     def _best(
         self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
     ) -> Diagnosis | None:
-        largest = [(each, float(left[:looked].max())) for each, left in tried]
-        explained = [(each, left) for each, left in largest if left * (drop or each.drop) <= own]
+        largest = [(attempt, float(left[:looked].max())) for attempt, left in tried]
+        explained = [(attempt, left) for attempt, left in largest if left * (drop or attempt.drop) <= own]
         if not explained:
             return None
         best = min(max(left, FLOOR) for _, left in explained)
-        alike = [(each, left) for each, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
+        alike = [(attempt, left) for attempt, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
         first, _ = alike[0]
         # of one kind the number that fits best
         first, left = min((pair for pair in alike if pair[0].kind == first.kind), key=lambda pair: max(pair[1], FLOOR))
         # with a number that was fitted more can be explained
-        equal = [each for each, _ in alike if each.drop <= first.drop]
-        others = list(dict.fromkeys(each.kind for each in equal if each.kind != first.kind))[:_MOST_OTHERS]
+        equal = [attempt for attempt, _ in alike if attempt.drop <= first.drop]
+        others = list(dict.fromkeys(attempt.kind for attempt in equal if attempt.kind != first.kind))[:_MOST_OTHERS]
         numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(others)} if others else {})
         return replace(self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)])), likely=bool(drop))
 
 
-def _suppositions(given: Suppositions) -> Iterator[_Try]:
+def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
     """The simplest first, those with a fitted number last."""
-    seen = given.seen
+    seen = suppositions.seen
     for kind, numbers, reading in _readings(seen):
         yield from _scopes(seen, kind, numbers, reading)
     # before the axis that points up: where both fit, the third axis points down
@@ -237,43 +237,43 @@ def _suppositions(given: Suppositions) -> Iterator[_Try]:
         if kind == "gravity_sign":
             for other, more, reading in _axes_of_space(seen):
                 yield from _scopes(seen, other, more, reading)
-    yield from _steps(given)
+    yield from _steps(suppositions)
     yield from _positions(seen)
     yield from _renamed(seen)
-    course = given.courses.of()
+    course = suppositions.courses.of()
     if course is not None:
         yield from _fitted(seen, course)
-        yield from _early_rates(given, course)
+        yield from _early_rates(suppositions, course)
 
 
-def _steps(given: Suppositions) -> Iterator[_Try]:
+def _steps(suppositions: Suppositions) -> Iterator[_Try]:
     """All columns, or Ω alone, half a step or a step of the method early or late; Ω that is 0 throughout."""
-    rates = [values for name, values in given.seen.columns.items() if name.startswith("omega")]
-    if rates and not any(values.any() for values in rates) and len(given.seen.columns) > len(rates):
+    rates = [values for name, values in suppositions.seen.columns.items() if name.startswith("omega")]
+    if rates and not any(values.any() for values in rates) and len(suppositions.seen.columns) > len(rates):
         yield _Try("omega_zero", still=True)
     for part, shift in product((Fraction(1, 2), Fraction(1)), (-1, 1)):
-        if given.step:
-            by = shift * part * given.step
+        if suppositions.step:
+            by = shift * part * suppositions.step
             whole = _Try("times_shifted", {"shift": _signed(by)}, shift=by)
             yield whole
-            if rates and len(given.seen.columns) > len(rates):
+            if rates and len(suppositions.seen.columns) > len(rates):
                 text = f"{'half a step' if part < 1 else 'one step'} {'early' if shift < 0 else 'late'}"
                 yield replace(whole, kind="omega_shifted", numbers={**whole.numbers, "steps": text}, rates=True)
 
 
-def _early_rates(given: Suppositions, course: Course) -> Iterator[_Try]:
+def _early_rates(suppositions: Suppositions, course: Course) -> Iterator[_Try]:
     """Ω alone of other times, by as much as fits."""
-    seen, small = given.seen, Fraction(1, 10**6) / Fraction(turning(given.seen.body, given.start))
+    seen, small = suppositions.seen, Fraction(1, 10**6) / Fraction(turning(suppositions.seen.body, suppositions.start))
     name = next((name for name in ("omega", "omega_space") if name in seen.columns), None)
     if name is None or len(seen.columns) < 2 or len(seen.times) < 3:
         return
     values = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
     shift = Fraction(0)
     for _ in range(_REFINED):
-        here, there = (given.courses.of(shift=at) for at in (shift, shift + small))
+        here, there = (suppositions.courses.of(shift=at) for at in (shift, shift + small))
         if here is None or there is None:
             return
-        at_shift, later = (getattr(each, name) for each in (here, there))
+        at_shift, later = (getattr(rates, name) for rates in (here, there))
         slope = (later - at_shift) / float(small)
         square = float((slope * slope).sum())
         if not 0 < square < numpy.inf or not numpy.isfinite(values).all():
@@ -291,7 +291,7 @@ def _signed(shift: Fraction) -> str:
 def _scopes(seen: Seen, kind: str, numbers: dict[str, str], reading: Reading) -> Iterator[_Try]:
     """The reading of start and columns, of the columns, of the start: as far as each is another than was said."""
     inertia = seen.body.tensor
-    before, after = (seen.start.begin(each, inertia) for each in (seen.said, reading))
+    before, after = (seen.start.begin(columns, inertia) for columns in (seen.said, reading))
     moved = not (numpy.array_equal(before.rotation, after.rotation) and numpy.array_equal(before.omega, after.omega))
     if moved:
         yield _Try(kind, {**numbers, "of": BOTH}, reading, reading)
@@ -361,7 +361,7 @@ def _angles(said: Reading) -> Iterator[Named]:
     yield "degrees", {"unit": "radians" if said.degrees else "degrees"}, replace(said, degrees=not said.degrees)
     yield "extrinsic", {"sequence": said.sequence}, replace(said, extrinsic=True)
     yield "angles_negated", {}, replace(said, negated=True)
-    others = [each for each in SEQUENCES if each != said.sequence]
+    others = [sequence for sequence in SEQUENCES if sequence != said.sequence]
     for sequence in others:
         yield "sequence", {"sequence": sequence}, replace(said, sequence=sequence)
     for sequence in others:
@@ -463,30 +463,30 @@ def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
     if "position" not in seen.columns:
         return
     said, point = seen.said, seen.point
-    given = said.vectors(seen.columns["position"] - seen.pivot)
+    positions = said.vectors(seen.columns["position"] - seen.pivot)
     true = course.rotation @ point
     size = float((true * true).sum())
     if size:
         yield from _near(
-            "position_unit", "factor", float((given * true).sum()) / size, lambda value: replace(said, scale=value)
+            "position_unit", "factor", float((positions * true).sum()) / size, lambda value: replace(said, scale=value)
         )
-    offset = (given - true).mean(axis=0)
+    offset = (positions - true).mean(axis=0)
     yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=_triple(offset)), drop=FITTED_DROP)
-    own = numpy.einsum("nji,nj->ni", course.rotation, given).mean(axis=0)
+    own = numpy.einsum("nji,nj->ni", course.rotation, positions).mean(axis=0)
     yield _Try("point", {"point": _list(own)}, replace(said, point=_triple(own)), drop=FITTED_DROP)
-    both = _point_and_offset(course, given)
+    both = _point_and_offset(course, positions)
     if both is not None:
         reading = replace(said, point=_triple(both[:3]), offset=_triple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
         yield _Try("point_and_pivot", numbers, reading, drop=FITTED_DROP)
 
 
-def _point_and_offset(course: Course, given: Array) -> Array | None:
-    design = numpy.concatenate([course.rotation, numpy.tile(numpy.eye(3), (len(given), 1, 1))], axis=2)
-    if not numpy.isfinite(design).all() or not numpy.isfinite(given).all() or len(given) < 4:
+def _point_and_offset(course: Course, positions: Array) -> Array | None:
+    design = numpy.concatenate([course.rotation, numpy.tile(numpy.eye(3), (len(positions), 1, 1))], axis=2)
+    if not numpy.isfinite(design).all() or not numpy.isfinite(positions).all() or len(positions) < 4:
         return None
-    found: Array = numpy.linalg.lstsq(design.reshape(-1, 6), given.reshape(-1), rcond=None)[0]
-    return found
+    solution: Array = numpy.linalg.lstsq(design.reshape(-1, 6), positions.reshape(-1), rcond=None)[0]
+    return solution
 
 
 def _turned(seen: Seen, course: Course) -> Iterator[_Try]:
@@ -494,11 +494,11 @@ def _turned(seen: Seen, course: Course) -> Iterator[_Try]:
     for form in ("quaternion", "matrix", "euler"):
         if form not in seen.columns:
             continue
-        given = seen.said.rotation(form, seen.columns[form])
-        if not numpy.isfinite(given).all():
+        rotations = seen.said.rotation(form, seen.columns[form])
+        if not numpy.isfinite(rotations).all():
             return
-        space = nearest_rotation((given @ course.rotation.transpose(0, 2, 1)).mean(axis=0))
-        body = nearest_rotation((course.rotation.transpose(0, 2, 1) @ given).mean(axis=0))
+        space = nearest_rotation((rotations @ course.rotation.transpose(0, 2, 1)).mean(axis=0))
+        body = nearest_rotation((course.rotation.transpose(0, 2, 1) @ rotations).mean(axis=0))
         plain = replace(seen.said, up="z")
         if seen.said.up == "z":
             text = _angle(space)
@@ -518,10 +518,10 @@ def _scaled(seen: Seen, course: Course) -> Iterator[_Try]:
         if name not in seen.columns:
             continue
         true = course.omega_space if name == "omega_space" else course.omega
-        given = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
+        vectors = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
         size = float((true * true).sum())
         if size:
-            fitted = float((given * true).sum()) / size
+            fitted = float((vectors * true).sum()) / size
             yield from _near("omega_scaled", "factor", fitted, lambda value: replace(seen.said, omega=value))
 
 
@@ -541,7 +541,7 @@ def _list(values: Array) -> str:
 
 def _pairs(seen: Seen) -> Iterator[_Try]:
     """Two readings at once."""
-    singles = [each for each in _readings(seen) if each[0] != "extrinsic"] + list(_axes_of_space(seen))
+    singles = [reading for reading in _readings(seen) if reading[0] != "extrinsic"] + list(_axes_of_space(seen))
     for i, (kind, numbers, one) in enumerate(singles):
         for other, more, two in singles[i + 1 :]:
             if kind == other:
@@ -555,7 +555,7 @@ def _merged(said: Reading, one: Reading, two: Reading) -> Reading | None:
     """Both changes; None where they are of the same thing."""
     changes = {}
     for name in Reading.__dataclass_fields__:
-        values = [getattr(each, name) for each in (one, two) if getattr(each, name) != getattr(said, name)]
+        values = [getattr(attempt, name) for attempt in (one, two) if getattr(attempt, name) != getattr(said, name)]
         if len(values) > 1:
             return None
         if values:

@@ -96,44 +96,50 @@ def diagnose(
     if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= WORTH_ASKING:
         return _rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
-        given = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
-        if frame is None and _only_rounded(written_so(1), relative_error, None if given is None else given.trusted()):
+        samples = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
+        if frame is None and _only_rounded(
+            written_so(1), relative_error, None if samples is None else samples.trusted()
+        ):
             return _rounded(written, relative_error)
-        mistake = _still(given, states, relative_error) or _reset(given) or _off_alone(given, times, measured)
+        mistake = _still(samples, states, relative_error) or _reset(samples) or _off_alone(samples, times, measured)
         if mistake is None:
             if seen is None and system in WITH_ATTITUDE:
                 seen = of_states(top, start, times, states)
             of_columns = None if seen is None else Suppositions(seen, step)
-            mistake = _explanation(given if given is not None and given.rows else None, of_columns, frame is not None)
+            mistake = _explanation(
+                samples if samples is not None and samples.rows else None, of_columns, frame is not None
+            )
     return [mistake] if mistake else []
 
 
-def _explanation(given: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
+def _explanation(examined: Examined | None, columns: Suppositions | None, columns_first: bool) -> Diagnosis | None:
     """The explanation of the states, from their motion or from the columns, over all samples or the first ones."""
 
     @cache
     def on_samples(first: int | None) -> _Tried:
-        assert given is not None
-        return _tried(given, first)
+        assert examined is not None
+        return _tried(examined, first)
 
     def told(first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
-        of_columns = (each.sure(first, drop) for each in [columns] if each is not None)
-        of_states = (_mistake(on_samples(first), drop) for _ in [given] if given is not None)
-        found = chain(of_columns, of_states) if columns_first else chain(of_states, of_columns)
-        each_told = (each for each in found if each is not None)
+        of_columns = (suppositions.sure(first, drop) for suppositions in [columns] if suppositions is not None)
+        of_states = (_mistake(on_samples(first), drop) for _ in [examined] if examined is not None)
+        diagnoses = chain(of_columns, of_states) if columns_first else chain(of_states, of_columns)
+        each_told = (diagnosis for diagnosis in diagnoses if diagnosis is not None)
         if drop:  # a guess is the better one
-            return min(each_told, key=lambda each: (each.left or 0.0) / (each.error or 1.0), default=None)
+            return min(
+                each_told, key=lambda diagnosis: (diagnosis.left or 0.0) / (diagnosis.error or 1.0), default=None
+            )
         return next(each_told, None)
 
     exact = told()
-    if exact is None and given is not None:
-        every = given.widened()
+    if exact is None and examined is not None:
+        every = examined.widened()
         exact = _looked_at(every, _lost_row(every))
     exact = exact or next((sure for first in FIRST if (sure := told(first)) is not None), None)
     if exact is None and columns is not None:
         exact = columns.of_rates()
     likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
-    return exact or likely or (None if given is None else _looked_at(given, _integrals_off(given)))
+    return exact or likely or (None if examined is None else _looked_at(examined, _integrals_off(examined)))
 
 
 def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
@@ -143,16 +149,16 @@ def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
     return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
 
 
-def _only_rounded(written: Rounding | None, error: float | None, given: Examined | None) -> bool:
+def _only_rounded(written: Rounding | None, error: float | None, examined: Examined | None) -> bool:
     """Whether every component that is looked at is the true one, rounded as it is written."""
     if written is None or (error is not None and error > EXPLAINS * written.error):
         return False
-    truth = None if given is None or not given.rows else given.supposed(given.times)
-    if given is None or truth is None:
+    truth = None if examined is None or not examined.rows else examined.supposed(examined.times)
+    if examined is None or truth is None:
         return error is not None
-    units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(given.units.time), given.rate))
-    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * WORTH_ASKING * sizes
-    return bool((numpy.abs(given.states - truth) <= allowed).all())
+    units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(examined.units.time), examined.rate))
+    allowed = EXPLAINS * written.spacing(examined.states / units) / 2 * units + 10 * WORTH_ASKING * sizes
+    return bool((numpy.abs(examined.states - truth) <= allowed).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,13 +172,13 @@ class _Tried:
     fitted: bool
 
 
-def _tried(given: Examined, first: int | None) -> _Tried:
+def _tried(examined: Examined, first: int | None) -> _Tried:
     """All suppositions, or on the first samples those without a fitted number."""
-    given = given if first is None else given.at(given.rows[: first + (not given.times[0])])
-    truth = given.supposed(given.times)
-    error = _TOO_FAR if truth is None else given.error(truth)
-    tried = [*_hypotheses(given, truth, first is None)] if error > WORTH_ASKING else []
-    return _Tried(given, truth, error, tried, first is None)
+    examined = examined if first is None else examined.at(examined.rows[: first + (not examined.times[0])])
+    truth = examined.supposed(examined.times)
+    error = _TOO_FAR if truth is None else examined.error(truth)
+    tried = [*_hypotheses(examined, truth, first is None)] if error > WORTH_ASKING else []
+    return _Tried(examined, truth, error, tried, first is None)
 
 
 def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
@@ -180,27 +186,27 @@ def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
 
     drop: a smaller one than usual, of suppositions without a fitted number.
     """
-    given, error = tried.given, tried.error
-    explained = [each for each in tried.hypotheses if each.left * (drop or each.drop) <= error]
-    explained = [each for each in explained if each.drop == DROP or not drop]
+    examined, error = tried.given, tried.error
+    explained = [hypothesis for hypothesis in tried.hypotheses if hypothesis.left * (drop or hypothesis.drop) <= error]
+    explained = [hypothesis for hypothesis in explained if hypothesis.drop == DROP or not drop]
     if not explained and error > _WRONG and tried.fitted and not drop:
-        others = hypotheses.of_equations(given, tried.truth)
-        explained = [each for each in others if each.left * FITTED_DROP <= error]
+        others = hypotheses.of_equations(examined, tried.truth)
+        explained = [hypothesis for hypothesis in others if hypothesis.left * FITTED_DROP <= error]
     if not explained:
         return None
-    best = min(max(each.left, FLOOR) for each in explained)
-    first = next(each for each in explained if each.left <= (AS_LIKELY if drop else ALIKE) * best)
-    return _looked_at(given, Diagnosis(first.kind, first.numbers, error, first.left, likely=bool(drop)))
+    best = min(max(hypothesis.left, FLOOR) for hypothesis in explained)
+    first = next(hypothesis for hypothesis in explained if hypothesis.left <= (AS_LIKELY if drop else ALIKE) * best)
+    return _looked_at(examined, Diagnosis(first.kind, first.numbers, error, first.left, likely=bool(drop)))
 
 
-def _reset(given: Examined | None) -> Diagnosis | None:
+def _reset(examined: Examined | None) -> Diagnosis | None:
     """From some sample on, states are those of the motion that starts again there, as a program restarts what it lost.
 
     They jump, to a state near the start, and go on from it: a motion that comes back to its start does not jump.
     """
-    if given is None or not given.is_whole or len(given.all_times) < _FEWEST_ROWS:
+    if examined is None or not examined.is_whole or len(examined.all_times) < _FEWEST_ROWS:
         return None
-    every = given.at(range(min(len(given.all_times), MOST_AT_ONCE)))
+    every = examined.at(range(min(len(examined.all_times), MOST_AT_ONCE)))
     times = numpy.array([float(time) for time in every.times])
     grid = numpy.linspace(0, numpy.diff(times).max() if times[0] >= 0 else numpy.diff(times).min(), _GRID)
     truth = every.supposed(every.times)
@@ -213,10 +219,10 @@ def _reset(given: Examined | None) -> Diagnosis | None:
     back = numpy.flatnonzero((near[1:-2] <= _BACK) & (own[1:-2] > _JUMPS)) + 1
     for row in map(int, back):
         rows = range(row, min(row + _FOLLOWED, len(times)))
-        place = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
+        nearest = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
         expected = every.follows(row - 1)
         again = every.at([every.rows[n] for n in rows])
-        moved = again.supposed([time - every.times[row] + Fraction(grid[place]) for time in again.times])
+        moved = again.supposed([time - every.times[row] + Fraction(grid[nearest]) for time in again.times])
         jumps = expected is not None and _apart(every, every.states[row], expected) > _JUMPS
         if jumps and moved is not None and (left := again.error(moved)) * _AGAIN <= (error := float(own[rows].max())):
             return Diagnosis("reset", {"t": in_units(times[row], every.units.time)}, error, left)
@@ -224,46 +230,46 @@ def _reset(given: Examined | None) -> Diagnosis | None:
 
 
 def _still(
-    given: Examined | None, states: Sequence[Sequence[Fraction | None]], relative_error: float | None
+    examined: Examined | None, states: Sequence[Sequence[Fraction | None]], relative_error: float | None
 ) -> Diagnosis | None:
     """From some time on every state is the same, which are three at least, though the motion moves there."""
     same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
     right = relative_error is not None and relative_error <= _WRONG
-    if given is None or right or same < _FEWEST_STILL or not _moves(given, len(states) - same):
+    if examined is None or right or same < _FEWEST_STILL or not _moves(examined, len(states) - same):
         return None
     if same == len(states):
         return Diagnosis("constant")
-    first = in_units(given.all_times[-same], given.units.time)
+    first = in_units(examined.all_times[-same], examined.units.time)
     return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
 
 
-def _moves(given: Examined, row: int) -> bool:
+def _moves(examined: Examined, row: int) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
-    true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
-    pairs = [(here, given.follows(row))] + ([] if true is None else [(true[0], true[1])])
-    return any(after is not None and _apart(given, after, before) > _WRONG for before, after in pairs)
+    true, here = examined.supposed(examined.all_times[row : row + 2]), examined.all_states[row]
+    pairs = [(here, examined.follows(row))] + ([] if true is None else [(true[0], true[1])])
+    return any(after is not None and _apart(examined, after, before) > _WRONG for before, after in pairs)
 
 
-def _apart(given: Examined, one: Array, other: Array) -> float:
+def _apart(examined: Examined, one: Array, other: Array) -> float:
     """How far two states are apart, relative to the size of Ω and of γ."""
-    return float((numpy.abs(one - other) / numpy.repeat([given.rate, 1.0], [3, len(one) - 3])).max())
+    return float((numpy.abs(one - other) / numpy.repeat([examined.rate, 1.0], [3, len(one) - 3])).max())
 
 
-def _off_alone(given: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
+def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
     """A few states that are off while all others are right.
 
     errors: as far as they were measured; where there are none, those of what heyoka reaches.
     """
-    every = given.widened() if given is not None and not len(errors) else None
+    every = examined.widened() if examined is not None and not len(errors) else None
     truth = None if every is None or not every.rows else every.supposed(every.times)
     if every is not None and truth is not None:
         errors = every.errors(truth)
     order = numpy.argsort(-errors, kind="stable")
     most = max(1, min(_MOST_ALONE, len(errors) // _FEW_OF)) if len(errors) > 2 else 0
-    found = [n for n in range(1, most + 1) if _gap(errors[order[n - 1]], errors[order[n]])]
-    off = sorted(map(int, order[: found[-1]])) if found else []
+    gaps = [n for n in range(1, most + 1) if _gap(errors[order[n - 1]], errors[order[n]])]
+    off = sorted(map(int, order[: gaps[-1]])) if gaps else []
     last = len(errors) - 1
-    if not off or (last in off and (len(off) > 1 or not _jumps(given, times, last, errors))):
+    if not off or (last in off and (len(off) > 1 or not _jumps(examined, times, last, errors))):
         return None
     error, left = (min(float(errors[row]), float_info.max) for row in (order[0], order[len(off)]))
     where = ", ".join(decimal_text(times[row], 6) for row in off)
@@ -278,32 +284,32 @@ def _gap(error: float, other: float) -> bool:
     return bool(error > WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
 
 
-def _jumps(given: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
+def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
     """Whether the last state is not that of the motion through the one before, nor much later than that."""
     spans = [abs(b - a) for a, b in zip([Fraction(0), *times[: last - 1]], times[:last], strict=True)]
-    if given is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
+    if examined is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
         return False
-    expected = given.follows(last - 1)
+    expected = examined.follows(last - 1)
     if expected is None:
         return False
-    return _apart(given, given.all_states[last], expected) >= float(errors[last]) / 2
+    return _apart(examined, examined.all_states[last], expected) >= float(errors[last]) / 2
 
 
-def _looked_at(given: Examined, found: Diagnosis | None) -> Diagnosis | None:
+def _looked_at(examined: Examined, diagnosis: Diagnosis | None) -> Diagnosis | None:
     """The diagnosis with how many of the states it was found in, where that is not all of them."""
-    looked, all_of_them = len(given.rows), len(given.all_times)
-    if found is None or looked == all_of_them:
-        return found
-    return replace(found, looked_at=(looked, all_of_them, in_units(given.times[-1], given.units.time)))
+    looked, all_of_them = len(examined.rows), len(examined.all_times)
+    if diagnosis is None or looked == all_of_them:
+        return diagnosis
+    return replace(diagnosis, looked_at=(looked, all_of_them, in_units(examined.times[-1], examined.units.time)))
 
 
-def _hypotheses(given: Examined, truth: Array | None, fitted: bool) -> Iterator[Hypothesis]:
+def _hypotheses(examined: Examined, truth: Array | None, fitted: bool) -> Iterator[Hypothesis]:
     """The simplest first, those with a fitted number last, if at all."""
-    columns, error = (None, 0.0) if truth is None else hypotheses.reading(given, truth) or (None, 0.0)
+    columns, error = (None, 0.0) if truth is None else hypotheses.reading(examined, truth) or (None, 0.0)
     if columns is not None and columns.changes == 1:
         yield columns.leaving(error)
-    yield from hypotheses.without_numbers(given)
-    clock = hypotheses.clock(given, fitted)
+    yield from hypotheses.without_numbers(examined)
+    clock = hypotheses.clock(examined, fitted)
     if clock is not None and clock.drop == DROP:
         yield clock
     if columns is not None and columns.changes > 1:
@@ -311,11 +317,11 @@ def _hypotheses(given: Examined, truth: Array | None, fitted: bool) -> Iterator[
     if not fitted:
         return
     if truth is not None:
-        yield from hypotheses.scaled(given, truth)
+        yield from hypotheses.scaled(examined, truth)
     if clock is not None and clock.drop > DROP:
         yield clock
     fits = hypotheses.all_scaled, hypotheses.another_weight, hypotheses.another_start, hypotheses.another_top
-    yield from (hypothesis for fit in fits if (hypothesis := fit(given)) is not None)
+    yield from (hypothesis for fit in fits if (hypothesis := fit(examined)) is not None)
 
 
 def _lost_row(every: Examined) -> Diagnosis | None:
@@ -324,12 +330,12 @@ def _lost_row(every: Examined) -> Diagnosis | None:
     if len(times) < _FEWEST_ROWS:
         return None
     ends = {"row_missing": [*times[1:], 2 * times[-1] - times[-2]], "row_twice": [Fraction(0), *times[:-1]]}
-    found = [(kind, every.supposed(moved)) for kind, moved in ends.items()]
+    readings = [(kind, every.supposed(moved)) for kind, moved in ends.items()]
     truth = every.supposed(times)
     if truth is None:
         return None
     own = every.errors(truth)
-    for kind, moved_truth in found:
+    for kind, moved_truth in readings:
         if moved_truth is None:
             continue
         moved = every.errors(moved_truth)
@@ -342,20 +348,20 @@ def _lost_row(every: Examined) -> Diagnosis | None:
     return None
 
 
-def _integrals_off(given: Examined) -> Diagnosis | None:
+def _integrals_off(examined: Examined) -> Diagnosis | None:
     """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
-    if len(given.rows) < 3 or not given.is_whole:
+    if len(examined.rows) < 3 or not examined.is_whole:
         return None
-    truth = given.supposed(given.times)
-    error = _TOO_FAR if truth is None else given.error(truth)
+    truth = examined.supposed(examined.times)
+    error = _TOO_FAR if truth is None else examined.error(truth)
     if error <= WORTH_ASKING:
         return None
-    p = given.system.parameters(given.top, given.start)
-    start = [float(value) for value in given.start.flat]
-    vectors = given.states.reshape(len(given.states), -1, 3) @ given.frame.axes
+    p = examined.system.parameters(examined.top, examined.start)
+    start = [float(value) for value in examined.start.flat]
+    vectors = examined.states.reshape(len(examined.states), -1, 3) @ examined.frame.axes
     numbers: dict[str, str] = {}
-    for integral in holding(given.top, given.start, given.system):
-        if integral.name not in (sizes := _sizes(given)):
+    for integral in holding(examined.top, examined.start, examined.system):
+        if integral.name not in (sizes := _sizes(examined)):
             continue
         size, unit = sizes[integral.name]
         values = numpy.array([float(integral.value(p, [*omega, *gamma])) for omega, gamma, *_ in vectors])
@@ -371,18 +377,18 @@ def _integrals_off(given: Examined) -> Diagnosis | None:
     return Diagnosis("integrals_off", numbers, error) if told else None
 
 
-def _sizes(given: Examined) -> dict[str, tuple[float, Fraction]]:
+def _sizes(examined: Examined) -> dict[str, tuple[float, Fraction]]:
     """Sizes of the integrals that are looked at, and their units."""
-    p = given.system.parameters(given.top, given.start)
+    p = examined.system.parameters(examined.top, examined.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
-    rotor = max(abs(float(value)) for value in given.top.rotor or (0,))
-    area, energy = inertia * given.rate + rotor, inertia * given.rate**2 + moment
-    area_unit, energy_unit = given.units.moment * given.units.time, given.units.moment
+    rotor = max(abs(float(value)) for value in examined.top.rotor or (0,))
+    area, energy = inertia * examined.rate + rotor, inertia * examined.rate**2 + moment
+    area_unit, energy_unit = examined.units.moment * examined.units.time, examined.units.moment
     return {
         "gamma_squared": (1.0, Fraction(1)),
         "area": (area, area_unit),
         "energy": (energy, energy_unit),
         "gyrostat_energy": (energy, energy_unit),
         "momentum_squared": (area**2, area_unit**2),
-        "spin": (given.rate, 1 / given.units.time),
+        "spin": (examined.rate, 1 / examined.units.time),
     }

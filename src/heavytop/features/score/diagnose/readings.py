@@ -53,8 +53,8 @@ class BodyData:
     def steiner(self) -> Array:
         """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
         c = self.centre
-        found: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
-        return found
+        tensor: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
+        return tensor
 
     @property
     def tensor(self) -> Array:
@@ -80,15 +80,15 @@ class Course:
     @property
     def omega_space(self) -> Array:
         """R Ω."""
-        found: Array = numpy.einsum("nij,nj->ni", self.rotation, self.omega)
-        return found
+        vectors: Array = numpy.einsum("nij,nj->ni", self.rotation, self.omega)
+        return vectors
 
 
 def nearest_rotation(matrix: Array) -> Array:
     """The orthogonal matrix nearest to each of the last two axes; of determinant 1 where theirs is positive."""
     left, _, right = numpy.linalg.svd(matrix)
-    found: Array = left @ right
-    return found
+    rotation: Array = left @ right
+    return rotation
 
 
 def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
@@ -194,21 +194,21 @@ class Reading:
 
     def rotation(self, form: str, values: Array) -> Array:
         """R in canonical axes of space from the columns of ``form``, shape (n, 3, 3)."""
-        found = self._plain(form, values)
+        rotations = self._plain(form, values)
         if self.mirror is not None:
             signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
-            found = found * signs[:, None] * signs
-        return upright(numpy.array(self.space).T @ found @ numpy.array(self.body), self.up)
+            rotations = rotations * signs[:, None] * signs
+        return upright(numpy.array(self.space).T @ rotations @ numpy.array(self.body), self.up)
 
     def _plain(self, form: str, values: Array) -> Array:
         if form == "quaternion":
             unit = values / numpy.linalg.norm(values, axis=1)[:, None]
             w, x, y, z = (unit[:, [3, 0, 1, 2]] if self.scalar_last else unit).T
-            found = _stacked(matrix_of_quaternion((w, x, y, z)), len(values))
-            return found.transpose(0, 2, 1) if self.conjugate else found
+            rotations = _stacked(matrix_of_quaternion((w, x, y, z)), len(values))
+            return rotations.transpose(0, 2, 1) if self.conjugate else rotations
         if form == "matrix":
-            found = values.reshape(-1, 3, 3)
-            return found.transpose(0, 2, 1) if self.transposed else found
+            rotations = values.reshape(-1, 3, 3)
+            return rotations.transpose(0, 2, 1) if self.transposed else rotations
         angles = values * (-1 if self.negated else 1) * (_DEGREE if self.degrees else 1)
         if self.extrinsic:
             return _stacked(rows_of_euler(self.sequence[::-1], list(angles[:, ::-1].T), _NUMPY), len(values))
@@ -221,8 +221,8 @@ class Reading:
 
     def body_vectors(self, values: Array, axial: bool = False) -> Array:
         """Vectors of the body in the axes said, shape (n, 3)."""
-        found: Array = self._reflected(values, axial) @ numpy.array(self.body)
-        return found
+        vectors: Array = self._reflected(values, axial) @ numpy.array(self.body)
+        return vectors
 
     def _reflected(self, values: Array, axial: bool) -> Array:
         if self.mirror is None:
@@ -233,25 +233,25 @@ class Reading:
 
 def _stacked(rows: object, count: int) -> Array:
     """Rows of columns as an array of matrices."""
-    found = numpy.empty((count, 3, 3))
+    stacked = numpy.empty((count, 3, 3))
     for i, row in enumerate(rows):  # type: ignore[arg-type,var-annotated]
         for j, entry in enumerate(row):
-            found[:, i, j] = entry
-    return found
+            stacked[:, i, j] = entry
+    return stacked
 
 
 def upright(matrices: Array, up: str) -> Array:
     """Matrices whose rows are axes of space, with canonical ones in their place."""
     places, signs = UPS[up]
-    found: Array = matrices[..., list(places), :] * numpy.array(signs, dtype=float)[:, None]
-    return found
+    rotations: Array = matrices[..., list(places), :] * numpy.array(signs, dtype=float)[:, None]
+    return rotations
 
 
 def upright_vectors(vectors: Array, up: str) -> Array:
     """Vectors of space in canonical axes."""
     places, signs = UPS[up]
-    found: Array = vectors[..., list(places)] * numpy.array(signs, dtype=float)
-    return found
+    upright: Array = vectors[..., list(places)] * numpy.array(signs, dtype=float)
+    return upright
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,12 +335,12 @@ def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, va
         omega = omega @ body.tensor
     if (name == "omega_space") != reading.swapped:
         true = numpy.einsum("nij,nj->ni", course.rotation, omega)
-        given = reading.vectors(values, True)
+        vectors = reading.vectors(values, True)
     else:
-        true, given = omega, reading.body_vectors(values, True)
+        true, vectors = omega, reading.body_vectors(values, True)
     size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
-    found: Array = (given / reading.omega - true) / size
-    return found
+    errors: Array = (vectors / reading.omega - true) / size
+    return errors
 
 
 def _position_error(seen: Seen, course: Course, reading: Reading, values: Array) -> Array:
@@ -349,9 +349,9 @@ def _position_error(seen: Seen, course: Course, reading: Reading, values: Array)
     if reading.displaced:
         true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
     size = float(numpy.linalg.norm(point)) or 1.0
-    given = reading.vectors(values - seen.pivot)
-    found: Array = ((given - numpy.array(reading.offset)) / reading.scale - true) / size
-    return found
+    positions = reading.vectors(values - seen.pivot)
+    errors: Array = ((positions - numpy.array(reading.offset)) / reading.scale - true) / size
+    return errors
 
 
 def rates_off(seen: Seen, reading: Reading) -> Array | None:
@@ -384,19 +384,19 @@ def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
     columns, said = seen.columns, seen.said
     forms = [form for form in ("quaternion", "matrix", "euler") if form in columns]
     rows = {form: said.rotation(form, columns[form]) for form in forms}
-    found: dict[tuple[str, str], Array] = {}
+    errors: dict[tuple[str, str], Array] = {}
     for other in forms[1:]:
-        found[forms[0], other] = numpy.abs(rows[forms[0]] - rows[other]).max(axis=(1, 2))
+        errors[forms[0], other] = numpy.abs(rows[forms[0]] - rows[other]).max(axis=(1, 2))
     if not forms:
-        return found
+        return errors
     first = rows[forms[0]]
     if "gamma" in columns:
-        found[forms[0], "gamma"] = numpy.abs(first[:, 2] - columns["gamma"]).max(axis=1)
+        errors[forms[0], "gamma"] = numpy.abs(first[:, 2] - columns["gamma"]).max(axis=1)
     if {"omega", "omega_space"} <= columns.keys():
         true = numpy.einsum("nij,nj->ni", first, columns["omega"])
         size = float(numpy.abs(true).max()) or 1.0
-        found["omega", "omega_space"] = numpy.abs(said.vectors(columns["omega_space"]) - true).max(axis=1) / size
-    return found
+        errors["omega", "omega_space"] = numpy.abs(said.vectors(columns["omega_space"]) - true).max(axis=1) / size
+    return errors
 
 
 def of_states(
@@ -414,6 +414,6 @@ def of_states(
         return None
     along = numpy.cross(gamma, numpy.eye(3)[int(numpy.abs(gamma).argmin())])
     rows = numpy.array([along, numpy.cross(gamma, along), gamma])
-    given = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
+    reading = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
     split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
-    return Seen(tuple(times), split, body, given, Reading(), centre, numpy.zeros(3))
+    return Seen(tuple(times), split, body, reading, Reading(), centre, numpy.zeros(3))

@@ -152,13 +152,13 @@ class Examined:
     @property
     def tensor(self) -> Array:
         """The inertia tensor in the axes of the file."""
-        found: Array = self.frame.axes * floats(self.top.inertia) @ self.frame.axes.T
-        return found
+        tensor: Array = self.frame.axes * floats(self.top.inertia) @ self.frame.axes.T
+        return tensor
 
     def in_file(self, vector: Sequence[Fraction]) -> Array:
         """A vector in principal axes, or several one after the other, in the axes of the file."""
-        found: Array = (floats(vector).reshape(-1, 3) @ self.frame.axes.T).reshape(-1)
-        return found
+        products: Array = (floats(vector).reshape(-1, 3) @ self.frame.axes.T).reshape(-1)
+        return products
 
     def starting(self, values: Array) -> Examined:
         """This motion with that start, in the axes of the file."""
@@ -191,8 +191,12 @@ class Examined:
         if any(abs(float(time)) * self.rate > FARTHEST for time in times):
             return None
         xi = self.frame.xi if self.system in WITH_ATTITUDE else None
-        found = motion(top or self.top, start or self.start, self.system, times, xi)
-        return None if found is None else (found.reshape(len(found), -1, 3) @ self.frame.axes.T).reshape(len(found), -1)
+        states = motion(top or self.top, start or self.start, self.system, times, xi)
+        return (
+            None
+            if states is None
+            else (states.reshape(len(states), -1, 3) @ self.frame.axes.T).reshape(len(states), -1)
+        )
 
     def at(self, rows: Sequence[int]) -> Examined:
         """This motion at other samples."""
@@ -225,10 +229,10 @@ class Examined:
         if numpy.isnan(self.all_states[row]).any():
             return None
         try:
-            found = self.starting(self.all_states[row]).supposed([span])
+            states = self.starting(self.all_states[row]).supposed([span])
         except HeavyTopError:  # beyond the numbers that a start may have
             return None
-        return None if found is None else found[0]
+        return None if states is None else states[0]
 
     def errors(self, supposed: Array) -> Array:
         """The error of each state relative to the size of Ω and γ in the supposed ones, shape (n,)."""
@@ -239,8 +243,8 @@ class Examined:
         gamma = sizes[:, 3:].max() or 1.0
         # of what the file gives
         largest = (numpy.fmax.reduce(part, axis=1) for part in (off[:, :3] / omega, off[:, 3:] / gamma))
-        found: Array = numpy.fmax(*largest)
-        return found
+        errors: Array = numpy.fmax(*largest)
+        return errors
 
     def error(self, supposed: Array | None) -> float:
         """The largest of the errors; infinite for None."""
@@ -286,11 +290,11 @@ def examined(
     rows = looked_at(ends, rate)
     if worst is not None and worst < rows[-1]:
         rows = sorted({*rows, worst})
-    found = Examined(
+    samples = Examined(
         top, start, system, tuple(times), array, tuple(rows), array[rows], rate, units, frame or FileAxes()
     )
-    trusted = found.trusted()
-    return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
+    trusted = samples.trusted()
+    return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else samples
 
 
 def looked_at(times: Sequence[float], rate: float) -> list[int]:
@@ -330,7 +334,7 @@ def motion(
 ) -> Array | None:
     """States of heyoka in double at ``times``, shape (n, 6), or (n, 9) with ξ; None where it does not get there."""
     first = [float(value) for value in (*start.flat, *(xi or ()))]
-    found = numpy.empty((len(times), len(first)))
+    states = numpy.empty((len(times), len(first)))
     for sign in (1, -1):
         asked = {time: [] for time in sorted({t for t in times if sign * t > 0}, key=abs)}  # type: dict[Fraction, list[int]]
         if not asked:
@@ -345,9 +349,9 @@ def motion(
         if run.outcome is not Outcome.SUCCESS:
             return None
         for rows, state in zip(asked.values(), run.states, strict=True):
-            found[rows] = state
-    found[[row for row, time in enumerate(times) if time == 0]] = first
-    return found
+            states[rows] = state
+    states[[row for row, time in enumerate(times) if time == 0]] = first
+    return states
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:

@@ -37,14 +37,14 @@ def of_bag(path: Path) -> str:
                 if not any(name.endswith("stamp.sec") for name in values):
                     values = {"timestamp": f"{nanoseconds}e-9"} | values
                 rows += [",".join(values)] * (not rows) + [",".join(values.values())]
-    found = {topic: rows for topic, rows in topics.items() if rows}
-    if len(found) != 1:
-        names = ", ".join(found) or "none of " + (", ".join(topics) or "no topics")
+    topics_with_rows = {topic: rows for topic, rows in topics.items() if rows}
+    if len(topics_with_rows) != 1:
+        names = ", ".join(topics_with_rows) or "none of " + (", ".join(topics) or "no topics")
         raise InputError(
-            f"Attitudes or angular velocities are in {len(found)} topics: {names}.",
+            f"Attitudes or angular velocities are in {len(topics_with_rows)} topics: {names}.",
             "Give a bag with one: rosbags-convert --src FILE --dst FILE.mcap --include-topic NAME.",
         )
-    return "\n".join([*comments, *found.popitem()[1]])
+    return "\n".join([*comments, *topics_with_rows.popitem()[1]])
 
 
 @contextmanager

@@ -109,16 +109,16 @@ class Header:
 
     def of_state(self) -> dict[str, int]:
         """The places of t, omega1 to omega3, gamma1 to gamma3, as far as they are there; InputError for one twice."""
-        found = {} if self.time is None else {"t": self.time}
+        indices = {} if self.time is None else {"t": self.time}
         for quantity, name in (("omega", "omega"), ("framed", "omega"), ("gamma", "gamma")):
             components = self.places.get(quantity, {})
             if {"0", "3"} <= set(components):
                 raise InputError(f"There are {name}0 and {name}3.", "Number them from 1 to 3, or from 0 to 2.")
-            for component, place in components.items():
+            for component, index in components.items():
                 axis = _AXES.get(component) or str(int(component) + ("0" in components))
-                if found.setdefault(f"{name}{axis}", place) != place:
+                if indices.setdefault(f"{name}{axis}", index) != index:
                     raise InputError(f"The column {name}{axis} stands twice.", "Give each column once.")
-        return found
+        return indices
 
 
 def header(names: Sequence[str], joint: str = "") -> Header:
@@ -127,18 +127,18 @@ def header(names: Sequence[str], joint: str = "") -> Header:
     joint: of columns qpos and qvel, "free" or "ball".
     """
     names = [canonical(name, joint) for name in names]
-    found: dict[str, dict[str, int]] = {}
+    indices: dict[str, dict[str, int]] = {}
     time, angles, others = None, set(), []
     units: dict[str, set[Unit]] = {}
     plainly = [_plain(_with_index(name.strip())) for name in names]
     together = _quaternion(names, plainly)
-    for place, (name, plain) in enumerate(zip(names, plainly, strict=True)):
-        if place in together.values():
+    for index, (name, plain) in enumerate(zip(names, plainly, strict=True)):
+        if index in together.values():
             continue
         if plain in _TIME:
             if time is not None:
                 raise InputError("The column t stands twice.", "Give each column once.")
-            time = place
+            time = index
             units["t"] = {_unit("t", name)}
             continue
         meaning = _meaning(plain)
@@ -146,21 +146,21 @@ def header(names: Sequence[str], joint: str = "") -> Header:
             others.append(name)
             continue
         quantity, component = meaning
-        if component in found.setdefault(quantity, {}):
+        if component in indices.setdefault(quantity, {}):
             of_state = quantity in ("omega", "gamma")
             said = f"{quantity}{_AXES.get(component, component)}" if of_state else quoted(name)
             raise InputError(f"The column {said} stands twice.", "Give each column once.")
-        found[quantity][component] = place
+        indices[quantity][component] = index
         units.setdefault(quantity, set()).add(_unit(quantity, name))
         if quantity == "euler" and (unit := _UNIT.search(name.strip())):
             angles.add("degrees" if unit[1] else "radians")
     if len(angles) > 1:
         raise InputError("The header has angles in degrees and in radians.", "Give all of them in one unit.")
     if together:
-        found["quaternion"] = together
+        indices["quaternion"] = together
     for name in others:
-        _require_no_quantity(name, found)
-    return Header(time, found, "".join(angles), tuple(others), _in_one_unit(units))
+        _require_no_quantity(name, indices)
+    return Header(time, indices, "".join(angles), tuple(others), _in_one_unit(units))
 
 
 def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
@@ -170,18 +170,18 @@ def _quaternion(names: Sequence[str], plain: Sequence[str]) -> dict[str, int]:
     """
     if any(meaning is not None and meaning[0] == "quaternion" for meaning in map(_meaning, plain)):
         return {}
-    runs = [(place, tuple(plain[place : place + 4])) for place in range(len(plain) - 3)]
+    runs = [(begin, tuple(plain[begin : begin + 4])) for begin in range(len(plain) - 3)]
     lengths = [_unit("position", name).name in _LENGTHS for name in names]
-    found = [(place, run) for place, run in runs if run in _TOGETHER and not any(lengths[place : place + 4])]
-    if len(found) > 1:
+    matches = [(begin, run) for begin, run in runs if run in _TOGETHER and not any(lengths[begin : begin + 4])]
+    if len(matches) > 1:
         raise InputError(
             f"Of the columns {quoted(','.join(names))[:80]} more than four may be a quaternion.",
             "Call them qw,qx,qy,qz, and positions px,py,pz.",
         )
-    return {name[-1]: place + number for place, run in found for number, name in enumerate(run)}
+    return {name[-1]: begin + number for begin, run in matches for number, name in enumerate(run)}
 
 
-def _require_no_quantity(name: str, found: Mapping[str, object]) -> None:
+def _require_no_quantity(name: str, indices: Mapping[str, object]) -> None:
     """Raises InputError for a column that is not read, called as one of a quantity that no other column gives.
 
     So of a unit that does not stand in brackets: the quantity would be passed over.  What stands behind ``_`` makes
@@ -192,7 +192,7 @@ def _require_no_quantity(name: str, found: Mapping[str, object]) -> None:
         begins = _plain(begun := "".join(parts[:end]))
         quantity = (None if begins in _CLASSIC else _meaning(begins)) or ("", "")
         named = quantity[0] in (*_OMEGA, "gamma") or (quantity[0] and "_" not in parts[end])
-        if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & found.keys():
+        if named and not {quantity[0], *(_OMEGA if quantity[0] in _OMEGA else ())} & indices.keys():
             raise InputError(
                 f"The column {quoted(name)} begins like one of the {_words(quantity[0])}, and is not understood.",
                 f"Write a unit in brackets, {quoted(begun + ' [unit]')}, or give the column another name.",
@@ -214,8 +214,8 @@ def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
         if len({(unit.size, unit.turning) for unit in said}) > 1:
             names = " and ".join(sorted(f"in {unit.name}" if unit.name else "without a unit" for unit in said))
             raise InputError(f"The header has the {_words(quantity)} {names}.", "Give all of it in one unit.")
-    found = {quantity: min(said, key=lambda unit: unit.name) for quantity, said in units.items()}
-    return {quantity: unit for quantity, unit in found.items() if unit.size != 1}
+    unit_of_quantity = {quantity: min(said, key=lambda unit: unit.name) for quantity, said in units.items()}
+    return {quantity: unit for quantity, unit in unit_of_quantity.items() if unit.size != 1}
 
 
 def _with_index(name: str) -> str:
@@ -243,15 +243,15 @@ def _meaning(plain: str) -> tuple[str, str] | None:
     return None
 
 
-def is_more_than_states(found: Header) -> bool:
+def is_more_than_states(header: Header) -> bool:
     """Whether there are other columns than Ω and γ, or one of these vectors alone."""
-    names = set(found.places)
-    given = {"omega" if name == "framed" else name for name in names}
-    return bool(given - {"omega", "gamma"}) or (len(given) == 1 and _complete(found))
+    names = set(header.places)
+    quantities = {"omega" if name == "framed" else name for name in names}
+    return bool(quantities - {"omega", "gamma"}) or (len(quantities) == 1 and _complete(header))
 
 
-def _complete(found: Header) -> bool:
-    return all(len(components) == 3 for components in found.places.values())
+def _complete(header: Header) -> bool:
+    return all(len(components) == 3 for components in header.places.values())
 
 
 def ordered_places(
@@ -419,14 +419,14 @@ def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     Raises InputError for columns that are not complete, for a sequence that is not said, and for a cell that is none,
     by its line and column.
     """
-    found = _of_table(document, said) if "header" in document else _of_lists(document, said)
-    if not found.values:
+    table = _of_table(document, said) if "header" in document else _of_lists(document, said)
+    if not table.values:
         raise InputError("There are no columns that fix something of the motion.", _REMEDY)
-    if "euler" in found.values and not said.sequence:
+    if "euler" in table.values and not said.sequence:
         raise InputError(
             "There are Euler angles, and nothing says of which sequence.", 'Give sequence, such as "ZXZ" or "ZYX".'
         )
-    return found
+    return table
 
 
 _TO_QUATERNION = {"rodrigues": quaternions_of, "rotation_vector": quaternions_of_vectors}
@@ -457,7 +457,7 @@ def _of_table(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     for number, row in zip(lines, cells, strict=True):
         for name in values:
             values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
-    texts = [row[place] for row in cells for name in values for _, place in places[name]]
+    texts = [row[distance] for row in cells for name in values for _, distance in places[name]]
     for name, unit in units.items():
         values[name] = _times(unit.factor(max(map(len, texts), default=0)), values[name])
     for name in _TO_QUATERNION.keys() & values.keys():
@@ -485,9 +485,9 @@ def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention,
         return table
 
     def off(size: Fraction) -> float:
-        apart = [size * value - place for value, place in zip(first, said.pivot, strict=True)]
-        found = log10(dot(apart, apart))
-        return inf if found is None else abs(found - distance)
+        apart = [size * value - coordinate for value, coordinate in zip(first, said.pivot, strict=True)]
+        logarithm = log10(dot(apart, apart))
+        return inf if logarithm is None else abs(logarithm - distance)
 
     if off(unit.size) >= off(Fraction(1)):
         return table
@@ -496,32 +496,32 @@ def in_unit_of_body(table: ColumnTable, header: Header | None, said: Convention,
 
 def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
     prefix = {"quaternion": "q", "matrix": "R", "position": "", "euler": "euler"}.get(name, name)
-    return [(f"{prefix}{component}", place) for component, place in places[name]]
+    return [(f"{prefix}{component}", index) for component, index in places[name]]
 
 
 def _whole(values: Any) -> tuple[Fraction, ...] | None:
     """The numbers of one sample; None where one is not finite."""
-    found = tuple(values)
-    return None if None in found else found
+    numbers = tuple(values)
+    return None if None in numbers else numbers
 
 
 def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
-    given: dict[str, tuple[str, list[Any]]] = {}
+    columns: dict[str, tuple[str, list[Any]]] = {}
     space = in_space(document)
     states = document.get("states")
     if states is not None:
         rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(listed(states, "states"))]
-        given["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
-        given["gamma"] = "states", [row[3:] for row in rows]
+        columns["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
+        columns["gamma"] = "states", [row[3:] for row in rows]
     for key, name in _ARRAYS.items():
         if not _is_table(document.get(key), name):
             continue
         if name == "omega" and space:
             name = "omega_space"
-        if name in given:
-            raise InputError(f"{key} and {given[name][0]} both give {name}.", "Give each quantity once.")
-        given[name] = key, [_flat(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
-    counts = {key: len(rows) for key, rows in given.values()}
+        if name in columns:
+            raise InputError(f"{key} and {columns[name][0]} both give {name}.", "Give each quantity once.")
+        columns[name] = key, [_flat(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
+    counts = {key: len(rows) for key, rows in columns.values()}
     times = document.get("times")
     if isinstance(times, list):
         for key, count in counts.items():
@@ -529,10 +529,10 @@ def _of_lists(document: Mapping[str, Any], said: Convention) -> ColumnTable:
                 raise InputError(f"There are {len(times)} times and {count} {key}.", "Give one row for each time.")
     values = {}
     for name in WIDTHS:
-        if name in given:
-            key, rows = given[name]
+        if name in columns:
+            key, rows = columns[name]
             values[name] = [_whole(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
-    texts = [str(value) for _, rows in given.values() for row in rows for value in row]
+    texts = [str(value) for _, rows in columns.values() for row in rows for value in row]
     return ColumnTable(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
 
 
@@ -583,7 +583,7 @@ def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said:
         one, other = (key for key, *_ in list(forms.values())[:2])
         raise InputError(f"{one} and {other} both give the attitude at t = 0.", "Give one of them.")
     if not forms and gamma is None:
-        known = next((each for each in ("quaternion", "matrix", "euler", "gamma") if first.get(each)), None)
+        known = next((attitude for attitude in ("quaternion", "matrix", "euler", "gamma") if first.get(attitude)), None)
         if known is None:
             raise InputError(
                 "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
@@ -606,13 +606,13 @@ def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said:
 
 def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...] | None]) -> tuple[Vector, bool]:
     """Ω at t = 0, and whether it is in the axes of space."""
-    given = [
+    rates = [
         key for key in ("omega", "omega_space") if document.get(key) is not None and not _is_table(document[key], key)
     ]
-    if len(given) > 1:
+    if len(rates) > 1:
         raise InputError("omega and omega_space both give Ω at t = 0.", "Give one of them.")
-    if given:
-        return vector(_numbers(document[given[0]], given[0], 3), given[0]), given[0] == "omega_space"
+    if rates:
+        return vector(_numbers(document[rates[0]], rates[0], 3), rates[0]), rates[0] == "omega_space"
     for name in ("omega", "omega_space"):
         if first.get(name):
             return vector(list(first[name] or ()), name), name == "omega_space"
@@ -627,20 +627,20 @@ def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[F
     if isinstance(value, str):
         value = value.replace(",", " ").split()
     values = _flat(value, WIDTHS[name], key)
-    marked = [isinstance(each, str) and each.strip().endswith("deg") for each in values]
+    marked = [isinstance(value, str) and value.strip().endswith("deg") for value in values]
     if any(marked) and (name != "euler" or not all(marked)):
         raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
     with prefixed(key):
-        found = [exact(each.strip().removesuffix("deg") if isinstance(each, str) else each) for each in values]
-    return found, name == "euler" and (any(marked) or said.angles == "degrees")
+        part = [exact(value.strip().removesuffix("deg") if isinstance(value, str) else value) for value in values]
+    return part, name == "euler" and (any(marked) or said.angles == "degrees")
 
 
 def times(document: Mapping[str, Any]) -> list[Fraction]:
     """The column t of a text table; raises InputError that names the line of what is not a finite number."""
-    found, unit = [], document["header"].units.get("t")
+    instants, unit = [], document["header"].units.get("t")
     for number, text in zip(document["lines"], document["times"], strict=True):
         value = cell(text, f"Line {number}, column t")
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
-        found.append(value if unit is None else unit.size * value)
-    return found
+        instants.append(value if unit is None else unit.size * value)
+    return instants

@@ -102,21 +102,21 @@ class TextTable:
         self.notes += notes
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
-        found = observed_columns.header(names, str(self.keys.get("joint", "")))
-        logs.require_understood(found.others, [*found.places])
-        if found.time is not None:
-            self._without_repeats(found.time)
-        units = {"omega" if name == "framed" else name: unit.name for name, unit in found.units.items()}
+        meaning = observed_columns.header(names, str(self.keys.get("joint", "")))
+        logs.require_understood(meaning.others, [*meaning.places])
+        if meaning.time is not None:
+            self._without_repeats(meaning.time)
+        units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
         said = [f"{name} in {unit}" for name, unit in units.items() if name != "position"]
         self.notes += [f"as the header says, {', '.join(said)}"] if said else []
-        if found.time is not None and (found.units or observed_columns.is_more_than_states(found)):
-            self.header, others = found, list(found.others)
+        if meaning.time is not None and (meaning.units or observed_columns.is_more_than_states(meaning)):
+            self.header, others = meaning, list(meaning.others)
         else:
-            places = found.of_state()
+            places = meaning.of_state()
             if missing := [name for name in COLUMNS if name not in places]:
                 raise _no_header(missing)
             self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
-            others = [name for place, name in enumerate(names) if place not in places.values()]
+            others = [name for index, name in enumerate(names) if index not in places.values()]
         self.notes += unread(others, names)
 
     def _key(self, comment: str, known: Sequence[str]) -> bool:
@@ -135,9 +135,9 @@ class TextTable:
         self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
         return True
 
-    def _without_repeats(self, place: int) -> None:
+    def _without_repeats(self, index: int) -> None:
         """Leave out rows that repeat one, and those behind a time that goes back."""
-        times = [time for row in self.cells if (time := logs.number(row[place])) is not None]
+        times = [time for row in self.cells if (time := logs.number(row[index])) is not None]
         if len(times) == len(self.cells):
             kept, notes = logs.without_repeats(times, self.cells, self.lines)
             self.cells, self.lines = [self.cells[i] for i in kept], [self.lines[i] for i in kept]
@@ -194,8 +194,10 @@ def _is_number(text: str) -> bool:
 
 def _is_header(names: list[str]) -> bool:
     """Whether the words of a comment name the columns."""
-    found = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
-    return len(found.of_state()) == len(COLUMNS) or (found.time is not None and not found.others and bool(found.places))
+    header = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
+    return len(header.of_state()) == len(COLUMNS) or (
+        header.time is not None and not header.others and bool(header.places)
+    )
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
@@ -208,7 +210,7 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
             remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon separates, a comma is the point of a decimal
-        rows.append([each.replace(",", ".") for each in cells] if separator == ";" else cells)
+        rows.append([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
     return rows
 
 
@@ -223,7 +225,7 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
     said += [
         (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
     ]
-    rotors = (each.rotor or (Fraction(0),) * 3 for each in (top, case.top))
+    rotors = (top.rotor or (Fraction(0),) * 3 for top in (top, case.top))
     said += [(f"k{i} of the rotor", new, old) for i, (new, old) in enumerate(zip(*rotors, strict=True), 1)]
     said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
     if at_start is not None:
@@ -304,9 +306,9 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     try:
         document, notes = (_json(text), []) if is_json else _table(text)
         name = "given" if piped else path.stem
-        given = _observed if observed_columns.is_observed(document) else _given
-        found = given(document, name, case, normalize)
-        return replace(found, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
+        reader = _observed if observed_columns.is_observed(document) else _given
+        trajectory = reader(document, name, case, normalize)
+        return replace(trajectory, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -395,20 +397,20 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
         require_case(case, body, case.start, which, None)
     raw = _raw_start(document, table, not times[0], said, case)
     precision = _precision(document, table.texts)
-    found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
-    top, start = found.posed.top, found.posed.start
+    quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
+    top, start = quantities.posed.top, quantities.posed.start
     require_physical(top, start)
-    about = _about(document, stem, case, None in rows) | {"observed": found}
+    about = _about(document, stem, case, None in rows) | {"observed": quantities}
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
 
 
 def _times(document: dict[str, Any]) -> list[Fraction]:
     """The times, exact and in order; raises InputError where there is none but 0."""
     if "lines" in document:
-        given = observed_columns.times(document)
+        texts = observed_columns.times(document)
     else:
-        given = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
-    times = list(check_times(given))
+        texts = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+    times = list(check_times(texts))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     return times
@@ -442,17 +444,17 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     """The body of a file of a robot, a body with its mass, or a top by its weight."""
     if "file" in document:
         return body_of({key: document[key] for key in ("file", "link", *BODY) if key in document})
-    given = [key for key in ("mass", "gravity") if key in document]
-    if not given:
+    keys = [key for key in ("mass", "gravity") if key in document]
+    if not keys:
         return _top(document, case)
     if "weight" in document:
-        raise InputError(f"weight and {given[0]} are both given.", "Give the weight, or mass and gravity.")
+        raise InputError(f"weight and {keys[0]} are both given.", "Give the weight, or mass and gravity.")
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
             raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
-    flat = [each for row in inertia for each in (row if isinstance(row, list) else [row])]
+    flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
     return Body(mass, gravity, centre, flat, {"centre": CENTRE}.get(about, about or None), rotor)
 
@@ -498,8 +500,8 @@ def _row_of_start(document: dict[str, Any]) -> State | None:
     if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
         return None
     values = [written_numbers.component(value) for value in rows[0]]
-    found = [value for value in values if value is not None]
-    return State(found[:3], found[3:]) if len(found) == 6 else None
+    numbers = [value for value in values if value is not None]
+    return State(numbers[:3], numbers[3:]) if len(numbers) == 6 else None
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:

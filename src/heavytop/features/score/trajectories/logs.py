@@ -77,23 +77,23 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
     """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row."""
     names = list(names)
     parts = {
-        match[1].lower()[0]: place for place, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
+        match[1].lower()[0]: index for index, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
     }
     if parts.keys() == {"s", "n"}:
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
             row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
         names[seconds], names[nano] = "timestamp", "nanosec"
-    place = next((place for place, name in enumerate(names) if canonical(name) in _EPOCHS), None)
-    if place is None:
+    index = next((index for index, name in enumerate(names) if canonical(name) in _EPOCHS), None)
+    if index is None:
         return names, cells, []
-    names[place] = "t"
-    first = number(cells[0][place])
+    names[index] = "t"
+    first = number(cells[0][index])
     if not first:
         return names, cells, []
     for row in cells:
-        if (value := number(row[place])) is not None:
-            row[place] = exact_text(value - first)
+        if (value := number(row[index])) is not None:
+            row[index] = exact_text(value - first)
     return names, cells, [f"times are counted from the first row, {decimal_text(first, 20)}"]
 
 

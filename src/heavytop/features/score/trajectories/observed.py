@@ -77,14 +77,14 @@ def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
     """The body in principal axes, and the rows of A, v_given = A v_principal; irrational axes to so many bits."""
     if isinstance(body, HeavyTop):
         return body, IDENTITY
-    found = body.principal(bits)
-    top = body.top_in(found)
-    if found.exact:
-        return top, found.axes
+    principal = body.principal(bits)
+    top = body.top_in(principal)
+    if principal.exact:
+        return top, principal.axes
     # short numbers in place of long ones, which are not exact anyway
     centre = [round_to(value, bits) for value in top.centre]
     rotor = None if top.rotor is None else [round_to(value, bits) for value in top.rotor]
-    return HeavyTop(top.inertia, top.weight, centre, rotor=rotor), found.axes
+    return HeavyTop(top.inertia, top.weight, centre, rotor=rotor), principal.axes
 
 
 def system_of(body: AnyBody, named: System) -> System:
@@ -163,16 +163,16 @@ def rotation(raw: RawStart, said: Convention, precision: Precision, normalize: b
         rows: Any = said.rotation("quaternion", raw.values, None)
     else:
         rows = _orthogonal(raw, said, precision)
-    found = [tuple(row) for row in said.upright(rows)]
+    rotations = [tuple(row) for row in said.upright(rows)]
     if raw.gamma is not None:
-        off = max(abs(a - b) for a, b in zip(raw.gamma, found[2], strict=True))
+        off = max(abs(a - b) for a, b in zip(raw.gamma, rotations[2], strict=True))
         if off > max(slack, Fraction(1, 10**6)):
             raise InputError(
                 f"gamma and {where} contradict each other: gamma is ({_list(raw.gamma)}), but the third row of R is "
-                f"({_list(found[2])}).",
+                f"({_list(rotations[2])}).",
                 "Give one of them; with up = another axis than z gamma still points up.",
             )
-    return found[0], found[1], found[2]
+    return rotations[0], rotations[1], rotations[2]
 
 
 def _list(values: Sequence[Fraction]) -> str:
@@ -248,13 +248,13 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
 
 def require_rows(form: str, rows: Sequence[Sequence[Fraction] | None], places: Sequence[str], normalize: bool) -> None:
     """Raises InputError for the first row whose quaternion or matrix is far from one of a rotation."""
-    for row, place in zip(rows, places, strict=True):
+    for row, index in zip(rows, places, strict=True):
         if row is None:
             continue
         if form == "quaternion":
-            require_direction(row, f"The quaternion of {place}")
+            require_direction(row, f"The quaternion of {index}")
         if not normalize:
-            require_rotation(form, row, _FAR, f"The {form} of {place}")
+            require_rotation(form, row, _FAR, f"The {form} of {index}")
 
 
 def body_omega(raw: RawStart, said: Convention, rows: Rows) -> Vector:
@@ -318,15 +318,15 @@ class GivenTrajectory:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
         if self.observed is not None:
             return [*self.notes, *self.observed.body.warnings()]
-        found = [*self.notes, *self.top.warnings()]
+        sentences = [*self.notes, *self.top.warnings()]
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
-                found.append(
+                sentences.append(
                     f"|gamma|^2 is off 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
                     f"are the states in the order {' '.join(VARIABLES)}?"
                 )
                 break
-        return found
+        return sentences
 
 
 def of_arrays(
@@ -378,9 +378,9 @@ def named(text: str, what: str) -> str:
 
 def rounded_state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
     """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
-    found = tuple(_rounded_given(value, precision) for value in values if value is not None)
-    finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
-    return found if finite else None
+    numbers = tuple(_rounded_given(value, precision) for value in values if value is not None)
+    finite = len(numbers) == len(values) and all(_fits(value, precision) for value in numbers)
+    return numbers if finite else None
 
 
 def _rounded_given(value: Fraction, precision: Precision) -> Fraction:
@@ -497,8 +497,8 @@ def observed(
     columns = {name: [row for row in part[:done] if row is not None] for name, part in rounded.items()}
     if normalize:
         columns = {name: _normalized(name, part, said) for name, part in columns.items()}
-    body, start, found = posed(body, raw, said, precision, normalize)
-    return Observed(columns, said, found, body, start), rows
+    body, start, observed = posed(body, raw, said, precision, normalize)
+    return Observed(columns, said, observed, body, start), rows
 
 
 def _normalized(name: str, rows: list[tuple[Fraction, ...]], said: Convention) -> list[tuple[Fraction, ...]]:
@@ -508,7 +508,7 @@ def _normalized(name: str, rows: list[tuple[Fraction, ...]], said: Convention) -
     if name != "matrix":
         return rows
     squares = [nearest_quaternion([row[0:3], row[3:6], row[6:9]]) for row in rows]
-    return [tuple(entry for row in of_quaternion(unit(each)) for entry in row) for each in squares]
+    return [tuple(entry for row in of_quaternion(unit(quaternion)) for entry in row) for quaternion in squares]
 
 
 def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -525,12 +525,12 @@ def _rounded(row: tuple[Fraction, ...] | None, precision: Precision) -> tuple[Fr
 
 
 def _joined(parts: Sequence[tuple[Fraction, ...] | None]) -> tuple[Fraction, ...] | None:
-    found: list[Fraction] = []
+    joined: list[Fraction] = []
     for part in parts:
         if part is None:
             return None
-        found += part
-    return tuple(found)
+        joined += part
+    return tuple(joined)
 
 
 def of_observed_arrays(
@@ -555,10 +555,10 @@ def of_observed_arrays(
     form = precision or written_numbers.of_bits(max(bits_of(value) for value in numbers))
     values = {name: [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)] for name, rows in arrays.items()}
     places = [f"row {i}" for i in range(len(times))]
-    found, states = observed(body, raw, said, values, places, form, normalize)
-    require_physical(found.posed.top, found.posed.start)
+    quantities, states = observed(body, raw, said, values, places, form, normalize)
+    require_physical(quantities.posed.top, quantities.posed.start)
     which = system_of(body, HEAVY_TOP)
-    return _in_memory(names, found.posed.top, found.posed.start, which, form, times, states, found)
+    return _in_memory(names, quantities.posed.top, quantities.posed.start, which, form, times, states, quantities)
 
 
 def _in_memory(
@@ -569,18 +569,18 @@ def _in_memory(
     form: Precision,
     times: list[Fraction],
     states: list[tuple[Fraction, ...] | None],
-    found: Observed | None = None,
+    observed: Observed | None = None,
 ) -> GivenTrajectory:
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
-    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=found)
+    return GivenTrajectory(name, integrator, top, start, which, form, times, states, outcome, 0, {}, observed=observed)
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
     with prefixed(where):
-        found = [component(value) for value in row]
-    finite = tuple(value for value in found if value is not None)
-    return finite if len(finite) == len(found) else None
+        numbers = [component(value) for value in row]
+    finite = tuple(value for value in numbers if value is not None)
+    return finite if len(finite) == len(numbers) else None
 
 
 def require_system(system: System) -> None:

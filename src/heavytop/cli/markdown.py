@@ -1,0 +1,24 @@
+"""Markdown on a terminal, with whole words in the columns of its tables."""
+
+from __future__ import annotations
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.markdown import Markdown, TableElement
+from rich.table import Table
+
+
+class _FoldedTable(TableElement):
+    """A table whose long words go on in the next line."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for table in super().__rich_console__(console, options):
+            if isinstance(table, Table):
+                for column in table.columns:
+                    column.overflow = "fold"
+            yield table
+
+
+class Page(Markdown):
+    """A page of Markdown for the console of rich."""
+
+    elements = Markdown.elements | {"table_open": _FoldedTable}
