@@ -1,4 +1,4 @@
-"""Audits in the process of the tests: `tests/features/claims/test_guard.py` has the process that they have otherwise."""
+"""Audits in the process of the tests: `tests/features/claims/test_guard.py` has the one that they have otherwise."""
 
 import pytest
 
