@@ -10,7 +10,7 @@ from heavytop.exact.cases.euler import Euler
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.flint.balls import radius, radius_text, working_precision
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import bobylev_steklov_motion
+from rational_motions import bobylev_steklov_motion
 
 F = Fraction
 MOTIONS = {

@@ -24,7 +24,7 @@ from heavytop.measure.certify import Certificate, bits_of, certify, enclosure_of
 from heavytop.measure.reference import Ball, known_texts
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import bobylev_steklov_motion, grioli_motion, staude_motion
+from rational_motions import bobylev_steklov_motion, grioli_motion, staude_motion
 
 _DIGITS = 100
 # what the second source may cost at one time, in seconds of its model

@@ -36,7 +36,7 @@ from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
-from motions import steklov_motion
+from rational_motions import steklov_motion
 
 F = Fraction
 LATE = F(10**6)

@@ -11,7 +11,7 @@ from heavytop.exact.closed_form import ALL, Renamed, inverse, renamed_state, ren
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import bobylev_steklov_motion, grioli_motion
+from rational_motions import bobylev_steklov_motion, grioli_motion
 from support.proofs import assert_attitude, assert_solves
 
 UNIT = (Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3))

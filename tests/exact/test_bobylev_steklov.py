@@ -6,12 +6,12 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.errors import NotInClass
+from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, initial_xi, renamed_state, renamed_top
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import bobylev_steklov_motion
+from rational_motions import bobylev_steklov_motion
 from support.proofs import (
     assert_agrees,
     assert_attitude,
@@ -93,6 +93,8 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/9", 1), (0, 1, 1)))
     with pytest.raises(NotInClass, match="P a gamma3 - I3 Omega1 Omega3 = 1"):
         BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, 0, 1), (0, 1, 2)))
+    with pytest.raises(InputError, match="a = 0"):
+        bobylev_steklov_motion((Fraction(1), Fraction(1)), Fraction(0), Fraction(1), Fraction(1), Fraction(1))
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -27,7 +27,7 @@ from heavytop.exact.enclosure.run import Validated
 from heavytop.precision import round_to
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import bobylev_steklov_motion, grioli_motion, staude_motion, steklov_motion
+from rational_motions import bobylev_steklov_motion, grioli_motion, staude_motion, steklov_motion
 from support.proofs import assert_solves
 
 F = Fraction

@@ -5,13 +5,13 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.errors import NotInClass
+from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.grioli import Grioli
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import grioli_motion, staude_motion
+from rational_motions import grioli_motion, staude_motion
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 
@@ -57,6 +57,8 @@ def test_what_is_not_grioli_is_refused_with_the_test_that_failed():
         Grioli(motion.top, State((omega[0], omega[1] + 1, omega[2]), gamma))
     with pytest.raises(NotInClass, match=r"gamma as it follows from Omega, but the difference = \(1/7, 0, 0\)"):
         Grioli(motion.top, State(omega, (gamma[0] + Fraction(1, 7), *gamma[1:])))
+    with pytest.raises(InputError, match="No Grioli top"):
+        grioli_motion(Fraction(1, 3), Fraction(1, 3), Fraction(0), Fraction(1))
 
 
 @pytest.mark.parametrize("seed", range(50))

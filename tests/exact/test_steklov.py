@@ -10,7 +10,7 @@ from heavytop.exact.cases.one_interval import Steklov, quadratics
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.heavy_top import HeavyTop, State
-from motions import steklov_motion
+from rational_motions import steklov_motion
 from support.proofs import assert_enclosed, assert_exact, assert_narrow, assert_solves, positive
 
 F = Fraction
@@ -98,6 +98,8 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         Steklov(top, State(start.omega, (1, 0, 0)))
     with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
         Steklov(top, State(start.omega, (0, 0, 0)))
+    with pytest.raises(InputError, match="No Steklov top has moments"):
+        steklov_motion(F(1), F(1, 2), F(1), F(1))
 
 
 @pytest.mark.parametrize("distance", [F(1, 10**12), F(1, 10**30), F(1, 10**400)])

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 _BITS = 64
+_UTF8_MARK = b"\xef\xbb\xbf"
 _LARGEST_FILE = 50_000_000
 _MOST_SLACK = Fraction(1, 200)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
+_IDENTITY: Tensor = rows((Fraction(1), Fraction(1), Fraction(1), *_ZERO))
 _SIX_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _FORMATS = "Give a URDF, MJCF or SDF file, USD as text (.usda), or TOML with mass, centre and inertia."
 
@@ -76,6 +78,8 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
         if not bodies:
             raise InputError(f"{path} holds no mass properties.", "A body needs its mass and its inertia tensor.")
         raise InputError(f"{path} holds {len(bodies)} bodies: {names}.", "Choose one with --link NAME.")
+    if bodies[0].mass <= 0:
+        raise InputError(f"{bodies[0].name}: mass must be positive; got {bodies[0].mass}.", "Give its mass in kg.")
     return bodies[0]
 
 
@@ -93,15 +97,14 @@ def _bodies(path: Path) -> Iterator[BodyInFile]:
         raise InputError(f"{path} has {len(content)} bytes.", f"A body is read from at most {_LARGEST_FILE}.")
     if content.startswith(b"PXR-USDC"):
         raise InputError(f"{path} is binary USD.", "Convert it to text: usdcat FILE -o FILE.usda.")
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or content.removeprefix(_UTF8_MARK).lstrip().startswith(b"<"):
+        return _xml(path, content.strip())
     try:
-        text = content.decode()
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path} is not text.", _FORMATS) from None
-    head = text.lstrip()
-    if head.startswith("#usda"):
+    if text.lstrip().startswith("#usda"):
         return _usd(text)
-    if head.startswith("<"):
-        return _xml(path, content)
     if path.suffix.lower() == ".toml":
         return _toml(path, text)
     raise InputError(f"{path} is in no format that is known.", _FORMATS)
@@ -119,7 +122,14 @@ def _xml(path: Path, content: bytes) -> Iterator[BodyInFile]:
         refused = isinstance(error, DefusedXmlException)
         cause = "declares entities, which are refused" if refused else f"is not XML: {error}"
         raise InputError(f"{path} {cause}.", "Write it out without them." if refused else _FORMATS) from None
-    readers: dict[str, Callable[[Element], Iterator[BodyInFile]]] = {"robot": _urdf, "mujoco": _mjcf, "sdf": _sdf}
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]  # a namespace changes no meaning
+    readers: dict[str, Callable[[Element], Iterator[BodyInFile]]] = {
+        "robot": _urdf,
+        "mujoco": _mjcf,
+        "mujocoinclude": _mjcf,
+        "sdf": _sdf,
+    }
     if root.tag not in readers:
         raise InputError(f"{path} is XML with the root <{root.tag}>.", _FORMATS)
     return readers[root.tag](root)
@@ -137,6 +147,11 @@ class _Numbers:
         text = text if text is not None else default
         if text is None:
             raise InputError(f"{self.where}: {what} is missing.", "Give it in the file.")
+        if "${" in text or "$(" in text:
+            raise InputError(
+                f"{self.where}: {what} = {quoted(text)} is an expression of xacro.",
+                "Expand the file first: xacro FILE -o FILE.urdf.",
+            )
         with prefixed(f"{self.where}: {what} = {quoted(text)}"):
             return [self._one(part) for part in text.replace(",", " ").split()]
 
@@ -284,6 +299,11 @@ def _sdf(root: Element) -> Iterator[BodyInFile]:
             continue
         name = link.get("name", "")
         numbers = _Numbers(f"link {name}")
+        if inertial.get("auto") == "true":
+            raise InputError(
+                f'{numbers.where}: inertial auto="true" has Gazebo compute mass and tensor from the shapes.',
+                "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
+            )
         axes, centre = _pose(numbers, inertial.find("pose"))
         tensor = inertial.find("inertia")
         texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
@@ -319,54 +339,111 @@ def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
 
 
 def _mjcf(root: Element) -> Iterator[BodyInFile]:
-    compiler = root.find("compiler")
-    radians = compiler is not None and compiler.get("angle") == "radian"
+    settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
+    frames = _MjcfFrames(settings.get("angle") == "radian", settings.get("eulerseq", "xyz"))
+    classes = _joint_types(root)
+    parents = {child: parent for parent in root.iter() for child in parent}
+    if settings.get("inertiafromgeom") == "true" or (
+        root.find(".//inertial") is None and root.find(".//body/geom") is not None
+    ):
+        raise InputError(
+            "MuJoCo computes mass and tensor of these bodies from their geoms.",
+            "Write them out: mujoco.mj_saveLastXML(FILE, model), without inertiafromgeom.",
+        )
     for index, body in enumerate(root.iter("body")):
         inertial = body.find("inertial")
         if inertial is None:
             continue
         name = body.get("name") or f"body{index + 1}"
         numbers = _Numbers(f"body {name}")
-        axes = _orientation(numbers, inertial, radians)
-        diagonal, full = inertial.get("diaginertia"), inertial.get("fullinertia")
-        if full is not None:
-            parts: Sequence[str | None] = full.split()
-            if len(parts) == 9:
-                raise InputError(
-                    f"{numbers.where}: fullinertia has 9 numbers, a matrix row by row.",
-                    "Give M11 M22 M33 M12 M13 M23: " + " ".join(str(parts[i]) for i in (0, 4, 8, 1, 2, 5)) + ".",
-                )
-        else:
-            parts = [*(diagonal or "").split(), "0", "0", "0"]
-        if len(parts) != 6:
-            raise InputError(f"{numbers.where}: diaginertia or fullinertia is missing.", "Give 3 or 6 numbers.")
-        six, slack = numbers.tensor(parts, ("M11", "M22", "M33", "M12", "M13", "M23"))
+        axes = frames.rotation(numbers, inertial)
+        six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
         centre, mass = numbers.three(inertial.get("pos"), "pos"), numbers.one(inertial.get("mass"), "mass")
-        ball = next((joint for joint in body.findall("joint") if joint.get("type") == "ball"), None)
+        joints = (joint for joint in body.findall("joint") if _joint_type(joint, classes, parents) == "ball")
+        ball = next(joints, None)
         joint = None if ball is None else numbers.three(ball.get("pos"), "pos", "0 0 0")
-        shape = _shape_of(numbers, _geoms(numbers, body, radians), mass, centre)
+        shape = _shape_of(numbers, _geoms(numbers, body, frames), mass, centre)
         yield BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, joint, *shape)
 
 
-def _orientation(numbers: _Numbers, element: Element, radians: bool) -> Tensor:
-    """Rotation of a frame of MJCF: a quaternion, axisangle, or euler angles in the sequence xyz."""
-    for key in ("xyaxes", "zaxis"):
-        if element.get(key) is not None:
-            raise InputError(f"{numbers.where}: {key} is not read.", "Give the frame by quat.")
-    if element.get("quat") is not None:
-        quaternion = numbers.read(element.get("quat"), "quat")
-        if len(quaternion) != 4:
-            raise InputError(f"{numbers.where}: quat has {len(quaternion)} numbers.", "Give w x y z.")
-        return _rotation(Attitude.quaternion(*quaternion, normalize=True))
-    unit = "" if radians else "deg"
-    if element.get("axisangle") is not None:
-        *axis, angle = numbers.read(element.get("axisangle"), "axisangle")
-        return _rotation(Attitude.axis_angle(axis, f"{angle}{unit}"))
-    angles = (f"{angle}{unit}" for angle in numbers.three(element.get("euler"), "euler", "0 0 0"))
-    return _rotation(Attitude.euler("XYZ", *angles))
+def _mjcf_six(numbers: _Numbers, inertial: Element) -> Sequence[str | None]:
+    """The six numbers of fullinertia, or the three of diaginertia with zeros."""
+    full = inertial.get("fullinertia")
+    parts = [*(inertial.get("diaginertia") or "").split(), "0", "0", "0"] if full is None else full.split()
+    if full is not None and len(parts) == 9:
+        raise InputError(
+            f"{numbers.where}: fullinertia has 9 numbers, a matrix row by row.",
+            "Give M11 M22 M33 M12 M13 M23: " + " ".join(parts[i] for i in (0, 4, 8, 1, 2, 5)) + ".",
+        )
+    if full is not None and any(inertial.get(key) is not None for key in _ORIENTATIONS):
+        raise InputError(
+            f"{numbers.where}: fullinertia and an orientation of the inertial frame contradict each other.",
+            "Give fullinertia in the axes of the body alone, or diaginertia with quat.",
+        )
+    if len(parts) != 6:
+        raise InputError(f"{numbers.where}: diaginertia or fullinertia is missing.", "Give 3 or 6 numbers.")
+    return parts
 
 
-def _geoms(numbers: _Numbers, body: Element, radians: bool) -> list[Shape]:
+_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+
+def _joint_types(root: Element) -> dict[str, str]:
+    """The type of joint of each default class, which it has from the class around it unless it says another."""
+    types: dict[str, str] = {}
+
+    def collect(default: Element, inherited: str) -> None:
+        joint = default.find("joint")
+        own = inherited if joint is None else joint.get("type", inherited)
+        types[default.get("class", "main")] = own
+        for nested in default.findall("default"):
+            collect(nested, own)
+
+    for default in root.findall("default"):
+        collect(default, "hinge")
+    return types
+
+
+def _joint_type(joint: Element, types: dict[str, str], parents: dict[Element, Element]) -> str:
+    """The type that a joint says, or that of its class, or of the childclass of the nearest body around it."""
+    name, around = joint.get("class"), joint
+    while name is None and around in parents:
+        around = parents[around]
+        name = around.get("childclass")
+    return joint.get("type") or types.get(name or "main", "hinge")
+
+
+@dataclass(frozen=True, slots=True)
+class _MjcfFrames:
+    """Units and sequence of angles in an MJCF file; of the sequence small letters turn with the frame."""
+
+    radians: bool
+    sequence: str
+
+    def rotation(self, numbers: _Numbers, element: Element) -> Tensor:
+        """Rotation of a frame: a quaternion, axisangle, or euler angles."""
+        for key in ("xyaxes", "zaxis"):
+            if element.get(key) is not None:
+                raise InputError(f"{numbers.where}: {key} is not read.", "Give the frame by quat.")
+        if element.get("quat") is not None:
+            quaternion = numbers.read(element.get("quat"), "quat")
+            if len(quaternion) != 4:
+                raise InputError(f"{numbers.where}: quat has {len(quaternion)} numbers.", "Give w x y z.")
+            return _rotation(Attitude.quaternion(*quaternion, normalize=True))
+        unit = "" if self.radians else "deg"
+        if element.get("axisangle") is not None:
+            *axis, angle = numbers.read(element.get("axisangle"), "axisangle")
+            return _rotation(Attitude.axis_angle(axis, f"{angle}{unit}"))
+        turns = _IDENTITY
+        angles = numbers.three(element.get("euler"), "euler", "0 0 0")
+        for letter, angle in zip(self.sequence, angles, strict=True):
+            around = [int(letter.lower() == name) for name in "xyz"]
+            turn = _rotation(Attitude.axis_angle(around, f"{angle}{unit}"))
+            turns = multiplied(turns, turn) if letter.islower() else multiplied(turn, turns)
+        return turns
+
+
+def _geoms(numbers: _Numbers, body: Element, frames: _MjcfFrames) -> list[Shape]:
     shapes: list[Shape] = []
     for geom in body.findall("geom"):
         size = numbers.read(geom.get("size"), "size", "")
@@ -379,7 +456,7 @@ def _geoms(numbers: _Numbers, body: Element, radians: bool) -> list[Shape]:
             moments = _sphere(size[0])
         else:
             return []
-        shapes.append((_orientation(numbers, geom, radians), numbers.three(geom.get("pos"), "pos", "0 0 0"), moments))
+        shapes.append((frames.rotation(numbers, geom), numbers.three(geom.get("pos"), "pos", "0 0 0"), moments))
     return shapes
 
 
@@ -393,6 +470,7 @@ def _usd(text: str) -> Iterator[BodyInFile]:
         key: exact(value) for key, value in re.findall(r"\b(metersPerUnit|kilogramsPerUnit)\s*=\s*([-+.\deE]+)", text)
     }
     length, kilogram = units.get("metersPerUnit", Fraction(1, 100)), units.get("kilogramsPerUnit", Fraction(1))
+    text = re.sub(r"(?m)#.*$", "", text)
     starts = [*_PRIM.finditer(text)]
     for index, prim in enumerate(starts):
         end = starts[index + 1].start() if index + 1 < len(starts) else len(text)
@@ -403,6 +481,13 @@ def _usd(text: str) -> Iterator[BodyInFile]:
         parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
         if len(parts) != 6:
             raise InputError(f"{numbers.where}: diagonalInertia has {len(parts) - 3} numbers.", "Give 3.")
+        if "inf" in values.get("centerOfMass", "") or not any(
+            numbers.read(values["diagonalInertia"], "diagonalInertia")
+        ):
+            raise InputError(
+                f"{numbers.where}: an infinite centre of mass or a tensor of zeros has USD compute it from the shapes.",
+                "Give physics:centerOfMass and physics:diagonalInertia in numbers.",
+            )
         six, slack = numbers.tensor(parts, ("I1", "I2", "I3", "I12", "I13", "I23"))
         axes = numbers.read(values.get("principalAxes"), "principalAxes", "1 0 0 0")
         if len(axes) != 4:
@@ -432,6 +517,8 @@ def _toml(path: Path, text: str) -> Iterator[BodyInFile]:
         numbers = _Numbers(f"top {name}")
         texts = _texts(table["inertia"])
         if len(texts) == 9:
+            if any(exact(texts[i]) != exact(texts[j]) for i, j in ((1, 3), (2, 6), (5, 7))):
+                raise InputError(f"{numbers.where}: the inertia tensor is not symmetric.", "Give each product once.")
             texts = [texts[i] for i in (0, 4, 8, 1, 2, 5)]
         if len(texts) == 3:
             texts += ["0"] * 3
@@ -440,6 +527,11 @@ def _toml(path: Path, text: str) -> Iterator[BodyInFile]:
         six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
         centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
         mass = numbers.one(str(table["mass"]), "mass")
+        if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
+            raise InputError(
+                f"{numbers.where}: it is not said which point the inertia tensor is about.",
+                'Give about = "pivot" or about = "centre of mass".',
+            )
         yield BodyInFile(name, mass, centre, six, slack, table.get("about") == "pivot", si=False)
 
 

@@ -29,8 +29,8 @@ _FAR_CENTRE = 100
 """Sizes of the body between its axes and its centre of mass."""
 _ROUND = 10
 """By so much the products of inertia shrink without Steiner's part where the tensor was meant about the pivot."""
-_NEAR, _APART = Fraction(1, 50), Fraction(1, 5)
-"""Relative distance of a tensor from that of the geometry in the file: it agrees; it is another."""
+_APART = Fraction(1, 20)
+"""Relative distance of a tensor from that of the geometry in the file from which on it is another."""
 _SMALL = Fraction(1, 10**9)
 _SHOWN_BITS = 56
 
@@ -282,10 +282,10 @@ def _of_products(body: MassProperties) -> Iterator[Slip]:
 def _against_geometry(body: MassProperties) -> Iterator[Slip]:
     """The slip by which the tensor becomes that of the shapes in the file."""
     shape = body.geometry
-    if shape is None or _distance(body.central, shape) < _APART:
+    if shape is None or (apart := _distance(body.central, shape)) < _APART:
         return
     for slip, mended in (*_conjugated(body), *_mends(body), *_about_pivot(body), *_of_scale(body)):
-        if _distance(mended.central, shape) < _NEAR:
+        if _distance(mended.central, mended.geometry or shape) * _ROUND < min(apart, Fraction(1, 5)):
             yield slip
             return
 
@@ -306,6 +306,11 @@ def _about_pivot(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
 
 
 def _of_scale(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    if body.geometry is not None:
+        shape = replace(body, six=six_of(body.geometry), at_pivot=False)
+        if 5 * float(body.mass) / _size(shape) ** 3 > _DENSEST:
+            lighter = _scaled(shape, 1, 1000)
+            body = replace(body, mass=lighter.mass, geometry=rows(lighter.six))
     for name, scale, unit in (
         ("millimetres", 10**6, "kg mm^2"),
         ("grams", 10**3, "g m^2"),

@@ -260,3 +260,71 @@ def test_the_command_line_takes_a_body_from_a_file(tmp_path: Path) -> None:
         done = heavytop("propagate", "--file", path, *extra, *start)
         assert done.returncode == 2
         assert words in done.stderr
+
+
+RIGHT_AS_WRITTEN: dict[str, tuple[str, bytes]] = {
+    "a default namespace": ("urdf", urdf(SIX).replace("<robot ", '<robot xmlns="http://www.ros.org" ').encode()),
+    "a mark of UTF-8": ("urdf", b"\xef\xbb\xbf" + urdf(SIX).encode()),
+    "UTF-16": ("urdf", ('<?xml version="1.0" encoding="utf-16"?>' + urdf(SIX)).encode("utf-16")),
+    "Latin-1": ("urdf", ('<?xml version="1.0" encoding="latin-1"?><!-- \xe9 -->' + urdf(SIX)).encode("latin-1")),
+    "lines of Windows": ("sdf", b"\r\n" + sdf(SIX).replace("><", ">\r\n<").encode()),
+    "an included file": (
+        "xml",
+        mjcf(SIX).replace("mujoco>", "mujocoinclude>").replace("<worldbody>", "").replace("</worldbody>", "").encode(),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT_AS_WRITTEN)
+def test_a_right_file_is_read_however_it_is_written(name: str, tmp_path: Path) -> None:
+    suffix, content = RIGHT_AS_WRITTEN[name]
+    (path := tmp_path / f"arm.{suffix}").write_bytes(content)
+    assert read_body(path).six == tuple(map(Fraction, SIX))
+
+
+REFUSED: dict[str, tuple[str, str, str]] = {
+    "xacro": ("urdf", urdf(SIX, mass="${m}"), "xacro FILE -o FILE.urdf"),
+    "a mass of 0": ("urdf", urdf(SIX, mass="0"), "mass must be positive; got 0"),
+    "inertiafromgeom": (
+        "xml",
+        mjcf(SIX).replace("<worldbody>", '<compiler inertiafromgeom="true"/><worldbody>'),
+        "saveLastXML",
+    ),
+    "geoms alone": ("xml", '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>', "saveLastXML"),
+    "fullinertia turned": ("xml", mjcf(SIX).replace("<inertial ", '<inertial quat="1 0 0 0" '), "contradict"),
+    "auto": ("sdf", sdf(SIX).replace("<inertial>", '<inertial auto="true">'), "expand-auto-inertials"),
+    "a matrix that is not symmetric": (
+        "toml",
+        "mass = 1\ncentre = [0, 0, 0]\ninertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]]",
+        "symmetric",
+    ),
+    "no word on the point": ("toml", "mass = 1\ncentre = [1, 0, 0]\ninertia = [1, 1, 1]", "about"),
+    "a tensor of zeros": (
+        "usda",
+        '#usda 1.0\ndef "a" {\n physics:mass = 1\n physics:diagonalInertia = (0, 0, 0)\n}',
+        "in numbers",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_another_program_has_to_compute_is_refused_with_the_way_out(name: str, tmp_path: Path) -> None:
+    suffix, text, remedy = REFUSED[name]
+    (path := tmp_path / f"arm.{suffix}").write_text(text)
+    run = heavytop("body", path)
+    assert run.returncode == 2
+    assert remedy in run.stderr
+
+
+def test_angles_of_mjcf_are_of_its_sequence_and_a_ball_joint_of_its_class(tmp_path: Path) -> None:
+    """Principal moments 3, 2, 1.5 turned by 90 degrees about z, then about the turned y; and about the fixed y."""
+    path = tmp_path / "arm.xml"
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="3 2 1.5" euler="90 90 0"/>'
+    for sequence, moments in (("zyx", (2, Fraction(3, 2), 3)), ("ZYX", (Fraction(3, 2), 3, 2))):
+        path.write_text(
+            f'<mujoco><compiler eulerseq="{sequence}"/><default><default class="b"><joint type="ball"/></default>'
+            f'</default><worldbody><body childclass="b"><joint pos="0 0 -1"/>{inertial}</body></worldbody></mujoco>'
+        )
+        found = read_body(path)
+        assert found.six[:3] == moments
+        assert found.joint == (0, 0, -1)

@@ -110,6 +110,36 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
 }
 
 
+def exported(stamp: str, times: Sequence[str], prefix: str, mark: str, rate: str) -> str:
+    names = [f"{prefix}orientation{mark}{a}" for a in "xyzw"] + [f"{prefix}{rate}{mark}{a}" for a in "xyz"]
+    body = rows(quaternions()[:, [1, 2, 3, 0]], omegas()).splitlines()
+    lines = [f"{time},{line}" for time, line in zip(times, body, strict=True)]
+    return HEAD + "\n".join([",".join([stamp, *names]), *lines])
+
+
+def rated(kind: str, more: str) -> str:
+    """The message with rates in deg/s, in the axes that ``more`` names."""
+    lines = ephemeris().replace("ATTITUDE_TYPE = QUATERNION", f"ATTITUDE_TYPE = {kind}\n{more}").splitlines()
+    first = lines.index("DATA_START") + 1
+    for index, omega in enumerate(numpy.degrees(omegas())):
+        lines[first + index] += "".join(f" {value!r}" for value in omega.tolist())
+    return "\n".join(lines)
+
+
+NANO = [f"{17 * 10**17 + k * 10**8}" for k in range(11)]
+BASILISK = ",".join(f"{name}[{k}]" for name in ("sigma_BN", "omega_BN_B") for k in range(3))
+TO_BODY = "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\nRATE_FRAME = REF_FRAME_B"
+FROM_BODY = "ATTITUDE_DIR = B2A\nREF_FRAME_A = SC_BODY_1\nREF_FRAME_B = ICRF"
+FORMS |= {
+    "rostopic": ("csv", lambda: exported("%time", NANO, "field.", ".", "angular_velocity")),
+    "PlotJuggler": ("csv", lambda: exported("__time", list(map(str, TIMES)), "/imu/", "/", "angular_velocity")),
+    "milliseconds": ("csv", lambda: exported("time_ms", [str(100 * k) for k in range(11)], "pose_", "_", "angular")),
+    "Basilisk": ("csv", lambda: f"{HEAD}time,{BASILISK}\n{rows(TIMES, mrp(), omegas())}"),
+    "ephemeris with rates": ("aem", lambda: rated("QUATERNION/RATE", TO_BODY)),
+    "ephemeris from the body": ("aem", lambda: ephemeris().replace("ATTITUDE_DIR = A2B", FROM_BODY)),
+}
+
+
 def scored(path: Path, *options: str) -> dict[str, object]:
     done = heavytop("score", path, "--json", *options)
     assert done.returncode in (0, 1), done.stderr
@@ -160,6 +190,8 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     [
         ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
         ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "joint that is not said"),
+        ("t,rx,ry,rz,n", "# attitude: rotation vector"),
+        ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),
     ],
 )
 def test_half_a_file_is_never_scored(header: str, says: str, tmp_path: Path) -> None:
@@ -168,3 +200,24 @@ def test_half_a_file_is_never_scored(header: str, says: str, tmp_path: Path) -> 
     refused = heavytop("score", path)
     assert refused.returncode == 2
     assert says in refused.stderr
+
+
+def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path: Path) -> None:
+    body = ht.Body("2", "0", (0, 0, 0), ("1.2", "0.9", "0.6"))
+    start = ht.State(omega=(1, 2, 6), attitude=ht.Attitude.quaternion("0.8", 0, "0.6", 0))
+    free = ht.propagate(body, start, [str(time) for time in TIMES], ht.DOUBLE)
+    head = HEAD.replace("9.81", "0").replace("0.3, -0.2, 0.4", "0, 0, 0")
+    falling = numpy.outer(TIMES, (1, 2, 3))
+    path = tmp_path / "log.csv"
+    for text in (
+        "t,omega1,omega2,omega3\n" + rows(TIMES, free.to_numpy()[:, :3]),
+        "t,px,py,pz,qw,qx,qy,qz\n" + rows(TIMES, falling, free.quaternions()),
+    ):
+        path.write_text(head + text)
+        assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+
+
+def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:
+    path = tmp_path / "poses.txt"
+    path.write_text(HEAD + "1 0 0 0 0 1 0 0 0 0 1 0\n")
+    assert "t R11 R12 R13 px R21" in heavytop("score", path).stderr

@@ -35,7 +35,7 @@ def _rates(top: HeavyTop, start: State) -> tuple[Fraction]:
 
 
 def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
-    return [g - wanted for g, wanted in zip(start.gamma, _gamma(top, start.omega), strict=True)]
+    return [g - wanted for g, wanted in zip(start.gamma, gamma_of(top, start.omega), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class Grioli(WithAttitude):
         return [rate * (a + r) for a, r in zip(u, axis, strict=True)], between((u0, w0, axis), space)
 
 
-def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:
+def gamma_of(top: HeavyTop, omega: Vector) -> list[Fraction]:
     """The γ that goes with Ω, times nothing: every root has cancelled."""
     (i1, i2, i3), n = top.inertia, top.moment
     square, spin = dot(n, n), dot(omega, n)

@@ -66,7 +66,13 @@ _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
 _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
 """What stands in the last brackets of a name, or behind its first slash."""
 _A_SECOND = ("/s", "/sec", "/second", "s-1")
-_SECOND = {"ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "μs": Fraction(1, 10**6), "min": Fraction(60)}
+_SECOND = {
+    "ms": Fraction(1, 10**3),
+    "ns": Fraction(1, 10**9),
+    "us": Fraction(1, 10**6),
+    "μs": Fraction(1, 10**6),
+    "min": Fraction(60),
+}
 _RATE = {
     **{f"{unit}{second}": Fraction(1, 180) for unit in ("deg", "degree", "degrees", "°") for second in _A_SECOND},
     **dict.fromkeys(("rpm", "rev/min", "r/min"), Fraction(1, 30)),
@@ -94,7 +100,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What the columns of a table are.
+    """The quantities in the columns of a table.
 
     time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
     their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
@@ -359,7 +365,7 @@ def is_observed(document: Mapping[str, Any]) -> bool:
 
 
 def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
-    """What the file says of its conventions; raises InputError for what is not known."""
+    """Conventions that the file states; raises InputError for what is not known."""
     said: dict[str, Any] = {}
     if (order := _word(document, "quaternion_order")) is not None:
         if order.lower() not in _ORDERS:
@@ -562,8 +568,10 @@ def _flat(row: Any, width: int, what: str) -> list[Any]:
     return row
 
 
-def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention) -> RawStart:
-    """The start: by its keys, else by the row t = 0.
+def start(
+    document: Mapping[str, Any], table: ColumnTable, at_start: bool, said: Convention, free: bool = False
+) -> RawStart:
+    """The start: by its keys, else by the row t = 0.  free: of a body without weight, Ω alone asks for no attitude.
 
     Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.
     """
@@ -584,10 +592,14 @@ def start(document: Mapping[str, Any], table: ColumnTable, at_start: bool, said:
         raise InputError(f"{one} and {other} both give the attitude at t = 0.", "Give one of them.")
     if not forms and gamma is None:
         known = next((attitude for attitude in ("quaternion", "matrix", "euler", "gamma") if first.get(attitude)), None)
+        if known is None and free and set(table.values) == {"omega"}:
+            omega, space = _omega(document, first)
+            if not space:
+                return RawStart("quaternion", (Fraction(1), Fraction(0), Fraction(0), Fraction(0)), omega, space)
         if known is None:
             raise InputError(
                 "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
-                "and there is no row t = 0 that gives it.",
+                "and no row t = 0 gives it.",
                 "Give one of them, or the row t = 0, or --case NAME.",
             )
         from_row, form, values = True, known, list(first[known] or ())
@@ -617,7 +629,7 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
         if first.get(name):
             return vector(list(first[name] or ()), name), name == "omega_space"
     raise InputError(
-        "The key omega is missing, and there is no row t = 0 that gives it.",
+        "The key omega is missing, and no row t = 0 gives it.",
         "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
     )
 

@@ -61,7 +61,7 @@ def nearest(key: str, known: Sequence[str]) -> str:
 
 
 def unknown(key: str, known: Sequence[str]) -> InputError:
-    """What is said of a key that is none."""
+    """Error text for an unknown key."""
     near = nearest(key, known)
     return InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?" if near else REMEDY)
 
@@ -87,6 +87,7 @@ class TextTable:
                 comment = stripped.lstrip("#%!/ ")
                 if not body and not self._key(comment, known) and _is_header(_cells(comment, None)):
                     header = _cells(comment, None)
+                    header[0] = "%time" if stripped.startswith("%time") else header[0]  # of rostopic, in nanoseconds
             elif stripped:
                 body.append(stripped)
                 self.lines.append(number)
@@ -103,7 +104,7 @@ class TextTable:
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
         meaning = observed_columns.header(names, str(self.keys.get("joint", "")))
-        logs.require_understood(meaning.others, [*meaning.places])
+        logs.require_understood(names, meaning.others, [*meaning.places])
         if meaning.time is not None:
             self._without_repeats(meaning.time)
         units = {"omega" if name == "framed" else name: unit.name for name, unit in meaning.units.items()}
@@ -149,9 +150,14 @@ class TextTable:
         if width == len(logs.TUM) and logs.is_unit(first[-4:]):
             self.notes.append(f"there is no header; the columns are taken as {' '.join(logs.TUM)}")
             return logs.TUM
+        if width == len(logs.KITTI):
+            raise InputError(
+                "Rows of 12 numbers without times, as KITTI has them: the first three rows of [R p; 0 1].",
+                f"Put the time before each row, and above the first the line t {' '.join(logs.KITTI)}.",
+            )
         if width != len(COLUMNS):
             raise InputError(
-                f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
+                f"The first line is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, "
                 f"not {len(COLUMNS)}.",
                 "Give a header that names the columns.",
             )
@@ -160,7 +166,7 @@ class TextTable:
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
-    """What is said of columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
+    """Note on columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
     more = [name for name in names if name.strip() not in own]
@@ -308,7 +314,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         name = "given" if piped else path.stem
         reader = _observed if observed_columns.is_observed(document) else _given
         trajectory = reader(document, name, case, normalize)
-        return replace(trajectory, sha256=hashlib.sha256(content).hexdigest(), notes=tuple(notes))
+        return replace(trajectory, sha256=hashlib.sha256(content).hexdigest(), notes=(*notes, *trajectory.notes))
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -346,7 +352,7 @@ def _json(text: str) -> dict[str, Any]:
 def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
-        raise InputError("This is no text: it holds a byte 0.", REMEDY)
+        raise InputError("A table must be text; this holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
     table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}))
@@ -391,16 +397,20 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     require_states(times, table.places)
     body = _body(document, case)
     table = observed_columns.in_unit_of_body(table, document.get("header"), said, body.centre)
+    notes: tuple[str, ...] = ()
+    if not body.weight and not any(body.centre) and {"position"} < set(table.values):
+        table = replace(table, values={name: rows for name, rows in table.values.items() if name != "position"})
+        notes = ("positions of a free body are left out: they do not follow from its rotation",)
     which = system_of(_system(document, case), body)
     require_system(which)
     if case is not None and isinstance(body, HeavyTop):
         require_case(case, body, case.start, which, None)
-    raw = _raw_start(document, table, not times[0], said, case)
+    raw = _raw_start(document, table, not times[0], said, case, not body.weight)
     precision = _precision(document, table.texts)
     quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
     top, start = quantities.posed.top, quantities.posed.start
     require_physical(top, start)
-    about = _about(document, stem, case, None in rows) | {"observed": quantities}
+    about = _about(document, stem, case, None in rows) | {"observed": quantities, "notes": notes}
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=rows, **about)
 
 
@@ -432,12 +442,17 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
 
 
 def _raw_start(
-    document: dict[str, Any], table: observed_columns.ColumnTable, at_start: bool, said: Any, case: Case | None
+    document: dict[str, Any],
+    table: observed_columns.ColumnTable,
+    at_start: bool,
+    said: Any,
+    case: Case | None,
+    free: bool,
 ) -> RawStart:
     """The start of the file, or of the case where the file says nothing of it."""
     if case is not None and not document.keys() & {"omega", "gamma", *observed_columns.STARTS}:
         return RawStart("gamma", case.start.gamma, case.start.omega)
-    return observed_columns.start(document, table, at_start, said)
+    return observed_columns.start(document, table, at_start, said, free)
 
 
 def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
@@ -452,7 +467,7 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
-            raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
+            raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
@@ -479,7 +494,7 @@ def _start(document: dict[str, Any], case: Case | None, at_start: State | None) 
     if case is None and not {"omega", "gamma"} <= document.keys():
         missing = "omega" if "omega" not in document else "gamma"
         raise InputError(
-            f"The key {missing} is missing, and there is no row t = 0 that gives the start.",
+            f"The key {missing} is missing, and no row t = 0 gives the start.",
             "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
         )
     return State(*(_vector(document, key, case) for key in ("omega", "gamma")))

@@ -18,19 +18,25 @@ from heavytop.extras import require_extra
 from heavytop.precision import decimal_text, exact_text
 
 TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
-_STAMP = re.compile(r"(?:.*[./])?(?:header[./])?stamp[./](secs?|n(?:ano)?secs?)", re.IGNORECASE)
+KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
+_STAMP = re.compile(r"(?:.*[./_])?stamp[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Columns of times that are counted from their first row."""
 _ALIASES = tuple(
-    (re.compile(rf"(?:.*[./])?{pattern}", re.IGNORECASE), name)
+    (re.compile(rf"(?:.*[./_])?{pattern}", re.IGNORECASE), name)
     for pattern, name in (
-        (r"(?:quat(?:ernion)?|orientation|rotation|attitude)[._]([wxyz])", "q{}"),
-        (r"(?:position|translation|pos)[._]([xyz])|t([xyz])", "p{}"),
-        (r"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?)[._]([xyz])", "w{}"),
+        (r"(?:quat(?:ernion)?|orientation|rotation|attitude)[./_]([wxyz])", "q{}"),
+        (r"(?:position|translation|pos)[./_]([xyz])|t([xyz])", "p{}"),
+        (r"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?)[./_]([xyz])", "w{}"),
         (r"(?:sim_?time|time_?s|elapsed)", "t"),
-        (r"(?:timestamp|stamp)", "timestamp"),
+        (r"(?:timestamp|stamp|__time)", "timestamp"),
+        (r"(?:timestamp|stamp)_(ns|us|ms)", "timestamp [{}]"),
+        (r"(?:time|t)_(ns|us|ms)", "t [{}]"),
+        (r"%time", "timestamp [ns]"),
     )
 )
+_BASILISK = re.compile(r"(?:.*\.)?(sigma_BN|omega_BN_B)[\[_(]([0-2])[\])]?")
+"""Columns of vectors of Basilisk, counted from 0."""
 _JOINTS = {"free": (3, 3), "ball": (0, 0)}
 """Where the quaternion stands in qpos of MuJoCo, and the angular velocity, of the body, in qvel."""
 _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
@@ -45,6 +51,10 @@ def canonical(name: str, joint: str = "") -> str:
     joint: "free" or "ball", of the columns qpos and qvel of MuJoCo.
     """
     text = name.strip()
+    if match := _BASILISK.fullmatch(text):
+        return f"{match[1].partition('_')[0]}{int(match[2]) + 1}"
+    if _OTHER.match(text):
+        return text
     if (match := _INDEX.fullmatch(text)) and joint in _JOINTS:
         number = int(match[2]) - _JOINTS[joint][match[1].lower() == "qvel"]
         if match[1].lower() == "qpos":
@@ -56,10 +66,18 @@ def canonical(name: str, joint: str = "") -> str:
     return text
 
 
-def require_understood(others: Sequence[str], quantities: Sequence[str]) -> None:
-    """Raises InputError for a column that looks like an attitude or Ω and is not read, where no other gives one."""
+def require_understood(names: Sequence[str], others: Sequence[str], quantities: Sequence[str]) -> None:
+    """Raises InputError for a column that looks like an attitude or Ω and is not read, where no other gives one.
+
+    names: of all columns; others: of those that are not read.
+    """
     if any(quantity in quantities for quantity in ("quaternion", "matrix", "euler", "omega", "omega_space", "framed")):
         return
+    if {"rx", "ry", "rz"} <= {name.strip().lower() for name in names}:
+        raise InputError(
+            "The columns rx, ry, rz may be a rotation vector, angles, or a position.",
+            "Add the line `# attitude: rotation vector` above the columns, or call a position px, py, pz.",
+        )
     for name in others:
         if _LOOKS.search(name) and not _OTHER.match(name):
             raise InputError(
@@ -84,10 +102,11 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         for row in cells:
             row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
         names[seconds], names[nano] = "timestamp", "nanosec"
-    index = next((index for index, name in enumerate(names) if canonical(name) in _EPOCHS), None)
+    plain = [canonical(name) for name in names]
+    index = next((index for index, name in enumerate(plain) if name.partition(" ")[0] in _EPOCHS), None)
     if index is None:
         return names, cells, []
-    names[index] = "t"
+    names[index] = re.sub(r"^\w+", "t", plain[index])
     first = number(cells[0][index])
     if not first:
         return names, cells, []
@@ -138,7 +157,7 @@ def _repeats(count: int) -> list[str]:
 
 
 def quaternions_of(parameters: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²), exact; the shadow set gives the same rotation."""
+    """Quaternions of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set is the same rotation."""
     return [None if s is None else _ordered(_of_rodrigues(s), scalar_last) for s in parameters]
 
 
@@ -148,7 +167,7 @@ def _of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 
 def quaternions_of_vectors(vectors: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
+    """Quaternions of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
     from flint import arb, fmpq
 
     from heavytop.exact.flint.balls import midpoint, working_precision
@@ -166,6 +185,10 @@ def quaternions_of_vectors(vectors: Sequence[Sequence[Fraction] | None], scalar_
 
 def _ordered(q: tuple[Fraction, ...], scalar_last: bool) -> tuple[Fraction, ...]:
     return (*q[1:], q[0]) if scalar_last else q
+
+
+_SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYRO|IMU|STARTRACKER", re.IGNORECASE)
+"""Frames of a message that turn with the spacecraft."""
 
 
 def is_ephemeris(text: str) -> bool:
@@ -186,9 +209,14 @@ def of_ephemeris(text: str) -> str:
         raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not read.", "Write the message with QUATERNION.")
     first = meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
     order = ["qw", "qx", "qy", "qz"] if first else ["qx", "qy", "qz", "qw"]
-    if kind == "QUATERNION/RATE":
-        order += ["omega1", "omega2", "omega3"]
-    inertial_first = meta.get("ATTITUDE_DIR", "A2B").upper() == "A2B"
+    of_spacecraft = {letter: bool(_SPACECRAFT.match(meta.get(f"REF_FRAME_{letter}", ""))) for letter in "AB"}
+    body_first = of_spacecraft["A"] and not of_spacecraft["B"]
+    if kind in ("QUATERNION/RATE", "QUATERNION/ANGVEL"):
+        frame = (meta.get("RATE_FRAME") or meta.get("ANGVEL_FRAME") or "").upper()
+        of_a = frame.endswith("FRAME_A") or (frame and frame == meta.get("REF_FRAME_A", "").upper())
+        axes = "omega_space" if frame and bool(of_a) != body_first else "omega"
+        order += [f"{axes}_{axis} [deg/s]" for axis in "xyz"]
+    inertial_first = (meta.get("ATTITUDE_DIR", "A2B").upper() == "A2B") != body_first
     lines = [f"# {line.strip()[7:].strip()}" for line in text.splitlines() if line.strip().startswith("COMMENT")]
     if not inertial_first:
         lines.append("# quaternion: space_to_body")
@@ -229,7 +257,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
         try:
             loaded = numpy.load(BytesIO(content), allow_pickle=False)
         except ValueError as error:
-            raise InputError(f"This is no array: {error}.", "Save plain numbers, without pickle.") from None
+            raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
         columns = {"": loaded} if suffix == ".npy" else {name: loaded[name] for name in loaded.files}
     names: list[str] = []
     parts: list[Any] = []
