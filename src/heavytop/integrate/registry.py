@@ -573,19 +573,17 @@ def control_apart(which: str | IntegratorSource) -> str:
     integrator = described(which)
     if isinstance(integrator.source, Command) or integrator.own:
         return control_name(which)
-    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
 
-    from heavytop.processes import ChildContext
+    from heavytop.processes import GuardedProcess
 
-    context = ChildContext()
-    with ProcessPoolExecutor(1, mp_context=context) as pool:
-        try:
-            return pool.submit(control_name, which).result(timeout=_PATIENCE)
-        except BrokenProcessPool:
-            return ""
-        except TimeoutError:
-            context.kill()
-            return ""
+    process = GuardedProcess()
+    try:
+        return process.submit(control_name, which).result(timeout=_PATIENCE)
+    except (BrokenProcessPool, TimeoutError):
+        return ""
+    finally:
+        process.end()
 
 
 def available() -> dict[str, str | None]:
