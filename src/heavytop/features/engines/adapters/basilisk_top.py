@@ -10,6 +10,8 @@ from heavytop_engine import serve
 
 
 class Engine:
+    """Basilisk with a body about a fixed point."""
+
     def __init__(self, body):
         if body.gravity * abs(body.centre).max() or abs(body.centre).max():
             raise ValueError("Basilisk holds no body by a joint: give one that turns about its centre of mass.")

@@ -6,6 +6,8 @@ from heavytop_engine import serve
 
 
 class Engine:
+    """DART with a body about a fixed point."""
+
     def __init__(self, body):
         self.world, skeleton = dart.simulation.World(), dart.dynamics.Skeleton("top")
         self.world.setGravity([0, 0, -body.gravity])

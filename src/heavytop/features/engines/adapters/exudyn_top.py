@@ -16,6 +16,8 @@ exu.config.printToConsole = False
 
 
 class Engine:
+    """Exudyn with a body about a fixed point."""
+
     def __init__(self, body):
         self.time, self.settings, system = 0.0, exu.SimulationSettings(), exu.SystemContainer().AddSystem()
         about_pivot = make.RigidBodyInertia(body.mass, body.about_pivot, [0, 0, 0])

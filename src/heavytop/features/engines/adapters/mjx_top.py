@@ -30,6 +30,8 @@ def steps(model, data, count):
 
 
 class Engine:
+    """MJX with a body about a fixed point."""
+
     def __init__(self, body):
         six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         numbers = {"centre": text(body.centre), "mass": body.mass, "inertia": text(six), "down": -body.gravity}

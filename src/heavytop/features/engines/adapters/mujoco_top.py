@@ -20,6 +20,8 @@ def text(values):
 
 
 class Engine:
+    """MuJoCo with a body about a fixed point."""
+
     def __init__(self, body):
         six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         numbers = {"centre": text(body.centre), "mass": body.mass, "inertia": text(six), "down": -body.gravity}

@@ -10,6 +10,8 @@ WEIGHTS = np.array([1, 2, 2, 1]) / 6
 
 
 class Engine:
+    """Pinocchio with a body about a fixed point."""
+
     def __init__(self, body):
         self.model = pin.Model()
         self.model.gravity.linear = np.array([0, 0, -body.gravity])

@@ -12,6 +12,8 @@ PLACE = {"linkPositions": [[0, 0, 0]], "linkOrientations": [[0, 0, 0, 1]]}
 
 
 class Engine:
+    """PyBullet with a body about a fixed point."""
+
     def __init__(self, body):
         bullet.resetSimulation()
         bullet.setGravity(0, 0, -body.gravity)

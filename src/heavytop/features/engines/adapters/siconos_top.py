@@ -9,6 +9,8 @@ LONG = 1e6
 
 
 class Engine:
+    """Siconos with a body about a fixed point."""
+
     def __init__(self, body):
         self.centre, self.simulation = body.centre, None
         centre = body.rotation @ body.centre
