@@ -77,7 +77,7 @@ class DigitsEnd(Tabular):
         found = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:
-                found.append(f"{what}: not lost before t = {decimal_text(self.times[-1], 6)}")
+                found.append(f"{what}: not lost at any of {_TIMES} times up to t = {decimal_text(self.times[-1], 6)}")
                 continue
             how = "proven" if loss.proven else "computed, beyond the reach of a proof"
             found.append(
