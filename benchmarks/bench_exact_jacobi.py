@@ -5,12 +5,12 @@ from fractions import Fraction
 import pytest
 
 from heavytop.exact.cases import euler, pendulum
-from heavytop.exact.cases.bobylev_steklov import bobylev_steklov_motion
 from heavytop.exact.cases.delone import Delone
 from heavytop.exact.cases.euler import Euler
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.flint.balls import radius, radius_text, working_precision
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import bobylev_steklov_motion
 
 F = Fraction
 MOTIONS = {

@@ -148,7 +148,7 @@ def test_nothing_is_written_where_a_report_is_wrong(reports, monkeypatch, capsys
         (["compare", "old", "same", "--loss", "1e400"], "too large"),
         (["compare", "old", "same", "--junit", ""], "cannot be written"),
         (["history", "old"], "two reports or more"),
-        (["history", "old", "same", "--metric", "[x"], "no glob pattern"),
+        (["history", "old", "same", "--metric", "[x"], "must be a glob"),
     ],
 )
 def test_bad_input_is_refused_in_words(reports, monkeypatch, capsys, arguments: list[str], message: str) -> None:

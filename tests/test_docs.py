@@ -35,6 +35,7 @@ NOT_CODE = {
     "{include} ../CHANGELOG.md",
     "{include} _build/claims.md",
     "{include} _build/commands.md",
+    "{include} _build/engines.md",
     "{include} _build/public.md",
     "{thumbnails}",
 }

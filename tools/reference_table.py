@@ -14,11 +14,8 @@ from pathlib import Path
 import msgspec
 
 from heavytop.exact.cases.algebraic_starts import chaplygin_motion, goryachev_motion, kowalewski_motion
-from heavytop.exact.cases.bobylev_steklov import bobylev_steklov_motion
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
-from heavytop.exact.cases.grioli import grioli_motion
-from heavytop.exact.cases.staude import staude_motion
 from heavytop.exact.catalogue import find
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.solution import ExactSolution
@@ -27,6 +24,7 @@ from heavytop.measure.certify import Certificate, bits_of, certify, enclosure_of
 from heavytop.measure.reference import Ball, known_texts
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import bobylev_steklov_motion, grioli_motion, staude_motion
 
 _DIGITS = 100
 # what the second source may cost at one time, in seconds of its model

@@ -26,6 +26,11 @@ def skew(v: np.ndarray) -> np.ndarray:
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a × b: numpy's takes thirty times as long for three numbers."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def exponential(v: np.ndarray) -> np.ndarray:
     """The rotation of a rotation vector (Rodrigues)."""
     angle = np.linalg.norm(v)
@@ -78,7 +83,7 @@ class Engine:
         inverse, moment = np.linalg.inv(tensor), self.mass * self.gravity * self.centre
 
         def change(r: np.ndarray, w: np.ndarray) -> np.ndarray:
-            return inverse @ (np.cross(tensor @ w, w) + np.cross(r[2], moment))
+            return inverse @ (cross(tensor @ w, w) + cross(r[2], moment))
 
         r, w, h = self.rotation, self.omega, self.step
         steps, rotations, omegas = [0], [r], [w]
@@ -97,10 +102,10 @@ class Engine:
                 b = w + h / 2 * ka
                 kb = change(r @ exponential(h / 2 * a), b)
                 c = w + h / 2 * kb
-                kc = change(r @ exponential(h / 2 * b + h * h / 8 * np.cross(a, b)), c)
+                kc = change(r @ exponential(h / 2 * b + h * h / 8 * cross(a, b)), c)
                 d = w + h * kc
                 kd = change(r @ exponential(h * c), d)
-                turn = h / 6 * (a + 2 * b + 2 * c + d) + h * h / 12 * np.cross(a, d)
+                turn = h / 6 * (a + 2 * b + 2 * c + d) + h * h / 12 * cross(a, d)
                 r, w = r @ exponential(turn), w + h / 6 * (ka + 2 * kb + 2 * kc + kd)
             if self.reset and n == self.reset:
                 r, w = self.rotation, self.omega

@@ -14,6 +14,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from fractions import Fraction
+from pathlib import Path
 from random import Random
 from statistics import median
 from time import process_time
@@ -28,11 +29,14 @@ from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretens
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, ThetaMotion
-from heavytop.exact.cases.one_interval import gaps, steklov_motion
+from heavytop.exact.cases.one_interval import gaps
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+from rational_motions import steklov_motion
 
 F = Fraction
 LATE = F(10**6)

@@ -22,13 +22,21 @@ State = np.ndarray
 Field = Callable[[State], State]
 
 
+def cross(a: State, b: State) -> State:
+    """a × b: numpy's takes thirty times as long for three numbers."""
+    return a[AFTER] * b[BEFORE] - a[BEFORE] * b[AFTER]
+
+
+AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
+
+
 def equations(inertia: State, moment: State, gyroscopic: float = 1, kinematic: float = 1, term: float = 1) -> Field:
     """y' of y = (Ω, γ); the last three plant a fault: signs of M × Ω and γ × Ω, a factor of P γ × r."""
 
     def field(y: State) -> State:
         w, g = y[:3], y[3:]
-        torque = gyroscopic * np.cross(inertia * w, w) + term * np.cross(g, moment)
-        return np.concatenate([torque / inertia, kinematic * np.cross(g, w)])
+        torque = gyroscopic * cross(inertia * w, w) + term * cross(g, moment)
+        return np.concatenate([torque / inertia, kinematic * cross(g, w)])
 
     return field
 

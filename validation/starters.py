@@ -18,7 +18,10 @@ from collections.abc import Iterator
 from itertools import permutations
 from pathlib import Path
 
+from typer.testing import CliRunner
+
 from heavytop.api.integrators import LANGUAGES, METHODS
+from heavytop.cli import app
 
 HEAVYTOP = [sys.executable, "-m", "heavytop"]
 COMPILERS = {"python": "python3", "c": "cc", "cpp": "g++", "rust": "rustc", "julia": "julia", "fortran": "gfortran"}
@@ -102,11 +105,12 @@ def findings(folder: Path, repeats: int, load: int) -> int:
         print(f"{folder.name}: check-integrator ends with {code}: {said}")
     runs = [measured(folder, number, load) for number in range(repeats)]
     for old, new in permutations(runs, 2):
-        code, said = ran(folder, "compare", old, new, "--policy", "policy.toml")
-        if code:
+        paths = [str(folder / name) for name in (old, new, "policy.toml")]
+        done = CliRunner().invoke(app, ["compare", *paths[:2], "--policy", paths[2]])
+        if done.exit_code:
             wrong += 1
-            print(f"{folder.name}: {old} against {new} ends with {code}: {said[:600]}")
-    print(f"{folder.name}: {wrong} of {1 + repeats * (repeats - 1)} are not green")
+            print(f"{folder.name}: {old} against {new} ends with {done.exit_code}: {done.output[:600]}", flush=True)
+    print(f"{folder.name}: {wrong} of {1 + repeats * (repeats - 1)} are not green", flush=True)
     return wrong
 
 

@@ -22,7 +22,8 @@ from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.stability import stability
 
 FORMATS = ("double", "extended", "quad")
-INTEGRATORS = ("heyoka", "multiword", "splitting:8")
+INTEGRATORS = ("heyoka", "splitting:8", "scipy:DOP853")
+"""Their state is rounded to the format after each step; multiword carries more bits and rounds what it returns."""
 
 
 def rational(draw: random.Random, least: int = -12, most: int = 12) -> Fraction:

@@ -88,7 +88,7 @@ def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
     Raises InputError for a system that does not know the rotor of a top.
     """
     if not (value is None or isinstance(value, str) or any(value is known for known in SYSTEMS)):
-        raise InputError(f"system = {quoted(value)} is none.", f"Give {WHICH_SYSTEM}, as text.")
+        raise InputError(f"system must be a name; got {quoted(value)}.", f"Give {WHICH_SYSTEM}, as text.")
     return system_of(value, *tops)
 
 

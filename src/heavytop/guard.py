@@ -100,12 +100,12 @@ def kill_marked(mark: str) -> None:
 
 def _marked(mark: str) -> list[int]:
     """The processes whose environment has this mark; none where the system does not show environments."""
-    found, wanted = [], f"{MARK}={mark}".encode()
+    processes, wanted = [], f"{MARK}={mark}".encode()
     for file in glob("/proc/[0-9]*/environ"):
         with suppress(OSError):  # it has ended, or is somebody else's; that of a zombie is empty
             if wanted in Path(file).read_bytes():
-                found.append(int(file.split("/")[2]))
-    return found
+                processes.append(int(file.split("/")[2]))
+    return processes
 
 
 def stopwatch(process: int | None = None) -> Callable[[], float]:

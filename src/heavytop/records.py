@@ -144,9 +144,9 @@ def _parsed(text: str) -> Fraction | float:
         return math.inf if text == "never" else math.nan
 
 
-def by_name(found: Mapping[Quantity, Metric]) -> dict[str, Metric]:
+def by_name(metrics: Mapping[Quantity, Metric]) -> dict[str, Metric]:
     """Metrics under their keys, each with its quantity."""
-    return {q.text: msgspec.structs.replace(metric, quantity=q) for q, metric in found.items()}
+    return {q.text: msgspec.structs.replace(metric, quantity=q) for q, metric in metrics.items()}
 
 
 class Series(msgspec.Struct, frozen=True, gc=False):
@@ -301,7 +301,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             ends = f", and no digit is left from t = {self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
-        said = ", for the first start; ".join(each.text for each in self.certificates)
+        said = ", for the first start; ".join(certificate.text for certificate in self.certificates)
         return f"known: {self.method}, radius below {self.radius}; {said}"
 
     @property
@@ -438,10 +438,10 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     def __post_init__(self) -> None:
         key, reference = self.key, self.reference
         against = f"nothing: {reference.reason}" if self.outcome in UNMEASURED else reference.text
-        given = self.system, self.precision, self.horizon, self.measure, self.against
+        identity = self.system, self.precision, self.horizon, self.measure, self.against
         derived = key.system, key.precision, key.horizon, key.kind, against
-        if given != derived:
-            for name, old, new in zip(_DERIVED, given, derived, strict=True):
+        if identity != derived:
+            for name, old, new in zip(_DERIVED, identity, derived, strict=True):
                 if old not in ("", new):
                     raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
                 msgspec.structs.force_setattr(self, name, new)
@@ -538,27 +538,27 @@ def in_document(part: Any) -> set[str]:
         return set().union(*map(in_document, part))
     if not isinstance(part, dict):
         return set()
-    given = part.get("integrator")
-    own = {given} if isinstance(given, str) and given in INTEGRATORS else set()
-    return own.union(*(in_document(each) for each in part.values()))
+    integrator = part.get("integrator")
+    own = {integrator} if isinstance(integrator, str) and integrator in INTEGRATORS else set()
+    return own.union(*(in_document(item) for item in part.values()))
 
 
 def of_document(part: Any) -> Any:
     """A plan's document with the names of now."""
     if isinstance(part, list):
-        return [of_document(each) for each in part]
+        return [of_document(item) for item in part]
     if not isinstance(part, dict):
         return part
-    found = {name: of_document(each) for name, each in part.items()}
-    if isinstance(given := part.get("integrator"), str):
-        found["integrator"] = current(given)
-    return found
+    plain = {name: of_document(item) for name, item in part.items()}
+    if isinstance(integrator := part.get("integrator"), str):
+        plain["integrator"] = current(integrator)
+    return plain
 
 
 def of_plan(plan: dict[str, str]) -> dict[str, str]:
     """The plan block of a report with the name of now of the integrator that was measured beside heyoka."""
-    given = plan.get("integrator", "")
-    return plan | {"integrator": current(given)} if given in INTEGRATORS else plan
+    integrator = plan.get("integrator", "")
+    return plan | {"integrator": current(integrator)} if integrator in INTEGRATORS else plan
 
 
 def of_identity(identity: dict[str, str]) -> dict[str, str]:

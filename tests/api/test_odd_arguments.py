@@ -390,7 +390,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states has the shape (1, 9)"),
         (lambda: ht.score([1, 2], np.zeros((1, 6)), top=TOP, start=START), "2 times and 1 states"),
         (lambda: ht.score([1], [[1, 2, 3]], top=TOP, start=START), "states[0] has 3 numbers"),
-        (lambda: ht.compare("nowhere", "nowhere"), "There is no report"),
+        (lambda: ht.compare("nowhere", "nowhere"), "holds no report"),
         (lambda: ht.run("smok"), "Unknown plan 'smok'"),
         (lambda: ht.audit("paper"), "Unknown claim 'paper'"),
     ],

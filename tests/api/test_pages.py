@@ -54,7 +54,7 @@ def test_a_page_is_what_its_file_says_and_has_nothing_that_only_the_site_can_sho
         )
     assert pages.page("docs/score.md") == pages.page("score")
     for name in ("", "../README", "no such page"):
-        with pytest.raises(InputError, match="There is no page"):
+        with pytest.raises(InputError, match="topic must name a page"):
             pages.page(name)
     with pytest.raises(InputError) as caught:
         pages.page("Compere")

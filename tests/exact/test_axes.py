@@ -5,14 +5,13 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import NotInClass
-from heavytop.exact.cases.bobylev_steklov import bobylev_steklov_motion
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.euler import Euler
-from heavytop.exact.cases.grioli import grioli_motion
 from heavytop.exact.closed_form import ALL, Renamed, inverse, renamed_state, renamed_top
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import bobylev_steklov_motion, grioli_motion
 from support.proofs import assert_attitude, assert_solves
 
 UNIT = (Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3))

@@ -7,10 +7,11 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.cases.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, attitude_of, initial_xi, renamed_state, renamed_top
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import bobylev_steklov_motion
 from support.proofs import (
     assert_agrees,
     assert_attitude,

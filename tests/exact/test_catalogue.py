@@ -6,27 +6,28 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact.cases.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.cases.dokshevich import Dokshevich
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.euler import Euler
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
-from heavytop.exact.cases.grioli import Grioli, grioli_motion
+from heavytop.exact.cases.grioli import Grioli
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
 from heavytop.exact.cases.lagrange import Lagrange, SphericalTop
-from heavytop.exact.cases.one_interval import Steklov, steklov_motion
+from heavytop.exact.cases.one_interval import Steklov
 from heavytop.exact.cases.pendulum import Pendulum
-from heavytop.exact.cases.staude import Staude, staude_motion
+from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find, matches, table
 from heavytop.exact.closed_form import ALL, ClosedForm, Renamed, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.precision import round_to
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import bobylev_steklov_motion, grioli_motion, staude_motion, steklov_motion
 from support.proofs import assert_solves
 
 F = Fraction

@@ -6,11 +6,12 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.cases.grioli import Grioli, grioli_motion
-from heavytop.exact.cases.staude import Staude, staude_motion
+from heavytop.exact.cases.grioli import Grioli
+from heavytop.exact.cases.staude import Staude
 from heavytop.exact.catalogue import find
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import grioli_motion, staude_motion
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 

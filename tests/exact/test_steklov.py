@@ -6,10 +6,11 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.cases.one_interval import Steklov, quadratics, steklov_motion
+from heavytop.exact.cases.one_interval import Steklov, quadratics
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.heavy_top import HeavyTop, State
+from rational_motions import steklov_motion
 from support.proofs import assert_enclosed, assert_exact, assert_narrow, assert_solves, positive
 
 F = Fraction

@@ -234,7 +234,7 @@ def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
     [
         ('name = "silent"', 'name = "forks"', "one name to two integrators"),
         ('name = "silent"', 'name = "words"', "built-in"),
-        ('"mine.py:solve"', '"mine"', "is no file"),
+        ('"mine.py:solve"', '"mine"', "integrators must name files"),
         ('"mine.py:solve"', '"absent.toml"', "cannot be read"),
         ('name = "silent"', "", "name"),
     ],

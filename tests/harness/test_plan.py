@@ -237,7 +237,7 @@ def test_an_unknown_kind_is_answered_with_those_that_are_there(
 ) -> None:
     file = tmp_path / "own.toml"
     file.write_text(f'name = "own"\nmeasure = []\n[[{section}]]\nkind = "{kind}"\n'.replace("measure = []\n[[m", "[[m"))
-    with pytest.raises(InputError, match=f"kind = '{kind}' in .*{section}.0.* is none of .*; did you mean {near}"):
+    with pytest.raises(InputError, match=f"{section}.0.* must be one of .*; got '{kind}'; did you mean {near}"):
         load(str(file))
 
 

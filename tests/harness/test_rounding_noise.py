@@ -139,5 +139,5 @@ def test_a_run_that_failed_has_no_bands(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize("seed", [-1, 1001])
 def test_a_seed_out_of_range_is_refused(seed: int) -> None:
-    with pytest.raises(InputError, match=f"no seed {seed}"):
+    with pytest.raises(InputError, match=f"seed must be from 0 to .*; got {seed}"):
         expand(PLAN, seed)

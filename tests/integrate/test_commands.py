@@ -57,10 +57,10 @@ FAILURES = {
     "1 GB": "wrote the state at 0.5 where that at 1",
     "aborts": "failed: no convergence at t = 1.3",
     "only done": "said done after 0 of 2 states",
-    "prompts": "wrote '> state 0.5 1 2 3 4 5 6', which is no line of the protocol",
-    "an empty line": "wrote '', which is no line of the protocol",
-    "capitals": "wrote 'DONE', which is no line",
-    "ready again": "wrote 'ready faulty 1', which is no line",
+    "prompts": "wrote '> state 0.5 1 2 3 4 5 6', which the protocol does not know",
+    "an empty line": "wrote '', which the protocol does not know",
+    "capitals": "wrote 'DONE', which the protocol",
+    "ready again": "wrote 'ready faulty 1', which the protocol",
     "nan": "wrote a state that is not finite at t = 1",
     "infinite": "wrote a state that is not finite at t = 0.5",
     "overflow": "wrote '1e999', which is not a number: outside the range of double",
@@ -354,7 +354,7 @@ def test_a_file_is_named_by_itself_or_with_the_name_of_one_of_its_programs(tmp_p
 def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, line: list[str]) -> None:
     toml(tmp_path)
     given = msgspec.structs.replace(program(), command=tuple(line), folder=str(tmp_path))
-    with pytest.raises(PeerFailed, match=r"there is no program|is not executable"):
+    with pytest.raises(PeerFailed, match=r"the program .* does not exist|is not executable"):
         registry.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 

@@ -48,7 +48,7 @@ def test_an_order_leads_then_failures_digits_laws_and_that_nothing_else_changed(
     assert said[1] == "1 row of mine:rk5 failed on delone at T = 100 (mine:rk5, double): it returned NaN."
     assert said[2] == "Digits right 8.9 → 7.5 on lagrange at T = 100 (mine:rk5, double), fewer on 1 other row too."
     assert said[3].startswith("The error along the flow grows like t (was t^0.5) on grioli")
-    assert said[-1] == "Nothing else changed."
+    assert said[-1] == "No other row changed."
     assert len(said) == 5
 
 
@@ -58,7 +58,7 @@ def test_the_order_of_whole_runs_of_a_method_with_a_memory_leads_too() -> None:
 
     said = found([runs("4")], [runs("1")])
     assert said[0] == "Order observed 4 → 1 in whole runs on euler (mine:rk5, double)."
-    assert said[-1] == "Nothing else changed."
+    assert said[-1] == "No other row changed."
 
 
 def test_a_report_against_itself_has_one_sentence() -> None:
@@ -154,7 +154,7 @@ def test_rows_that_failed_are_counted_with_the_first_and_its_reason() -> None:
     assert found(old, new) == [
         "2 rows of mine:rk5 failed, first on lagrange at T = 100 (mine:rk5, double): "
         "out_of_time, not done within 40 s.",
-        "Nothing else changed.",
+        "No other row changed.",
     ]
     assert found(new, old)[0].startswith("2 rows of mine:rk5 are better, first on lagrange")
 

@@ -402,8 +402,9 @@ def headline_of(kind: str, rows: list[Row]) -> str:
 ALONE = {
     "claim_model": "The claimed Ω is off by 1 % of α = Ω3(0) I3/I1 from |t| = 0.002 on (ershkov-partial-6/forward, "
     "printed).",
-    "claim_evaluation": "In double the printed form is off by up to 1.11e-7 in Ω, not finite from |t| = 7.4; the "
-    "stable form is off by up to 1.03e-15 in Ω, finite throughout.",
+    "claim_evaluation": "In double the printed form is off by up to 1.11e-7 in Ω "
+    "(ershkov-partial-6/backward), ψ not finite from |t| = 7.4; the stable form is off by up to 1.03e-15 in Ω "
+    "(ershkov-partial-6/forward), finite throughout.",
     "homoclinic": "heyoka stays on a homoclinic motion up to |t| = 12.3 to 63 in double, 62.8 to 321 in real:237.",
     "break_away_law": "A bit of the format buys 0.27 to 1.4 time units before the escape: ln 2 / rate within 19 %.",
 }
@@ -429,7 +430,9 @@ def test_kinds_that_are_mixed_answer_in_order(default: Report) -> None:
     opened, *others = re.findall(
         r'<h2 id="verdict-heading"[^>]*>([^<]+)</h2>|<p>([^<]+)</p>', page.partition('<div class="cards">')[0]
     )
-    assert opened[0] == "heyoka in double: 8.7 of 16 digits right to T = 1e5 (lagrange, worst of 5)."
+    assert opened[0] == (
+        "heyoka in double: 8.7 of 16 digits right to T = 1e5 (lagrange, worst of 5); generic has lost all from t = 700."
+    )
     said = [other[1].strip() for other in others]
     assert said[0].endswith("it solves the gyrostat instead.")
     kinds = ("claim_model", "homoclinic", "break_away_law", "claim_evaluation")

@@ -20,7 +20,7 @@ MESSAGE = "message.txt"
 def require_baseline(baseline: Path) -> None:
     """Raises InputError where the folder holds no report."""
     if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
-        raise InputError(f"There is no baseline in {baseline}.", "Make it, and commit it: heavytop gate --bless")
+        raise InputError(f"{baseline} holds no baseline.", "Make it, and commit it: heavytop gate --bless")
 
 
 def clear(folder: Path) -> None:

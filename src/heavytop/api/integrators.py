@@ -98,11 +98,11 @@ def new_integrator(
     Raises InputError for an unknown language, method or engine, a folder that holds anything, a workflow that exists,
     and what cannot be written.
     """
-    for name, choices, noun in ((language, LANGUAGES, "program in"), (method, METHODS, "method")):
+    for name, choices, noun in ((language, LANGUAGES, "language"), (method, METHODS, "method")):
         if name not in choices:
-            raise InputError(f"There is no {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
+            raise InputError(f"Unknown {noun} {quoted(name)}.", f"Use {', '.join(choices)}.")
     if engine and engine not in (known := engines()):
-        raise InputError(f"There is no adapter of {quoted(engine)}.", f"Use {', '.join(known)}.")
+        raise InputError(f"engine must have an adapter; got {quoted(engine)}.", f"Use {', '.join(known)}.")
     workflow = (into or folder) / _WORKFLOW
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -170,10 +170,10 @@ def _prepared(
     run = registry.propagator(which, options)
 
     def call(times: Numbers) -> Trajectory:
-        found: Trajectory = run(setup.top, setup.start, check_times(times), form, system=setup.system)
+        trajectory: Trajectory = run(setup.top, setup.start, check_times(times), form, system=setup.system)
         if beside:
-            found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
-        return setup.given(found).with_dense(_dense(setup, which, found.time_reached, options))
+            trajectory = replace(trajectory, states=trajectory.states[:, :6], attitude=trajectory.states[:, 6:])
+        return setup.given(trajectory).with_dense(_dense(setup, which, trajectory.time_reached, options))
 
     return call
 
@@ -227,9 +227,9 @@ def motion(
     body, state = arguments.motion(top, start, form)
     about = arguments.system(system, body)
     checked = _options(form, options, None)
-    given = ordered(times, "times", "Give a list such as [1, 2, 5].")
-    instants = check_times(given)
-    written = [str(TimeText.of(time)) for time in given]
+    ordered_times = ordered(times, "times", "Give a list such as [1, 2, 5].")
+    instants = check_times(ordered_times)
+    written = [str(TimeText.of(time)) for time in ordered_times]
     return compute(body, state, instants, form, about, angles, checked, named(integrator), reached, outputs, written)
 
 
@@ -268,8 +268,8 @@ def ensemble(
     checked = _options(form, options, _watching(setups, observer))
     checked |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
     run = registry.ensemble_propagator(named(integrator), checked)
-    found = run([setup.problem for setup in setups], check_times(times))
-    return [setup.given(member) for setup, member in zip(setups, found, strict=True)]
+    trajectories = run([setup.problem for setup in setups], check_times(times))
+    return [setup.given(member) for setup, member in zip(setups, trajectories, strict=True)]
 
 
 def reference(
@@ -310,14 +310,14 @@ def reference(
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
-    about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
-    arguments.any_times(given)
+    about, instants = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
+    arguments.any_times(instants)
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
     seconds = EFFORT if effort is None else seconds_of(effort, "effort")
     solution = arguments.callback(finder, "finder") or find
-    return proven(body, state, given, as_integer(digits, "digits"), about, solution, told, which, seconds)
+    return proven(body, state, instants, as_integer(digits, "digits"), about, solution, told, which, seconds)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
@@ -353,12 +353,12 @@ def _options(
     form: Precision, options: Mapping[str, Any], observer: Callable[..., object] | None = None
 ) -> dict[str, Any]:
     """The options that were asked for, checked: an integrator need not know the others."""
-    given = _checked_names(options)
+    options_given = _checked_names(options)
     checked = {
-        "tolerance": arguments.tolerance(given["tolerance"], form),
-        "high_accuracy": arguments.flag(given["high_accuracy"], "high_accuracy"),
-        "compact_mode": arguments.flag(given["compact_mode"], "compact_mode"),
-        "step_limit": arguments.steps(given["step_limit"]),
+        "tolerance": arguments.tolerance(options_given["tolerance"], form),
+        "high_accuracy": arguments.flag(options_given["high_accuracy"], "high_accuracy"),
+        "compact_mode": arguments.flag(options_given["compact_mode"], "compact_mode"),
+        "step_limit": arguments.steps(options_given["step_limit"]),
         "observer": arguments.callback(observer, "observer"),
     }
     return {name: value for name, value in checked.items() if value is not None}
@@ -478,39 +478,39 @@ class Integrator:
         if isinstance(start, State):
             return self._together([self._one(start, None, targets)], targets, False, is_one)
         rows, several = self._rows(start)
-        found = []
+        trajectories = []
         for index, row in enumerate(rows):
             try:
-                found.append(self._one(None, row, targets))
+                trajectories.append(self._one(None, row, targets))
             except InputError as error:
                 if not several:
                     raise
                 raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
-        return self._together(found, targets, several, is_one)
+        return self._together(trajectories, targets, several, is_one)
 
     def _targets(self, times: Any) -> tuple[Sequence[Any], bool]:
         """Native times, checked, and whether one was asked for."""
         if type(times) is float and -_LARGEST < times < _LARGEST and self._is_plain:
             return (times,), True
         is_one = isinstance(times, int | float | str | Fraction) or not hasattr(times, "__iter__")
-        given = check_times([times] if is_one else times)
-        if not len(given):
+        targets = check_times([times] if is_one else times)
+        if not len(targets):
             raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
-        return numbers(given, self._form), is_one
+        return numbers(targets, self._form), is_one
 
     def _rows(self, start: Any) -> tuple[Any, bool]:
         """The starts, a row each, and whether there are several."""
         try:
-            given = start if isinstance(start, numpy.ndarray) else _array(list(start))
-            if given.dtype.kind == "f" and given.dtype.itemsize < 8:
-                given = given.astype(float)
-            if given.ndim == 1 and given.shape == (6,):
-                return [given], False
-            if given.ndim == 2 and given.shape[1] == 6 and len(given):
-                return given, True
+            array = start if isinstance(start, numpy.ndarray) else _array(list(start))
+            if array.dtype.kind == "f" and array.dtype.itemsize < 8:
+                array = array.astype(float)
+            if array.ndim == 1 and array.shape == (6,):
+                return [array], False
+            if array.ndim == 2 and array.shape[1] == 6 and len(array):
+                return array, True
         except (TypeError, ValueError):
-            raise InputError(f"start = {quoted(start)} is no start.", _SHAPES) from None
-        raise InputError(f"start has the shape {given.shape}.", _SHAPES)
+            raise InputError(f"start must be a State or an array of numbers; got {quoted(start)}.", _SHAPES) from None
+        raise InputError(f"start has the shape {array.shape}.", _SHAPES)
 
     def _one(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> tuple[Any, Outcome, Any, int]:
         """As :func:`heavytop.integrate.heyoka.motions.states_at`."""
@@ -524,7 +524,7 @@ class Integrator:
                     self._tool.spare.append(engine)
         if state is None:
             state = State(row[:3], row[3:])
-        found = propagate(
+        trajectory = propagate(
             self._top,
             state,
             [exact(target) for target in targets],
@@ -534,7 +534,7 @@ class Integrator:
             attitude=False,
             **self._options,
         )
-        return found.states, found.outcome, number(found.time_reached, self._form), found.steps
+        return trajectory.states, trajectory.outcome, number(trajectory.time_reached, self._form), trajectory.steps
 
     def _plain(self, state: State | None, row: Any, targets: Sequence[OrderedRing]) -> Any:
         """The start in doubles, checked; None for irrational ones, and where exact numbers tell what is wrong."""
@@ -561,15 +561,15 @@ class Integrator:
         return Problem.of(self._top, state, self._form, self._system)
 
     def _together(
-        self, found: list[tuple[Any, Outcome, Any, int]], targets: Sequence[OrderedRing], several: bool, is_one: bool
+        self, results: list[tuple[Any, Outcome, Any, int]], targets: Sequence[OrderedRing], several: bool, is_one: bool
     ) -> Propagated:
-        blocks = [self._filled(states, len(targets)) for states, *_ in found]
+        blocks = [self._filled(states, len(targets)) for states, *_ in results]
         times = targets[0] if is_one else numpy.array(targets)
         if not several:
-            states, (_, outcome, reached, steps) = blocks[0], found[0]
+            states, (_, outcome, reached, steps) = blocks[0], results[0]
             return Propagated(times, states[0] if is_one else states, outcome, reached, steps)
         states = numpy.array(blocks)
-        _, outcomes, ends, counts = zip(*found, strict=True)
+        _, outcomes, ends, counts = zip(*results, strict=True)
         return Propagated(times, states[:, 0] if is_one else states, outcomes, numpy.array(ends), counts)
 
     def _filled(self, states: Any, count: int) -> Any:

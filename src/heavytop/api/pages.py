@@ -27,7 +27,7 @@ def page(topic: str) -> str:
     if name not in files:
         near = get_close_matches(name.lower(), files, 1)
         remedy = f"Did you mean {near[0]}?  " if near else ""
-        raise InputError(f"There is no page {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
+        raise InputError(f"topic must name a page; got {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
     return re.sub(
         r"\$\$\n(.*?)\$\$",
         lambda formula: f"```text\n{plain_formula(formula[1])}\n```",

@@ -258,7 +258,7 @@ def poincare(
     for start in listed:
         if not isinstance(start, Crossings):
             raise InputError(
-                f"{quoted(start)} is no section.", "Give what heavytop.poincare or heavytop.events returns."
+                f"start must be events; got {quoted(start)}.", "Give what heavytop.poincare or heavytop.events returns."
             )
     total = sum(map(len, listed))
     if not total:
@@ -288,7 +288,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
         InputError: for a reference, whose integrals do not drift, and as :func:`sphere`.
     """
     if not isinstance(run, Trajectory):
-        raise InputError(f"{quoted(run)} is no computed motion.", "Give what heavytop.propagate returns.")
+        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
     samples(run)
     places = every(len(run.states))
     drawn, times = _flat(axes), np.array([float(exact(run.times[index])) for index in places])
@@ -419,10 +419,12 @@ def _writer(suffix: str, fps: int) -> AbstractMovieWriter:
     if suffix == ".gif":
         return PillowWriter(fps=fps)
     if suffix != ".mp4":
-        raise InputError(f"A film is no {quoted(suffix)} file.", "Give a path that ends with .gif or .mp4.")
+        raise InputError(
+            f"A film must be .gif or .mp4; got {quoted(suffix)}.", "Give a path that ends with .gif or .mp4."
+        )
     if not FFMpegWriter.isAvailable():
         raise InputError(
-            "There is no ffmpeg to write .mp4 with.", "Install ffmpeg, or give a path that ends with .gif."
+            "Writing .mp4 needs ffmpeg, which is not installed.", "Install ffmpeg, or give a path that ends with .gif."
         )
     return FFMpegWriter(fps=fps)
 

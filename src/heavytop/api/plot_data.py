@@ -96,7 +96,7 @@ def samples(run: Any) -> Samples:
     """A motion in double; raises InputError for what is none, for fewer than two samples, and for ones not finite."""
     if not isinstance(run, Trajectory | Reference):
         raise InputError(
-            f"{quoted(run)} is no motion to draw.", "Give what heavytop.propagate or heavytop.reference returns."
+            f"run must be a motion; got {quoted(run)}.", "Give what heavytop.propagate or heavytop.reference returns."
         )
     count = len(run.states)
     if count < _FEWEST:
@@ -179,7 +179,7 @@ def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, N
     if of in AXES:
         return of, np.array(AXES[of])
     if of != "centre":
-        raise InputError(f"of = {quoted(of)} is none.", f"Use {', '.join(OF)}.")
+        raise InputError(f"of must name a vector; got {quoted(of)}.", f"Use {', '.join(OF)}.")
     moment = parameters_of(run, top).moment
     if not any(moment):
         raise InputError("The centre of mass is at the fixed point, or has no weight.", "Use axis1, axis2 or axis3.")
@@ -204,7 +204,7 @@ def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, 
 def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
     """(problem, times, states, known states), exact, every nth of many; raises InputError where the times differ."""
     if not isinstance(run, Trajectory):
-        raise InputError(f"{quoted(run)} is no computed motion.", "Give what heavytop.propagate returns.")
+        raise InputError(f"run must be a computed motion; got {quoted(run)}.", "Give what heavytop.propagate returns.")
     samples(run)
     samples(known)
     count = len(run.states)

@@ -330,7 +330,7 @@ def read_history(reports: Any, metric: str, case: str, policy: PathLike | None, 
 def _report(source: Any, what: str, read: Callable[[], None]) -> store.AnyReport:
     """A report, or that of a path, whose rows are read as they are gone through; then ``read`` is called."""
     if not isinstance(source, records.Report | str | os.PathLike):
-        raise InputError(f"{what} = {quoted(source)} is no report.", "Give a Report, or the path of one.")
+        raise InputError(f"{what} must be a report; got {quoted(source)}.", "Give a Report, or the path of one.")
     if isinstance(source, records.Report):
         check_keys(what, source.rows)
         report: store.AnyReport = source

@@ -129,16 +129,16 @@ class PlannedRun:
         for index in indices:
             if KINDS[kind := self.tasks[index].key.kind].gathers:
                 parts.setdefault(kind, []).append(index)
-        found = [row for kind, places in parts.items() for row in self._gathered(kind, rows, places)]
+        rows_of_kinds = [row for kind, places in parts.items() for row in self._gathered(kind, rows, places)]
         others = sorted(set(indices).difference(*parts.values()))
         if len(self.tasks) > MOST_ON_A_PAGE:
-            return lambda: chain(rows.rows(others), found, laws)
-        held = [*rows.rows(others), *found, *laws]
+            return lambda: chain(rows.rows(others), rows_of_kinds, laws)
+        held = [*rows.rows(others), *rows_of_kinds, *laws]
         return lambda: held
 
     def _gathered(self, kind: str, rows: Checkpoint, places: list[int]) -> list[Row]:
         """The rows of the report made of those in these places, of a kind that gathers them."""
-        tasks = [self.tasks[place] for place in places]
+        tasks = [self.tasks[index] for index in places]
         return KINDS[kind].gather(lambda: zip(tasks, rows.rows(places), strict=True), self.directory)
 
     def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> FinishedRun:

@@ -41,7 +41,7 @@ def _version(asked: bool) -> None:
 def _completion(shell: str | None) -> None:
     if shell is not None:
         if shell not in SHELLS:
-            raise InputError(f"There is no completion for {quoted(shell)}.", f"Use {', '.join(SHELLS)}.")
+            raise InputError(f"shell must have completion; got {quoted(shell)}.", f"Use {', '.join(SHELLS)}.")
         from typer import completion
 
         print(

@@ -36,12 +36,12 @@ _LATEX = "--latex"
 
 def with_file_of_latex(arguments: list[str]) -> list[str]:
     """The arguments of the command line, with ``-`` for standard output behind a ``--latex`` without a file."""
-    found: list[str] = []
+    files: list[str] = []
     for argument in arguments:
-        if found[-1:] == [_LATEX] and argument.startswith("--"):
-            found.append(str(_SCREEN))
-        found.append(argument)
-    return [*found, str(_SCREEN)] if found[-1:] == [_LATEX] else found
+        if files[-1:] == [_LATEX] and argument.startswith("--"):
+            files.append(str(_SCREEN))
+        files.append(argument)
+    return [*files, str(_SCREEN)] if files[-1:] == [_LATEX] else files
 
 
 def made_by() -> tuple[str, str]:
@@ -84,13 +84,15 @@ BodyFile = Annotated[
 Link = Annotated[str | None, typer.Option(help="Link or body of --file, where it has several.")]
 CaseName = Annotated[str | None, typer.Option("--case", help="A case of `heavytop list` in place of body and start.")]
 Omega = Annotated[str | None, typer.Option(help="Angular velocity x,y,z at t = 0, in body axes.")]
-OmegaSpace = Annotated[str | None, typer.Option(help="The same in space axes, with an attitude.")]
+OmegaSpace = Annotated[str | None, typer.Option(help="Angular velocity at t = 0 in space axes; needs an attitude.")]
 Gamma = Annotated[str | None, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0, body to space.")]
 Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
 AxisAngle = Annotated[str | None, typer.Option(help="Attitude as x,y,z:angle; radians, or 30deg.")]
 Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
-Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
+Times = Annotated[
+    str, typer.Option(help="Times t1,t2,..., each farther from 0 than the last, on one side of it; the first may be 0.")
+]
 Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
 SystemName = Annotated[
     str | None,
@@ -167,23 +169,23 @@ class _Asked:
 
     def __init__(self, times: str, options: _Options, further: list[MotionOptions]) -> None:
         require_one_output(options.csv, options.latex, options.json)
-        given = {name: getattr(options, name) for name in _DATA}
+        options_of_data = {name: getattr(options, name) for name in _DATA}
         self.options = options
-        self.top, self.start, self.system = _motion(given, options.case, options.system, options.normalize)
+        self.top, self.start, self.system = _motion(options_of_data, options.case, options.system, options.normalize)
         self.outputs, self.times = _outputs(options.show, options.point, options.pivot), numbers(times)
-        self.further = [(each, what) for each in further if (what := each.require())]
+        self.further = [(option, what) for option in further if (what := option.require())]
 
     def beside(self, expected: float, **settings: Any) -> list[Any]:
         """The measurements of features on the motion up to the time farthest from 0.
 
         expected: seconds.  settings: of :meth:`MotionOptions.measure`.
         """
-        found = []
+        blocks = []
         for options, what in self.further:
             with reaching(what, expected) as reach:
                 settings |= {"system": self.system, "reached": _part_of(self.times, reach)}
-                found.append(options.measure(self.top, self.start, farthest(self.times), **settings))
-        return found
+                blocks.append(options.measure(self.top, self.start, farthest(self.times), **settings))
+        return blocks
 
     def write(
         self,
@@ -212,13 +214,13 @@ class _Asked:
                 say(f"wrote {path}")
         if options.json:
             command, version = made_by()
-            whole = reduce(or_, (each.to_json() for each in beside), document())
+            whole = reduce(or_, (extra.to_json() for extra in beside), document())
             print_json({**whole, "command": command, "version": version})
         elif on_screen is not None:
             print(on_screen, end="")
         elif table is not None:
-            for each in (text(table), *(each.text() for each in beside)):
-                show_on_terminal(each)
+            for extra in (text(table), *(extra.text() for extra in beside)):
+                show_on_terminal(extra)
 
 
 def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
@@ -235,17 +237,17 @@ def _of_a_motion(function: Callable[..., int]) -> Callable[..., int]:
         return function(_Asked(times, shared, further), **options)
 
     sources = (function, _Options, *_FURTHER)
-    hints = {name: hint for each in sources for name, hint in get_type_hints(each, include_extras=True).items()}
-    given = {
-        each.name: each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
+    hints = {name: hint for source in sources for name, hint in get_type_hints(source, include_extras=True).items()}
+    parameters = {
+        parameter.name: parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
         for source in sources
-        for each in signature(source).parameters.values()
+        for parameter in signature(source).parameters.values()
     }
     own = [name for name in signature(function).parameters if name != "asked"]
     own += [name for kind in _FURTHER for name in kind._fields]
     which, where = _SHARED[: _SHARED.index("show")], _SHARED[_SHARED.index("show") :]
     times = Parameter("times", Parameter.KEYWORD_ONLY, annotation=Times)
-    vars(with_options)["__signature__"] = Signature([times, *(given[name] for name in (*which, *own, *where))])
+    vars(with_options)["__signature__"] = Signature([times, *(parameters[name] for name in (*which, *own, *where))])
     return with_options
 
 
@@ -315,12 +317,12 @@ def reference(
     watch, told = _Watch(asked.times), True if attitude or asked.outputs else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
         options = {"system": asked.system, "attitude": told, "derivatives": derivatives, "effort": effort}
-        found = proven(asked.top, asked.start, asked.times, digits, finder=watch.find, **options)
-        found.require_outputs(asked.outputs)
+        known = proven(asked.top, asked.start, asked.times, digits, finder=watch.find, **options)
+        known.require_outputs(asked.outputs)
 
     beside = asked.beside(_REFERENCE_SECONDS, digits=digits)
-    document, text = partial(found.document, asked.outputs), partial(reference_text, found)
-    asked.write(document, lambda: of_reference(found, asked.outputs, *made_by()), text, beside)
+    document, text = partial(known.document, asked.outputs), partial(reference_text, known)
+    asked.write(document, lambda: of_reference(known, asked.outputs, *made_by()), text, beside)
     return ExitCode.GOOD
 
 
@@ -328,7 +330,7 @@ def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Ou
     """The outputs asked for; raises InputError for one that is unknown, and for a point or pivot without a position."""
     from heavytop.top.attitude import outputs
 
-    places = [None if each is None else numbers(each) for each in (point, pivot)]
+    places = [None if point_text is None else numbers(point_text) for point_text in (point, pivot)]
     if show is None and places == [None, None]:
         return ()
     return outputs("" if show is None else show, *places)
@@ -390,8 +392,8 @@ def _motion(
     if case is None:
         from heavytop.top.bodies import motion_of
 
-        given = {key: _value(key, text) for key, text in texts.items()}
-        top, start = motion_of(given, normalize)
+        values = {key: _value(key, text) for key, text in texts.items()}
+        top, start = motion_of(values, normalize)
     else:
         top, start, system = _of_case(case, system, [key for key, text in texts.items() if text is not None])
     for warning in top.warnings():
@@ -410,7 +412,7 @@ def _of_case(name: str, system: str | None, others: list[str]) -> Any:
 
     if others:
         raise InputError(f"--case {name} and --{others[0].replace('_', '-')} were given.", "Give one of them.")
-    found = case(name)
-    if system not in (None, found.system.name):
-        raise InputError(f"The case {name} is of the system {found.system.name}, not {system}.", "Leave --system out.")
-    return found.body or found.top, found.given_start or found.start, found.system.name
+    named = case(name)
+    if system not in (None, named.system.name):
+        raise InputError(f"The case {name} is of the system {named.system.name}, not {system}.", "Leave --system out.")
+    return named.body or named.top, named.given_start or named.start, named.system.name

@@ -40,8 +40,8 @@ def compare(
     policy: Annotated[
         Path | None, typer.Option(help="TOML file of what counts as the same: `heavytop docs compare`.")
     ] = None,
-    floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps are all the same: 4.")] = None,
-    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by: 2; of truncation a tenth.")] = None,
+    floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps count as equal (4).")] = None,
+    loss: Annotated[str | None, typer.Option(help="Bits that errors may grow by (2; 10 % for truncation).")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
@@ -269,7 +269,7 @@ def measured(planned: PlannedRun) -> FinishedRun:
         with _stopped_by_signals(), Progress(planned.tasks, KINDS, planned.workers) as advance:
             return planned.measure(advance, advance.begin)
     except KeyboardInterrupt as stop:
-        kept = f"finished rows are kept: --out {planned.directory} --resume goes on"
+        kept = f"finished rows are kept: `heavytop run` with the same plan, --out {planned.directory} --resume goes on"
         say(f"interrupted; {kept if (planned.directory / ROWS).exists() else 'no row was finished'}")
         raise typer.Exit(ExitCode.TERMINATED if isinstance(stop, _Terminated) else ExitCode.INTERRUPTED) from None
 

@@ -145,12 +145,6 @@ def sign(value: Fraction) -> int:
     return -1 if value < 0 else 1
 
 
-def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
-    """(cos, sin) of the angle with this tangent of its half: a rational point of the circle."""
-    square = Fraction(tangent) ** 2
-    return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
-
-
 def rotate(vector: Sequence[Balls], omega: Sequence[Fraction], time: Balls) -> list[Balls]:
     """The solution of v' = v × Ω for a constant Ω at ``time``, a number or series."""
     if not any(omega):

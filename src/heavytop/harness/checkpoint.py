@@ -175,7 +175,7 @@ class Checkpoint:
             try:
                 yield records.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
             except msgspec.MsgspecError as error:
-                raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
+                raise InputError(f"Each line of {self.path} must be a row: {error}", "Give another --out.") from None
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None

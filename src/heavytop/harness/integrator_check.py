@@ -101,19 +101,19 @@ def check(which: str | IntegratorSource) -> list[Checked]:
 
 def _checks(which: str | IntegratorSource, process: GuardedProcess | None) -> Iterator[Checked]:
     """Each part; where one of the first is violated, or one ends its process, no other is tried."""
-    for place, (name, _) in enumerate(_Contract(which).parts()):
-        checked, ended = (_part(which, place), False) if process is None else _in_child(process, which, place, name)
+    for index, (name, _) in enumerate(_Contract(which).parts()):
+        checked, ended = (_part(which, index), False) if process is None else _in_child(process, which, index, name)
         yield checked
-        if checked.verdict == "violated" and (ended or place < _FIRST):
+        if checked.verdict == "violated" and (ended or index < _FIRST):
             yield Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
             return
 
 
-def _in_child(process: GuardedProcess, which: str | IntegratorSource, place: int, name: str) -> tuple[Checked, bool]:
+def _in_child(process: GuardedProcess, which: str | IntegratorSource, index: int, name: str) -> tuple[Checked, bool]:
     """That part in the process, and whether it has ended it."""
     seconds = _PATIENCE_OF.get(name, _PATIENCE)
     try:
-        future = process.submit(_part, which, place)
+        future = process.submit(_part, which, index)
         # an interrupt that comes from the child was raised by the integrator
         error = future.exception(timeout=seconds)
         if error is None:
@@ -132,10 +132,10 @@ def _in_child(process: GuardedProcess, which: str | IntegratorSource, place: int
         return Checked(name, "violated", "It ended its whole process."), True
 
 
-def _part(which: str | IntegratorSource, place: int) -> Checked:
+def _part(which: str | IntegratorSource, index: int) -> Checked:
     """That part of the contract."""
     begin_row()
-    return _judged(*_Contract(which).parts()[place])
+    return _judged(*_Contract(which).parts()[index])
 
 
 _FIRST = 2
@@ -160,12 +160,12 @@ class _Contract:
     def __init__(self, which: str | IntegratorSource) -> None:
         self.which = which
         self.program = which if isinstance(which, Command) else None
-        names = [each for each in self.program.precisions if each != "real:BITS"] if self.program else []
-        self.precisions = [parse(each) for each in names] or [DOUBLE]
+        names = [name for name in self.program.precisions if name != "real:BITS"] if self.program else []
+        self.precisions = [parse(name) for name in names] or [DOUBLE]
         if self.program and "real:BITS" in self.program.precisions:
             self.precisions = [*(self.precisions if names else []), real(237)]
         self.precision = self.precisions[0]
-        self.systems = [each for each in (self.program.systems if self.program else ("heavy_top",)) if _case(each)]
+        self.systems = [name for name in (self.program.systems if self.program else ("heavy_top",)) if _case(name)]
         self.backward_only = bool(self.program) and "forward" not in (self.program.directions if self.program else ())
         case = CASES[_case(self.systems[0])] if self.systems else CASES["generic"]
         self.top, self.start, self.system = case.top, case.start, case.system
@@ -197,8 +197,8 @@ class _Contract:
             ("steps", self._steps),
             ("between steps", self._between_steps),
             ("attitude", self._attitude),
-            *((f"format {each.name}", self._format(each)) for each in self.precisions[1:]),
-            *((f"system {each}", self._of_system(each)) for each in self.systems[1:]),
+            *((f"format {precision.name}", self._format(precision)) for precision in self.precisions[1:]),
+            *((f"system {name}", self._of_system(name)) for name in self.systems[1:]),
         ]
         if self.program:
             parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
@@ -419,10 +419,10 @@ class _Contract:
         both = [Session(self.program) for _ in range(2)]
         try:
             with ThreadPoolExecutor(2) as threads:
-                replies = list(threads.map(lambda each: each.ask(request), both))
+                replies = list(threads.map(lambda program: program.ask(request), both))
         finally:
-            for each in both:
-                each.close()
+            for running in both:
+                running.close()
         if any([list(state) for state in reply.states] != alone for reply in replies):
             raise _Violated("Two of its processes at once do not answer as one alone: they share something.")
         return "Two of its processes at once answer as one alone."
@@ -488,7 +488,7 @@ class _Contract:
         top, start = (self.top, self.start) if case is None else (case.top, case.start)
         known = propagate(top, start, list(run.times), DOUBLE, system=run.problem.system)
         pairs = zip(run.times, run.states, known.states, strict=True)
-        time, off = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda each: each[1])
+        time, off = max(((t, _distance(a, b)) for t, a, b in pairs), key=lambda entry: entry[1])
         if off > _OFF:
             raise _Violated(
                 f"{subject} is off by {decimal_text(off, 2)} at t = {decimal_text(time, 3)}: "

@@ -228,7 +228,7 @@ def in_processes(
                 worker.greet()
                 if not worker.rows:
                     continue
-                index, *behind = (each for each, _ in worker.rows)
+                index, *behind = (row for row, _ in worker.rows)
                 try:
                     row = _ended(worker, tasks[index], costs[index], limits)
                 except BrokenProcessPool:
@@ -257,13 +257,13 @@ def _taken(worker: _Worker, pool: Sequence[_Worker], waiting: deque[int], tasks:
 
     Of the first of them one in the format of its last, else in that of no other worker: each compiles for itself.
     """
-    place = 0
+    chosen = 0
     if not tasks[waiting[0]].is_third_party:
-        others = {each.precision for each in pool if each is not worker}
+        others = {busy.precision for busy in pool if busy is not worker}
         formats = [tasks[index].key.precision for index in islice(waiting, _LOOKED_AT)]
-        place = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
-    index = waiting[place]
-    del waiting[place]
+        chosen = min(range(len(formats)), key=lambda i: (formats[i] != worker.precision, formats[i] in others))
+    index = waiting[chosen]
+    del waiting[chosen]
     worker.precision = tasks[index].key.precision
     return index
 
@@ -277,12 +277,12 @@ def in_order(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple
     costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
     guests = list(dict.fromkeys(tasks[index].key.subject.name for index in costs if tasks[index].is_third_party))
 
-    def place(index: int) -> tuple[int, float]:
+    def order(index: int) -> tuple[int, float]:
         task = tasks[index]
         third_party = task.is_third_party
         return (guests.index(task.key.subject.name), costs[index]) if third_party else (len(guests), -costs[index])
 
-    return costs, deque(sorted(costs, key=place))
+    return costs, deque(sorted(costs, key=order))
 
 
 @cache
@@ -313,7 +313,7 @@ def _wait(pool: Sequence[_Worker]) -> None:
     """Until a process is there, a row is done, or a limit is reached."""
     futures = [future for worker in pool if worker.rows for future in worker.awaited()]
     left = [worker.left for worker in pool if worker.rows]
-    wait(futures, min((max(each, 0.0) for each in left if each is not None), default=None), FIRST_COMPLETED)
+    wait(futures, min((max(seconds, 0.0) for seconds in left if seconds is not None), default=None), FIRST_COMPLETED)
 
 
 def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:

@@ -199,7 +199,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
         if text.endswith(".toml"):
             sources += commands_in(folder / text)
         elif isinstance(source := named(text, folder), str):
-            raise InputError(f"integrators = {quoted(text)} is no file.", "Give FILE.toml or FILE.py:FUNCTION.")
+            raise InputError(f"integrators must name files; got {quoted(text)}.", "Give FILE.toml or FILE.py:FUNCTION.")
         else:
             sources.append(source)
     defined = {source.name: source for source in sources}
@@ -274,7 +274,7 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
             near = get_close_matches(kind, known, 1)
             meant = f"; did you mean {near[0]}" if near else ""
             raise msgspec.ValidationError(
-                f"kind = {quoted(kind)} in {section}[{index}] is none of {', '.join(sorted(known))}{meant}"
+                f"kind in {section}[{index}] must be one of {', '.join(sorted(known))}; got {quoted(kind)}{meant}"
             )
 
 
@@ -299,7 +299,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, IntegratorSource] | 
     cannot hold, two measurements of the same, and a top or sweep that nothing measures.
     """
     if not 0 <= seed <= MOST_SEEDS:
-        raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
+        raise InputError(f"seed must be from 0 to {MOST_SEEDS}; got {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
     own, swept = _own(plan), _swept(plan)
     sweeps = list(zip(plan.sweep, swept.values(), strict=True))
     known = own | {name: cases[0] for name, cases in swept.items()}

@@ -75,7 +75,7 @@ def in_threads(
     observer, finished: as in :func:`propagate_ensemble`; called by this thread.
     """
     done: dict[int, Trajectory] = {}
-    given = numpy.geterr()
+    error_state = numpy.geterr()
 
     def receive(item: Any) -> None:
         if isinstance(item[1], Trajectory):
@@ -87,7 +87,7 @@ def in_threads(
             observer(*item)
 
     def receive_here(item: Any) -> None:
-        with numpy.errstate(**given):  # the caller's, whatever the lanes have set
+        with numpy.errstate(**error_state):  # the caller's, whatever the lanes have set
             receive(item)
 
     if threads == 1:

@@ -38,18 +38,18 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
     """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
     if not len(values):
         return values
-    found = numpy.array(values, copy=True)
+    rotated = numpy.array(values, copy=True)
     whole = [[entry.denominator == 1 for entry in row] for row in frame.axes]
-    for place in range(0, found.shape[1], 3):
-        part = values[:, place : place + 3]
+    for begin in range(0, rotated.shape[1], 3):
+        part = values[:, begin : begin + 3]
         if all(map(all, whole)):
             turned = _permuted(part, frame)
         elif precision == DOUBLE:
             turned = _in_double(part.astype(float), frame)
         else:
-            turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=found.dtype)
-        found[:, place : place + 3] = turned
-    return found
+            turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=rotated.dtype)
+        rotated[:, begin : begin + 3] = turned
+    return rotated
 
 
 def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
@@ -78,7 +78,7 @@ def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.floa
     """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
     high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
     low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
-    found = numpy.empty_like(part)
+    values = numpy.empty_like(part)
     with numpy.errstate(invalid="ignore", over="ignore"):
         for i in range(3):
             total, rest = numpy.zeros(len(part)), numpy.zeros(len(part))
@@ -87,8 +87,8 @@ def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.floa
                 before, total = total, total + product
                 back = total - before
                 rest += (before - (total - back)) + (product - back) + error + part[:, j] * low[i, j]
-            found[:, i] = total + rest
-    return found
+            values[:, i] = total + rest
+    return values
 
 
 def _product(a: NDArray[numpy.float64], b: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:

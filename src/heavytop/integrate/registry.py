@@ -314,21 +314,21 @@ def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None
     return found if set_to is None else replace(found, set_to=set_to)
 
 
-def load(place: str | Callable[..., Any]) -> Any:
+def load(source: str | Callable[..., Any]) -> Any:
     """The object at ``module:name``, imported; a function itself."""
-    return EntryPoint("", place, "").load() if isinstance(place, str) else place
+    return EntryPoint("", source, "").load() if isinstance(source, str) else source
 
 
 loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
 
 
-def _peer(name: str, place: str, *needs: str, **capabilities: Any) -> Integrator:
-    return Integrator(name, f"{_HERE}.peers.{place}", needs=needs, attitude=True, **capabilities)
+def _peer(name: str, module: str, *needs: str, **capabilities: Any) -> Integrator:
+    return Integrator(name, f"{_HERE}.peers.{module}", needs=needs, attitude=True, **capabilities)
 
 
 INTEGRATORS = {
-    each.name: each
-    for each in (
+    entry.name: entry
+    for entry in (
         Integrator(
             "heyoka",
             f"{_HERE}.heyoka.motions:propagate",
@@ -383,11 +383,11 @@ def named(integrator: Any, folder: Path | None = None) -> str | IntegratorSource
         return PythonFile(str((base / python[1]).resolve()), python[2])
     assert toml is not None
     match, path, wanted = toml, base / toml[1], toml[2]
-    found = [each for each in commands_in(path) if wanted in (None, each.name)]
-    if len(found) != 1:
-        known = ", ".join(each.name for each in commands_in(path))
+    commands = [command for command in commands_in(path) if wanted in (None, command.name)]
+    if len(commands) != 1:
+        known = ", ".join(command.name for command in commands_in(path))
         raise InputError(f"{integrator} is not one integrator: {path.name} has {known}.", f"Give {match[1]}:NAME.")
-    return found[0]
+    return commands[0]
 
 
 def of_callable(call: Any) -> IntegratorSource:
@@ -395,7 +395,7 @@ def of_callable(call: Any) -> IntegratorSource:
     if isinstance(call, Command | PythonFile | PythonObject):
         return call
     if not callable(call):
-        raise InputError(f"integrator = {quoted(call)} is none.", "Give a name, a file or a callable.")
+        raise InputError(f"integrator must be callable; got {quoted(call)}.", "Give a name, a file or a callable.")
     own = getattr(call, "integrator_name", None)
     file, function = place_of(call)
     plain = PythonFile(file, function).name if file else re.sub(r"[^\w.:+-]", "", function)[:64]
@@ -414,10 +414,10 @@ def commands_in(path: Path) -> list[Command]:
     tables = document.get("integrator")
     if document.keys() - {"integrator"} or not isinstance(tables, list) or not tables:
         raise InputError(f"{path} does not hold [[integrator]] tables alone.", _SHOWN)
-    found = [command_of(table, path.parent, str(path)) for table in tables]
-    if len({each.name for each in found}) < len(found):
+    commands = [command_of(table, path.parent, str(path)) for table in tables]
+    if len({command.name for command in commands}) < len(commands):
         raise InputError(f"{path} gives one name to two integrators.", "Give each a name of its own.")
-    return found
+    return commands
 
 
 def command_of(table: Any, folder: Path, where: str) -> Command:
@@ -451,11 +451,11 @@ def _require_possible(command: Command) -> None:
     for name, values in (("systems", command.declared.systems), ("directions", command.directions)):
         if not values:
             raise InputError(f"{name} is empty.")
-    for each in command.systems:
-        system(each)
-    for each in command.precisions:
-        if each != "real:BITS":
-            parse(each)
+    for item in command.systems:
+        system(item)
+    for item in command.precisions:
+        if item != "real:BITS":
+            parse(item)
     if not command.precisions:
         raise InputError("precisions is empty.")
 
@@ -477,7 +477,7 @@ def known() -> dict[str, Integrator]:
 def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
     """Integrators of the packages on ``sys.path``, looked through once."""
     entries = entry_points(group=GROUP)
-    return {each.name: foreign(each.name, each.value) for each in entries if each.name not in FORMER}
+    return {entry.name: foreign(entry.name, entry.value) for entry in entries if entry.name not in FORMER}
 
 
 def is_third_party(name: str) -> bool:
@@ -497,7 +497,7 @@ def require(which: str | IntegratorSource) -> None:
     """
     integrator = described(which)
     if isinstance(integrator.source, PythonFile) and not Path(integrator.source.path).is_file():
-        raise InputError(f"There is no file {integrator.source.path}.", "Give FILE.py:FUNCTION.")
+        raise InputError(f"The file {integrator.source.path} does not exist.", "Give FILE.py:FUNCTION.")
     if not integrator.is_known or (integrator.own and isinstance(integrator.function, str)):
         integrator.load()
 
@@ -519,13 +519,13 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
         if own or not integrator.is_known:
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    declared = found if isinstance(found := getattr(chosen, "declared", None), Declared) else None
-    given: dict[str, Any] = dict([control] if control else [])
+    declared = candidate if isinstance(candidate := getattr(chosen, "declared", None), Declared) else None
+    options: dict[str, Any] = dict([control] if control else [])
     if control is not None or not own:
         with contained(name, " when its arguments were looked at"):
             arguments = inspect.signature(chosen).parameters
-            takes_any = any(each.kind is each.VAR_KEYWORD for each in arguments.values())
-        for option in given:
+            takes_any = any(argument.kind is argument.VAR_KEYWORD for argument in arguments.values())
+        for option in options:
             if option not in arguments and not takes_any and own:
                 raise InputError(
                     f"The integrator {name} has no {option}.", "Fixed steps take a step, others a tolerance."
@@ -533,8 +533,8 @@ def ready(which: str | IntegratorSource, control: tuple[str, Fraction] | None = 
             if option not in arguments and not takes_any:
                 raise PeerFailed(f"{name} has no {option}")
         if "step_limit" in arguments and not own:
-            given["step_limit"] = STEP_LIMIT
-    return CheckedPlugin(name, chosen, own, declared, given)
+            options["step_limit"] = STEP_LIMIT
+    return CheckedPlugin(name, chosen, own, declared, options)
 
 
 def _program(command: Command, control: tuple[str, Fraction] | None) -> Peer:
@@ -559,12 +559,12 @@ def control_name(which: str | IntegratorSource) -> str:
         return integrator.source.control
     if integrator.control:
         return integrator.control
-    for each in ("step", "tolerance"):
+    for name in ("step", "tolerance"):
         try:
-            ready(integrator, (each, Fraction(1, 100)))
+            ready(integrator, (name, Fraction(1, 100)))
         except (InputError, PeerFailed):
             continue
-        return each
+        return name
     return ""
 
 
@@ -573,19 +573,17 @@ def control_apart(which: str | IntegratorSource) -> str:
     integrator = described(which)
     if isinstance(integrator.source, Command) or integrator.own:
         return control_name(which)
-    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
 
-    from heavytop.processes import ChildContext
+    from heavytop.processes import GuardedProcess
 
-    context = ChildContext()
-    with ProcessPoolExecutor(1, mp_context=context) as pool:
-        try:
-            return pool.submit(control_name, which).result(timeout=_PATIENCE)
-        except BrokenProcessPool:
-            return ""
-        except TimeoutError:
-            context.kill()
-            return ""
+    process = GuardedProcess()
+    try:
+        return process.submit(control_name, which).result(timeout=_PATIENCE)
+    except (BrokenProcessPool, TimeoutError):
+        return ""
+    finally:
+        process.end()
 
 
 def available() -> dict[str, str | None]:
@@ -593,15 +591,15 @@ def available() -> dict[str, str | None]:
 
     One of this program's is not imported: the packages that it needs are looked for.  One of another package is.
     """
-    found: dict[str, str | None] = {}
-    for name, each in known().items():
-        found[name] = None
-        if not each.own or each.lacks:
+    reasons: dict[str, str | None] = {}
+    for name, entry in known().items():
+        reasons[name] = None
+        if not entry.own or entry.lacks:
             try:
                 peer(name)
             except InputError as error:
-                found[name] = f"{error.cause} {error.remedy}"
-    return found
+                reasons[name] = f"{error.cause} {error.remedy}"
+    return reasons
 
 
 # Which runs are tried at all: those of no more steps than anyone waits for, whatever the units of the data.
@@ -710,10 +708,10 @@ def watched(
     run = propagator(which, options)
 
     def call(*arguments: Any, **more: Any) -> Any:
-        found = run(*arguments, **more)
-        for time, state in zip(found.times, found.states, strict=True):
+        result = run(*arguments, **more)
+        for time, state in zip(result.times, result.states, strict=True):
             observer(time, state)
-        return found
+        return result
 
     return call
 
@@ -741,7 +739,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
 def _names(function: Callable[..., Any]) -> frozenset[str] | None:
     """The arguments that it takes by name; None where that is anything."""
     parameters = inspect.signature(function).parameters
-    if any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values()):
+    if any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values()):
         return None
     return frozenset(parameters)
 

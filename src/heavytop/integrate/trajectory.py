@@ -69,7 +69,7 @@ def in_double(run: Trajectory, output: Output) -> NDArray[numpy.float64]:
     if run.problem.precision == DOUBLE:
         values = _columns(run, attitude, output)
     else:
-        exact_values = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
+        exact_values = [_exactly(run, index, attitude, output) for index in range(len(run.states))]
         values = numpy.array([[float(value) for value in line] for line in exact_values]).reshape(-1, size)
     if output.name == "quaternion":
         values = values * signs(_start(run), values)[:, None]
@@ -79,7 +79,7 @@ def in_double(run: Trajectory, output: Output) -> NDArray[numpy.float64]:
 def as_texts(run: Trajectory, output: Output) -> list[Any]:
     """The output at every sample as decimal text in the digits of the format, rounded once; lists of that shape."""
     attitude, digits = attitude_of(run), run.problem.precision.digits
-    lines = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
+    lines = [_exactly(run, index, attitude, output) for index in range(len(run.states))]
     if output.name == "quaternion" and lines:
         turns = signs(_start(run), numpy.array([[float(value) for value in line] for line in lines]))
         lines = [[value * int(turn) for value in line] for line, turn in zip(lines, turns, strict=True)]
@@ -125,21 +125,21 @@ def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[numpy.fl
     )
     if output.name == "quaternion":
         products = quaternion_products(rows_of(gamma, xi))
-        largest = numpy.argmax([products[place][place] for place in range(4)], axis=0)
+        largest = numpy.argmax([products[k][k] for k in range(4)], axis=0)
         multiples = [numpy.choose(largest, column) for column in products]
         length = numpy.sqrt(sum(part * part for part in multiples))
         return numpy.stack([part / length for part in multiples], axis=1)
     values = output.at(omega, gamma, xi, _centre(run, output), lib, float)
-    found = numpy.stack([numpy.broadcast_to(value, omega[0].shape) for value in values], axis=1)
+    quaternions = numpy.stack([numpy.broadcast_to(value, omega[0].shape) for value in values], axis=1)
     if output.name == "euler":
         square = euler_terms(rows_of(gamma, xi), output.sequence)[1][0]
-        found[numpy.ix_(square < (_LOCKED * float(DOUBLE.eps)) ** 2, [0, 2])] = math.nan
-    return found
+        quaternions[numpy.ix_(square < (_LOCKED * float(DOUBLE.eps)) ** 2, [0, 2])] = math.nan
+    return quaternions
 
 
-def _exactly(run: Trajectory, place: int, attitude: Any, output: Output) -> Sequence[Any]:
+def _exactly(run: Trajectory, index: int, attitude: Any, output: Output) -> Sequence[Any]:
     """The output at one sample from the exact native numbers: exact, or of more bits than the format has."""
-    numbers = [*run.states[place][:6], *attitude[place]]
+    numbers = [*run.states[index][:6], *attitude[index]]
     try:
         state = [exact(value) for value in numbers]
     except InputError:  # the last state of a run that failed
@@ -267,8 +267,8 @@ def _rounded(
 
 @cache_last_call
 def _rounded_parameters(top: HeavyTop, start: State | None, precision: Precision, system: System) -> Parameters:
-    given = system.parameters(top, _ANY_START if start is None else start)
-    return given.mapped(lambda value: rounded(Fraction(value), precision))
+    parameters = system.parameters(top, _ANY_START if start is None else start)
+    return parameters.mapped(lambda value: rounded(Fraction(value), precision))
 
 
 _ANY_START = State((0, 0, 0), (0, 0, 1))
@@ -329,10 +329,10 @@ class ResumePoint:
         """The place with that :meth:`content`."""
         state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
         samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
-        place = cls(samples, state, time, steps, float(seconds), dict(flags), tuple(content.get("words", ())))
-        if not (type(samples) is int is type(steps) and samples > 0 <= steps and 0 <= place.seconds < inf):
+        resume_point = cls(samples, state, time, steps, float(seconds), dict(flags), tuple(content.get("words", ())))
+        if not (type(samples) is int is type(steps) and samples > 0 <= steps and 0 <= resume_point.seconds < inf):
             raise ValueError(f"no run was ever at {content!r}")
-        return place
+        return resume_point
 
     def require_covered(self, steps: int) -> None:
         """Raises ValueError unless one step from here covers the last sample: else the two are not of one run."""
@@ -451,15 +451,13 @@ class Trajectory(LazyStates, Tabular, InSpace):
 
     def __post_init__(self) -> None:
         width = 6 if self.problem.xi is None or self.attitude is not None else 9
-        given = self.states
-        if callable(given):
-            object.__setattr__(self, "_make", given)
+        rows = self.states
+        if callable(rows):
+            object.__setattr__(self, "_make", rows)
             object.__delattr__(self, "states")
             return
         states = (
-            (given if isinstance(given, numpy.ndarray) else numpy.array(given))
-            if len(given)
-            else numpy.empty((0, width))
+            (rows if isinstance(rows, numpy.ndarray) else numpy.array(rows)) if len(rows) else numpy.empty((0, width))
         )
         object.__setattr__(self, "states", states)
 
@@ -506,8 +504,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
         if self.dense is None:
             raise InputError("This run has no dense output.", "Take that of heavytop.propagate.")
         several = numpy.ndim(t) > 0
-        found = numpy.array([self.dense(exact(time)) for time in (t if several else [t])])
-        return found.reshape(-1, 6).T if several else found[0]
+        states = numpy.array([self.dense(exact(time)) for time in (t if several else [t])])
+        return states.reshape(-1, 6).T if several else states[0]
 
     def with_dense(self, function: Callable[[Fraction], Sequence[Any]]) -> Trajectory:
         """This run, once ``dense`` is that function."""
@@ -571,8 +569,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
     def _repr_html_(self) -> str:
         states, carried = self.states, self.states.shape[1:] == (9,)
 
-        def point(place: int) -> Any:
-            gamma, xi = states[place][3:6], states[place][6:]
+        def point(index: int) -> Any:
+            gamma, xi = states[index][3:6], states[index][6:]
             return (xi[2], cross(gamma, xi)[2], gamma[2]) if carried else gamma
 
         what = "axis 3 in space" if carried else "γ, the vertical in body axes"
@@ -582,8 +580,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
         precision = self.problem.precision
         digits = min(_SHOWN, precision.digits)
 
-        def line(place: int) -> list[str]:
-            return [decimal_text(self.times[place], _SHOWN), *(_shown(value, digits) for value in self.states[place])]
+        def line(index: int) -> list[str]:
+            return [decimal_text(self.times[index], _SHOWN), *(_shown(value, digits) for value in self.states[index])]
 
         rows = LazyLines(min(len(self.times), len(self.states)), line)
         steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
@@ -661,7 +659,7 @@ class SampledRun(ABC):
         """How it came to the time, given as the native number and exactly, and the native state there."""
 
     @abstractmethod
-    def take_up(self, place: ResumePoint, covered: Any) -> None:
+    def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
 
     @abstractmethod
@@ -675,7 +673,7 @@ def sampled(
     flags: dict[str, str],
     began: float,
     observer: Observer | None,
-    place: ResumePoint | None,
+    resume_point: ResumePoint | None,
     mark: Callable[[ResumePoint], None] | None,
 ) -> Ended:
     """The targets that were reached, the states there unless they went to the observer, the outcome and the seconds.
@@ -686,11 +684,11 @@ def sampled(
     times: list[Fraction] = []
     states: list[Any] = []
     outcome = Outcome.SUCCESS
-    if place is not None:
-        place.require_same(flags)
-        began -= place.seconds
-        times = [exact(target) for target in targets[: place.samples]]
-        run.take_up(place, targets[place.samples - 1])
+    if resume_point is not None:
+        resume_point.require_same(flags)
+        began -= resume_point.seconds
+        times = [exact(target) for target in targets[: resume_point.samples]]
+        run.take_up(resume_point, targets[resume_point.samples - 1])
     for target in targets[len(times) :]:
         time = exact(target)
         outcome, state = run.at(target, time)

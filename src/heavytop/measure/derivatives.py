@@ -80,7 +80,7 @@ def which_derivatives(value: object) -> str | None:
     """ "start", "data", "all", or None for none; raises InputError for any other."""
     if value is None or (isinstance(value, str) and value in WHICH):
         return value
-    raise InputError(f"derivatives = {quoted(value)} is none.", 'Give "start", "data" or "all".')
+    raise InputError(f"derivatives must be known; got {quoted(value)}.", 'Give "start", "data" or "all".')
 
 
 def known_derivatives(

@@ -92,9 +92,9 @@ def timed(run: Callable[[int], Trajectory], how: Repeats) -> tuple[Figures, list
     ):
         sleep(_REST)
         runs.append(run(len(runs) + 1))
-    spent = [each.seconds["run"] for each in runs]
+    spent = [run.seconds["run"] for run in runs]
     figures = {"run": median(spent), "least": min(spent), "repeats": float(len(spent))}
-    figures |= next(({key: each.seconds[key]} for each in runs if (key := UNRESOLVED_SECONDS) in each.seconds), {})
+    figures |= next(({key: run.seconds[key]} for run in runs if (key := UNRESOLVED_SECONDS) in run.seconds), {})
     if how.band and len(spent) > 1 and min(spent) > 0:
         low, high = numpy.quantile(numpy.log10(spent), [0.025, 0.975])
         figures["band"] = round(float(high - low) / 2, 4)
@@ -151,8 +151,8 @@ def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction |
     top, start = problem.given or (problem.top, problem.start)
     try:
         ends = [
-            motions.propagate(top, each, judged.times[-1:], problem.precision, system=problem.system)
-            for each in (start, _nudged(problem, count))
+            motions.propagate(top, nudged, judged.times[-1:], problem.precision, system=problem.system)
+            for nudged in (start, _nudged(problem, count))
         ]
     except HeavyTopError:
         return None
@@ -287,7 +287,7 @@ class Ended(msgspec.Struct, frozen=True):
     def of(cls, run: Trajectory, scorer: Scorer) -> Ended:
         """The record of a run that went to ``scorer``."""
         running = scorer.running()
-        values = {q.text: [_finite(kept) for kept in each.kept.values()] for q, each in running.items()}
+        values = {q.text: [_finite(kept) for kept in run.kept.values()] for q, run in running.items()}
         lost = run.outcome is Outcome.SUCCESS and any(None in kept for kept in values.values())
         return cls(
             run.integrator,
@@ -308,7 +308,7 @@ def _finite(value: arb) -> float | None:
 
 def complete(
     motions: dict[int, Ended],
-    given: Sequence[Problem],
+    problems: Sequence[Problem],
     times: Sequence[Fraction],
     scorers: Sequence[Scorer],
     save: Callable[[], None],
@@ -316,17 +316,17 @@ def complete(
     options: Mapping[str, Any],
 ) -> None:
     """Compute those of the motions that are missing, all side by side; save after each.  options: the integrator's."""
-    missing = [index for index in range(len(given)) if index not in motions]
+    missing = [index for index in range(len(problems)) if index not in motions]
 
-    def observe(place: int, time: Fraction, state: Any) -> None:
-        scorers[missing[place]](time, state)
+    def observe(index: int, time: Fraction, state: Any) -> None:
+        scorers[missing[index]](time, state)
 
-    def finished(place: int, run: Trajectory) -> None:
-        motions[missing[place]] = Ended.of(run, scorers[missing[place]])
+    def finished(index: int, run: Trajectory) -> None:
+        motions[missing[index]] = Ended.of(run, scorers[missing[index]])
         save()
 
     if missing:
-        todo = [given[index] for index in missing]
+        todo = [problems[index] for index in missing]
         integrator.propagate_many(todo, times, observe, finished, **options)
 
 
@@ -397,14 +397,14 @@ def _errors(
     one = numpy.ones(len(starts))
     whole = numpy.hypot(omega, one)
     sizes = {"along": whole, "across": whole, "omega": omega, "gamma": one}
-    blur, found = numpy.array(reference.blur), {}
+    blur, errors = numpy.array(reference.blur), {}
     for part, accumulates in _ACCUMULATES.items():
         quantity = Quantity(SOLUTION_ERROR, part)
-        found[quantity] = _Measured(_values(quantity, reference.samples, motions), sizes[part], accumulates, blur)
+        errors[quantity] = _Measured(_values(quantity, reference.samples, motions), sizes[part], accumulates, blur)
     for quantity, size in ((ATTITUDE, one), (POSITION, distance * one)):
         if all(quantity.text in motion.values for motion in motions):
-            found[quantity] = _Measured(_values(quantity, reference.samples, motions), size, 2, blur)
-    return found
+            errors[quantity] = _Measured(_values(quantity, reference.samples, motions), size, 2, blur)
+    return errors
 
 
 def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array:
@@ -417,7 +417,7 @@ def _values(quantity: Quantity, samples: int, motions: Sequence[Ended]) -> Array
 
 
 def _add(
-    found: Growing,
+    growing: Growing,
     quantity: Quantity,
     measured: _Measured,
     times: Sequence[Fraction],
@@ -438,11 +438,11 @@ def _add(
         ensemble = replace(ensemble, size=size or 1.0)
     rms, name = ensemble.rms(), quantity.text
     texts = [_text(value, len(kept) > 0) for value in rms]
-    found.series[name] = Series([time_text(time) for time in times], texts, quantity)
+    growing.series[name] = Series([time_text(time) for time in times], texts, quantity)
     for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
         resolved = len(kept) > 0 and not (part == "final" and numpy.isnan(rms[-1]))
-        found.metrics[quantity.over(part)] = _metric(values, resolved)
-    found.laws[name] = msgspec.structs.replace(law(ensemble), quantity=quantity)
+        growing.metrics[quantity.over(part)] = _metric(values, resolved)
+    growing.laws[name] = msgspec.structs.replace(law(ensemble), quantity=quantity)
 
 
 def _text(value: float, measured: bool) -> str:

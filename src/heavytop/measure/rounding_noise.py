@@ -63,15 +63,15 @@ def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, 
     no larger than the others: chance may have made it small, but must not excuse what went wrong.
     Metrics that are not finite or missing in some run have no band.
     """
-    found = {}
+    bands = {}
     for name in runs[0]:
         sizes = [_size(run, name) for run in runs]
         if any(map(math.isnan, sizes)) or any(run[name].kind != "error" for run in runs):
             continue
         if name in own and _size(own, name) <= max(sizes):
             sizes.append(_size(own, name))
-        found[name] = _spread([max(size, floor) for size in sizes])
-    return found
+        bands[name] = _spread([max(size, floor) for size in sizes])
+    return bands
 
 
 def duration_band(times: Sequence[float], own: float, expected: float) -> float:
@@ -146,7 +146,7 @@ class Reruns:
         samples = _SAMPLES if closed_form(problem) else _SAMPLES_OF_CHAOS
         times = [exact(number(time, DOUBLE)) for time in some_of(asked, end, samples)]
         truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
-        reruns = self._of(problem, times, lambda given: Scorer(given, truth))
+        reruns = self._of(problem, times, lambda problem: Scorer(problem, truth))
         return banded(run, metrics, [scorer.metrics() for scorer in reruns])
 
     def of(self, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
@@ -160,7 +160,7 @@ class Reruns:
         for index in range(1, RERUNS + 1):
             scale = factor(self.seed, index)
             problems.append(replace(problem, parameters=_each(p, partial(mul, scale))))
-        scorers = [scorer(given) for given in problems]
+        scorers = [scorer(problem) for problem in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
         return scorers
 
@@ -182,7 +182,7 @@ def escape_band(own: Fraction, escapes: Sequence[Fraction], rate: float, bits: i
     The rounding noise of an escape time is added to it, some ln 2/rate in every format.
     """
     time, gained = float(own), (bits - DOUBLE.bits) * math.log(2) / rate
-    return duration_band([float(each) for each in escapes], time, time - gained)
+    return duration_band([float(escape) for escape in escapes], time, time - gained)
 
 
 def _short(problem: Problem) -> Problem:

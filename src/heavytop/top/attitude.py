@@ -248,7 +248,7 @@ class Attitude:
         q = tuple(exact(value) for value in (w, x, y, z))
         square = sum(value * value for value in q)
         if square == 0:
-            raise InputError("The quaternion is 0, which is no attitude.", "Give w,x,y,z of length 1.")
+            raise InputError("A quaternion must not be zero.", "Give w,x,y,z of length 1.")
         if square != 1 and not normalize:
             raise InputError(f"The quaternion is not of length 1: |q|^2 - 1 = {_size(square - 1)}.", _NORMALIZE)
         return cls("quaternion", q)

@@ -152,7 +152,7 @@ def test_a_verdict_is_kept_for_the_same_entry_alone(folder: Path, monkeypatch: p
         ({"source": {"authors": ["x"], "year": 1788, "title": " "}}, "title"),
         ({"tags": "one"}, "tags"),
         ({"name": "both"}, "name and id"),
-        ({"entry": {}}, "entry is no key"),
+        ({"entry": {}}, "a claim has no key entry"),
     ],
 )
 def test_what_is_no_entry_is_named(change: dict[str, Any], cause: str) -> None:
@@ -165,7 +165,7 @@ def test_names_and_twins_are_checked(folder: Path) -> None:
     with pytest.raises(ht.InputError, match="is the name of"):
         entries.library()
     put(folder, HEAD | CLAIM | {"corrects": "nothing"})
-    with pytest.raises(ht.InputError, match="corrects nothing"):
+    with pytest.raises(ht.InputError, match="must correct an entry that fails; got nothing"):
         entries.library()
 
 

@@ -127,7 +127,7 @@ def test_the_folder_of_an_engine_is_a_gate(engine: str, tmp_path: Path) -> None:
 
 
 def test_an_unknown_engine_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no adapter"):
+    with pytest.raises(InputError, match="must have an adapter"):
         new_integrator(tmp_path / "new", "python", engine="unity")
 
 

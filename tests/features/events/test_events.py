@@ -348,7 +348,7 @@ def test_a_run_that_ends_early_says_so() -> None:
         ({"until": 0}, "until = 0"),
         ({"until": "nan"}, "not a finite number"),
         ({"until": "1e151"}, "too large"),
-        ({"direction": 2}, "direction = 2"),
+        ({"direction": 2}, "direction must be a sign; got 2"),
         ({"direction": 0.5}, "not an integer"),
         ({"function": ""}, "not a function"),
         ({"function": "omega4"}, "not a component"),

@@ -61,7 +61,7 @@ def test_reference_gives_balls() -> None:
         (("propagate", "--events", "omega9"), "is not a component"),
         (("propagate", "--events", "nan"), "is not a component"),
         (("reference", "--events", "omega1=inf"), "is not a component"),
-        (("propagate", "--events", "omega1", "--event-direction", "2"), "direction = 2 is none"),
+        (("propagate", "--events", "omega1", "--event-direction", "2"), "direction must be a sign; got 2"),
         (("propagate", "--events", "omega1", "--integrator", "mpmath:odefun"), "hands over no polynomial"),
         (("propagate", "--events", "gamma1**2 + gamma2**2 + gamma3**2 = 1"), "is zero along this motion"),
     ],

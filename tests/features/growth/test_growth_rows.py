@@ -222,7 +222,11 @@ def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
         ('"euler"', 'precision = "double", horizon = "10", decades = 99', "decades = 99"),
         ('"euler"', 'precision = "double", horizon = "10", tolerance = "-1"', "tolerance"),
         ('"euler"', 'precision = "double", horizon = "10", bias = "x"', "not a finite number"),
-        ('"generic"', 'precision = "extended", horizon = "10", reference = "double"', "is no reference"),
+        (
+            '"generic"',
+            'precision = "extended", horizon = "10", reference = "double"',
+            "reference must have more bits; got double",
+        ),
         ('"euler"', 'precision = "real:2000", horizon = "10"', "up to real:900"),
         ('"euler"', 'precision = "double", horizon = "10", wrong = 1', "wrong"),
     ],

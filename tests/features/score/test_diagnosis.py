@@ -156,6 +156,14 @@ def test_a_sign_in_the_equations_is_told(signs: tuple[int, int], kind: str) -> N
 
 
 @pytest.mark.slow
+def test_a_sign_in_the_equations_of_a_symmetric_body_is_told_though_another_body_moves_so() -> None:
+    top, start = HeavyTop(("1.3", "1.3", "0.9"), 1, (0, 0, 1)), State(("0.02", "0.01", 4), (0, 0, 1))
+    times = [Fraction(k, 20) for k in range(1, 41)]
+    (told,) = found(top, start, times, runge_kutta(top, start, times, signs=(-1, 1)))
+    assert told.kind == "gyroscopic_sign"
+
+
+@pytest.mark.slow
 def test_one_equation_with_the_other_sign_is_named() -> None:
     top, start, times = problem(45)
     times = [time / 4 for time in times]

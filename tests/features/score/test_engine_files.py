@@ -43,6 +43,12 @@ def test_a_method_of_first_order_is_not_accused(tmp_path: Path) -> None:
     assert (kinds(found), found.digits_right < 4) == ([], True)
 
 
+def test_another_unit_of_g_is_no_name_for_moments_that_are_off(tmp_path: Path) -> None:
+    engine = replace(FINE, gravity=1.0)
+    log = Log(keys={"inertia": engine_files.six(engine.about_pivot() * 0.999), "about": "pivot"})
+    assert "gravity_unit" not in kinds(scored(engine, log, tmp_path))
+
+
 @pytest.mark.parametrize("mistake", ["frame unsaid", "no gravity", "free", "tensor about the other point"])
 def test_a_mistake_in_a_file_of_first_order_is_named(mistake: str, tmp_path: Path) -> None:
     named, build = engine_files.MISTAKES[mistake]
@@ -83,8 +89,8 @@ IN_FILE = {
     "omega_scaled": (of_columns(lambda w: 1.1 * w, "omega"), {"factor": "1.1"}),
     "gamma_scaled": (of_columns(lambda gamma: 1.1 * gamma, "gamma"), {"factor": "1.1"}),
     "column_order": (
-        of_columns(lambda gamma: gamma * [1, -1, 1], "gamma"),
-        {"columns": "Ω1, Ω2, Ω3, γ1, −γ2, γ3"},
+        of_columns(lambda gamma: gamma[[1, 0, 2]] * [1, -1, 1], "gamma"),
+        {"columns": "Ω1, Ω2, Ω3, γ2, −γ1, γ3"},
     ),
     "momentum": (
         Log(VECTORS, spoil=lambda columns, e: columns | {"omega": [e.about_pivot() @ w for w in columns["omega"]]}),

@@ -156,7 +156,7 @@ def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (5, 0.0)])
+@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (2, -1.0), (5, 0.0)])
 def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float) -> None:
     states = RIGHT.copy()
     states[:, column] *= factor
@@ -164,6 +164,7 @@ def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float
     assert told.kind == ("column_scaled" if factor else "column_constant")
     assert told.numbers["column"] == ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")[column]
     assert float(told.numbers.get("factor", 0)) == pytest.approx(factor)
+    assert ("has the other sign in these states" in diagnosis_text(told)) == (factor == -1)
 
 
 @pytest.mark.slow
@@ -227,3 +228,11 @@ def test_units_of_any_size_change_no_diagnosis(power: int) -> None:
     assert (told.kind, told.numbers["state"]) == ("one_state", "7 of 20")
     assert kinds(scored(in_units * (1.02 * OMEGA + GAMMA), times, top, start)) == ["omega_scaled"]
     assert kinds(scored(in_units, times, top, start)) == []
+
+
+def test_decimals_of_small_numbers_are_named_though_the_digits_written_are_as_many() -> None:
+    start = State(("0.05", "-0.035", "0.001"), (0, 0, -1))
+    top, times = HeavyTop(("1.8", "1.2", "1.1"), 1, ("0.2", "0.1", 1)), TIMES[:8]
+    states = np.round(motion(top, start, HEAVY_TOP, times), 4)
+    (told,) = scored(states, times, top, start).diagnoses
+    assert (told.kind, told.numbers) == ("rounded", {"to": "decimals", "digits": "4"})

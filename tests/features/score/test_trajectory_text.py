@@ -80,7 +80,7 @@ def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Pat
     assert given.start.flat == tuple(Fraction(repr(float(value))) for value in STATES[0])
     assert given.top == CASE.top
     rows = [[float(t), *state] for t, state in zip(TIMES, STATES, strict=True)][1:]
-    with pytest.raises(InputError, match="omega is missing, and there is no row t = 0") as caught:
+    with pytest.raises(InputError, match="omega is missing, and no row t = 0") as caught:
         scored(tmp_path, data + table(rows=rows), case=None)
     assert "--case" in caught.value.remedy
     with pytest.raises(InputError, match="The only time is 0"):
@@ -180,7 +180,7 @@ def test_w_x_y_z_beside_each_other_are_a_quaternion(names: str, places: dict[str
             "header says radians and angles = degrees",
         ),
         (table("t,a,b,c,d,e,f"), "The first line is not t,omega1.*: omega1, omega2"),
-        (table(None, order=range(3)), "there is no header, and Row 1 has 3 columns, not 7"),
+        (table(None, order=range(3)), "without a header Row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 are of one time and differ"),
         (table() + "3,1,1,1,0,0,abc\n", "'abc' is not a finite number"),

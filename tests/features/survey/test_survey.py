@@ -213,7 +213,7 @@ def test_an_integrator_without_lanes_is_surveyed_too() -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ('precision = "quad"', "no survey in quad"),
+        ('precision = "quad"', "precision must be that of a survey; got quad"),
         ('tolerance = "nan"', "not a finite number"),
         ("samples = 0", "samples"),
         ('integrator = "none-such"', "none-such"),
@@ -242,7 +242,7 @@ def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> N
     (tmp_path / "survey.parquet").write_bytes(b"")
     with pytest.raises(InputError, match="cannot be read"):
         ht.read_survey(tmp_path)
-    with pytest.raises(InputError, match="no column"):
+    with pytest.raises(InputError, match="column must be one of a survey"):
         ht.read_survey(tmp_path, columns=["nothing"])
 
 

@@ -23,14 +23,12 @@ from typing import Any
 
 from flint import acb, arb
 
-from heavytop.errors import InputError
 from heavytop.exact.closed_form import (
     ClosedForm,
     across,
     balls,
     cached_per_precision,
     carried_xi,
-    half_angle,
     instant,
     rotate,
     sign,
@@ -42,7 +40,7 @@ from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticM
 from heavytop.exact.elliptic.weierstrass import Winding
 from heavytop.exact.flint.balls import Balls, ball, coefficient, series_length, to_bits
 from heavytop.exact.solution import ON_AXIS_1, ExactRelation
-from heavytop.precision import Vector, cross, dot, shown
+from heavytop.precision import Vector, cross, dot
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -230,20 +228,3 @@ def _lattice(case: BobylevSteklov) -> _Lattice | None:
 def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
     """The part of the attitude that does not depend on the time."""
     return prepared_axis(case.top, case.start, across(case.start.gamma))
-
-
-def bobylev_steklov_motion(
-    inertia: tuple[Fraction, Fraction], moment: Fraction, rate: Fraction, tilt: Fraction, azimuth: Fraction
-) -> BobylevSteklov:
-    """A top of weight 1 with a Bobylev-Steklov motion and a start on it with |γ| = 1, all rational.
-
-    inertia: (I2, I3); I1 = 2 I3.  moment: a ≠ 0.  rate: Ω1 = p ≠ 0.  tilt, azimuth: tangents of half the angles in
-    γ = (cos tilt cos azimuth, cos tilt sin azimuth, sin tilt).  Raises InputError for a or p = 0.
-    """
-    if moment == 0 or rate == 0:
-        raise InputError(f"a = {shown(moment)}, p = {shown(rate)}.", "Give a centre of mass and a rate that are not 0.")
-    i2, i3 = inertia
-    (across, up), (cosine, sine) = half_angle(tilt), half_angle(azimuth)
-    gamma: Vector = (across * cosine, across * sine, up)
-    top = HeavyTop((2 * i3, i2, i3), 1, (moment, 0, 0))
-    return BobylevSteklov(top, State((rate, 0, moment * up / (i3 * rate)), gamma))

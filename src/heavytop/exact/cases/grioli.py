@@ -17,8 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from heavytop.errors import InputError
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, between, half_angle
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, between
 from heavytop.exact.flint.balls import Balls, ball
 from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
@@ -36,7 +35,7 @@ def _rates(top: HeavyTop, start: State) -> tuple[Fraction]:
 
 
 def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
-    return [g - wanted for g, wanted in zip(start.gamma, _gamma(top, start.omega), strict=True)]
+    return [g - wanted for g, wanted in zip(start.gamma, gamma_of(top, start.omega), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +73,7 @@ class Grioli(WithAttitude):
         return [rate * (a + r) for a, r in zip(u, axis, strict=True)], between((u0, w0, axis), space)
 
 
-def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:
+def gamma_of(top: HeavyTop, omega: Vector) -> list[Fraction]:
     """The γ that goes with Ω, times nothing: every root has cancelled."""
     (i1, i2, i3), n = top.inertia, top.moment
     square, spin = dot(n, n), dot(omega, n)
@@ -86,26 +85,3 @@ def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:
         / square
         for w, e, x in zip(omega, n, across, strict=True)
     ]
-
-
-def grioli_motion(
-    direction: Fraction, shape: Fraction, phase: Fraction, rate: Fraction, size: Fraction = Fraction(1)
-) -> Grioli:
-    """A top of weight 1 with a Grioli precession, and a start on it with |γ| = 1, all rational.
-
-    direction, shape, phase: tangents of half the angles (r̂1, r̂3) = (cos, sin), (I1 r̂1, I3 r̂3) = size (cos, sin) and
-    u = e2 cos + (r̂ × e2) sin.  rate: ν.  size: √(D² + κ²), a moment of inertia.
-    Raises InputError where a moment would not be positive, or I1 = I3, or ν = 0.
-    """
-    (a, c), (p1, p3), (u2, uz) = half_angle(direction), half_angle(shape), half_angle(phase)
-    if rate == 0 or size <= 0 or p1 * a <= 0 or p3 * c <= 0 or p1 * c == p3 * a:
-        raise InputError(
-            f"No Grioli top has direction {direction}, shape {shape}, rate {rate} and size {size}.",
-            "Give different direction and shape of one sign, both between 0 and 1, say; rate != 0, size > 0.",
-        )
-    i1, i3 = size * p1 / a, size * p3 / c
-    top = HeavyTop((i1, i1 * c * c + i3 * a * a, i3), 1, (rate**2 * size * a, 0, rate**2 * size * c))
-    # r̂ × e2 = (−c, 0, a)
-    omega = (rate * (a - uz * c), rate * u2, rate * (c + uz * a))
-    gamma = _gamma(top, State(omega, (0, 0, 0)).omega)
-    return Grioli(top, State(omega, gamma))

@@ -26,7 +26,7 @@ from typing import Any
 
 from flint import acb, arb, arb_series, fmpq, fmpq_poly
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import NotInClass
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.closed_form import ClosedForm, cached_per_precision
 from heavytop.exact.flint.balls import (
@@ -45,7 +45,6 @@ from heavytop.exact.flint.balls import (
 from heavytop.exact.separable.abel import decide, phase_at
 from heavytop.exact.separable.oscillation import MOST_TERMS, Azimuth, Bearing, Gap, Roots, WithBearing
 from heavytop.exact.solution import GAMMA, ON_AXIS_1, ExactRelation, differ
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -400,24 +399,3 @@ def _curve(top: HeavyTop, start: State) -> IntervalCurve:
     b, c = top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0]
     b2, b0, c2, c0 = quadratics(Fraction(1), b, c)
     return IntervalCurve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
-
-
-def steklov_motion(
-    first: Fraction, second: Fraction, ratio: Fraction, rate: Fraction, upwards: int = 1, size: Fraction = Fraction(1)
-) -> Steklov:
-    """A top with a Steklov motion, and a start on it with Ω1 = 0 and γ = ±e1, all rational.
-
-    first, second: I1 and I2 over ``size``.  ratio: s = Ω2/Ω3 at the start, I3 = ½ (I1 + s² (I1 − 2 I2)).  rate: Ω3
-    there.  upwards: −1 turns γ and r round.  Raises InputError where a moment would not be positive or two are equal.
-    """
-    a, b = size * first, size * second
-    c = (a + ratio**2 * (a - 2 * b)) / 2
-    if min(a, b, c) <= 0 or 0 in ((a - b) * (a - c) * (b - c), (a - 2 * b) * (a - 2 * c), rate):
-        raise InputError(
-            f"No Steklov top has moments ({shown(a)}, {shown(b)}, {shown(c)}) and rate {shown(rate)}.",
-            "Give three different positive moments, I1 not twice another one, and a rate other than 0.",
-        )
-    _, _, _, c0 = quadratics(a, b, c)
-    height = rate**2 / c0
-    top = HeavyTop((a, b, c), 1, (upwards * height, 0, 0))
-    return Steklov(top, State((0, ratio * rate, rate), (upwards, 0, 0)))

@@ -19,9 +19,7 @@ from typing import Any
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
 from heavytop.exact.flint.balls import BallLike
 from heavytop.exact.solution import equilibrium, require
-from heavytop.precision import Vector
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.equations import HEAVY_TOP, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +40,3 @@ class Staude(WithAttitude):
     def evaluate(self, _time: Fraction) -> list[Any]:
         """The start, at every time."""
         return balls(self.start.flat)
-
-
-def staude_motion(
-    inertia: Vector, gamma: Vector, rate: Fraction, along: Fraction = Fraction(0), rotor: Vector | None = None
-) -> Staude:
-    """The permanent rotation Ω = ω γ of the top of weight 1 with r = ω² I γ + κ γ, κ = ``along``: all there are.
-
-    rotor: k of a heavy gyrostat, for which r = ω² I γ + ω k + κ γ.
-    """
-    start = State([rate * g for g in gamma], gamma)
-    centre = [(rate**2 * i + along) * g for i, g in zip(inertia, gamma, strict=True)]
-    if rotor is None:
-        return Staude(HeavyTop(inertia, 1, centre), start)
-    carried = [n + rate * k for n, k in zip(centre, rotor, strict=True)]
-    return Staude(HeavyTop(inertia, 1, carried, rotor), start, HEAVY_GYROSTAT)

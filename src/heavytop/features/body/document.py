@@ -85,7 +85,7 @@ class BodyAssessment:
         }
 
     def lines(self) -> Iterator[str]:
-        """The same in lines for the terminal."""
+        """Lines of the mass properties for the terminal."""
         principal = self.principal
         moments = ", ".join(decimal_text(value, _PRINTED) for value in principal.moments)
         if self.sound:

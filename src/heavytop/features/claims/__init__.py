@@ -1,4 +1,4 @@
-"""What is said: published formulas, as printed, and what becomes of them."""
+"""Claimed motions: published formulas, as printed, and what becomes of them."""
 
 from heavytop.feature import Feature
 

@@ -104,7 +104,7 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder for the pictures.")],
     report: Annotated[Path | None, typer.Option(help="Draw every picture of its page instead, as SVG and PDF.")] = None,
 ) -> int:
-    """Draw Figs 2-8 of the paper, and the true motion.
+    """Draw Figs 2-8 of Ershkov's paper, and the true motion.
 
     The true motion beside the claim, all as SVG and PNG.  Takes about 10 seconds.
     """

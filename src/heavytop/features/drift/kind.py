@@ -109,9 +109,9 @@ class DriftKind(Kind):
             scorer.restore(before["measures"])
             _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], before["run"]["samples"])
 
-        def mark(place: ResumePoint) -> None:
+        def mark(resume_point: ResumePoint) -> None:
             if saved.due():
-                saved.save({"run": place.content(precision), "measures": scorer.content()})
+                saved.save({"run": resume_point.content(precision), "measures": scorer.content()})
 
         resume: dict[str, Any] = {}
         if task.integrator.ensemble:
@@ -121,8 +121,8 @@ class DriftKind(Kind):
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Significant digits at the longest horizon; digits right, a line a motion; everything, a line a row."""
-        if (found := digits_headline(rows)) is not None:
-            yield found
+        if (headline := digits_headline(rows)) is not None:
+            yield headline
         yield from digits_columns(rows)
         yield from attitude_columns(rows)
         yield motions(
@@ -160,8 +160,8 @@ def _with_attitude(task: Task) -> Row:
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:
     """Raises ValueError unless the scorer has taken in the first so many of the samples."""
     known = scorer.truth
-    for each in scorer.running().values():
-        error = scorer.error is not None and each in scorer.error.running.values()
+    for running in scorer.running().values():
+        error = scorer.error is not None and running in scorer.error.running.values()
         seen = [time for time in times[:samples] if not error or isinstance(known, str) or known.covers(time)]
-        if each.count != len(seen) or list(each.kept) != [time for time in seen if time in scorer.drift.keep]:
+        if running.count != len(seen) or list(running.kept) != [time for time in seen if time in scorer.drift.keep]:
             raise ValueError("the place of the run is not that of what was measured of it")

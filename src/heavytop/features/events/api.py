@@ -158,7 +158,7 @@ def _known_events(
         raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     if not function.rational:
         raise InputError(
-            f"The function {quoted(function.name)} is no rational function of Ω and γ, so nothing is proven of it.",
+            f"For a proof the function must be rational in Ω and γ; got {quoted(function.name)}.",
             "Write it with +, -, * and / alone, or leave digits out: then it is sampled.",
         )
     resolved = _resolved(top, start, until, digits, system)
@@ -166,7 +166,7 @@ def _known_events(
     method = "validated: Taylor enclosure" + (" of irrational data" if resolved.uncertainty else "")
     solution = Validated(resolved.top, resolved.start, system, method=method, uncertainty=resolved.uncertainty)
     try:
-        found = proven_events(solution, until, function, direction, digits, limit, reached, resolved)
+        events = proven_events(solution, until, function, direction, digits, limit, reached, resolved)
     except OutOfReach as error:
         remedy = f"{error.remedy} Computed ones reach further: leave digits out, and ask for quad or real:BITS."
         raise OutOfReach(error.cause, remedy) from None
@@ -178,18 +178,20 @@ def _known_events(
         digits=digits,
         system=system.name,
         until=exact_text(until),
-        times=[Ball(*value_text(event.time, digits + 1)) for event in found],
-        directions=[1 if event.rising else -1 for event in found],
-        states=[[Ball(*value_text(value, digits + 1)) for value in event.state] for event in found],
+        times=[Ball(*value_text(event.time, digits + 1)) for event in events],
+        directions=[1 if event.rising else -1 for event in events],
+        states=[[Ball(*value_text(value, digits + 1)) for value in event.state] for event in events],
     )
 
 
 def _resolved(top: HeavyTop | Body, start: State, until: Fraction, digits: int, system: System) -> Resolved:
     """The motion in principal axes; irrational data to as many bits as the motion loses until then, and more."""
-    found = resolve(top, start)
-    if found.uncertainty is None:
-        return found
-    lost = amplification(system, system.parameters(found.top, found.start), found.start.flat, until)
+    resolved_start = resolve(top, start)
+    if resolved_start.uncertainty is None:
+        return resolved_start
+    lost = amplification(
+        system, system.parameters(resolved_start.top, resolved_start.start), resolved_start.start.flat, until
+    )
     return resolve(top, start, _DATA_BITS + math.ceil(digits * math.log2(10) + 2 * math.log2(max(1.0, lost))))
 
 
@@ -223,10 +225,10 @@ def poincare(
     listed = arguments.listed(starts, State, "starts")
     if not listed:
         raise InputError("There are no starts.", "Give at least one State.")
-    found: list[Events | ReferenceEvents] = []
-    for place, start in enumerate(listed):
-        with prefixed(f"Start {place}"):
-            found.append(
+    sections: list[Events | ReferenceEvents] = []
+    for index, start in enumerate(listed):
+        with prefixed(f"Start {index}"):
+            sections.append(
                 events(
                     top, start, until, function, direction, precision, integrator=integrator, system=system, limit=limit
                 )
@@ -235,12 +237,12 @@ def poincare(
             )
     about = arguments.system(system, top)
     own = [resolve(top, start) for start in listed]
-    parameters = [about.parameters(each.top, each.start) for each in own]
+    parameters = [about.parameters(setup.top, setup.start) for setup in own]
     levels = [
-        tuple(_as_float(integral(p, each.start.flat)) for p, each in zip(parameters, own, strict=True))
+        tuple(_as_float(integral(p, setup.start.flat)) for p, setup in zip(parameters, own, strict=True))
         for integral in (energy, area)
     ]
-    return Section(tuple(found), *levels)
+    return Section(tuple(sections), *levels)
 
 
 def _as_float(value: Fraction) -> float:
@@ -251,15 +253,15 @@ def _as_float(value: Fraction) -> float:
 
 
 def _until(value: Number) -> Fraction:
-    found = physical(exact(value), "until")
-    if found == 0:
+    end = physical(exact(value), "until")
+    if end == 0:
         raise InputError("until = 0 leaves no time for an event.", "Give a time of either sign.")
-    return found
+    return end
 
 
 def require_direction(value: int) -> int:
     """1, -1 or 0; raises InputError for any other."""
-    found = as_integer(value, "direction")
-    if found not in (-1, 0, 1):
-        raise InputError(f"direction = {quoted(found)} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")
-    return found
+    sign = as_integer(value, "direction")
+    if sign not in (-1, 0, 1):
+        raise InputError(f"direction must be a sign; got {quoted(sign)}.", "Give 1 (rising), -1 (falling) or 0 (both).")
+    return sign

@@ -15,7 +15,7 @@ Functions = Annotated[
     typer.Option(
         "--events",
         metavar="FUNCTION",
-        help="Also the times, up to the last, at which omega1=0 or the like changes sign.",
+        help="Also the times, up to the last, at which a function such as omega1 changes sign.",
     ),
 ]
 Direction = Annotated[

@@ -101,7 +101,10 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     if run.bias is not None and abs(exact(run.bias)) >= 1:
         raise InputError(f"bias = {run.bias} in a growth run.", "Give a relative error between -1 and 1.")
     if run.reference is not None and parse(run.reference).bits <= precision.bits:
-        raise InputError(f"{run.reference} is no reference for {run.precision}.", "Name a format with more bits.")
+        raise InputError(
+            f"reference must have more bits; got {run.reference}.",
+            f"Name a format with more bits than {run.precision}.",
+        )
     steps = range(-run.samples * run.decades, 1)
     times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}

@@ -108,8 +108,8 @@ class Homoclinic(Kind):
         closed = case.homoclinic
         assert closed is not None
         problem = Problem.of(case.top, case.start, precision, case.system)
-        given = case.system.parameters(case.top, case.start)
-        exactly = given.mapped(Fraction)
+        parameters = case.system.parameters(case.top, case.start)
+        exactly = parameters.mapped(Fraction)
         if (problem.parameters, problem.start) != (exactly, case.start):
             raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
         early = Fraction(_CERTIFIED_AT if task.times[-1] > 0 else -_CERTIFIED_AT)
@@ -175,8 +175,8 @@ def _errors(row: Row) -> dict[str, Metric | None]:
     names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
     name = next(names, SOLUTION_ERROR)
     drift = max((metric for _, metric in drifts(row)), key=size, default=None)
-    found = {f"error of {symbol}": row.metric(name, part, "max") for part, symbol in (("omega", "Ω"), ("gamma", "γ"))}
-    return found | {"drift": drift}
+    errors = {f"error of {symbol}": row.metric(name, part, "max") for part, symbol in (("omega", "Ω"), ("gamma", "γ"))}
+    return errors | {"drift": drift}
 
 
 def _hidden(rows: Iterable[Row]) -> Iterator[str]:
@@ -188,7 +188,7 @@ def _hidden(rows: Iterable[Row]) -> Iterator[str]:
             continue
         pairs = zip(_errors(row).items(), _errors(own).values(), strict=True)
         worse = [(size(mine) - size(known), what, mine, known) for (what, mine), known in pairs if mine and known]
-        lost, what, mine, known = max(worse, key=lambda each: each[0], default=(0.0, "", None, None))
+        lost, what, mine, known = max(worse, key=lambda entry: entry[0], default=(0.0, "", None, None))
         if lost > _WORSE:
             yield f"{row.key.case}: the {what} of {row.key.subject.name} is {Value(mine)}, heyoka's {Value(known)}."
 
@@ -212,11 +212,11 @@ def _stays(rows: Iterable[Row]) -> str:
     formats: dict[tuple[int, str], list[Fraction]] = {}
     for row in rows:
         formats.setdefault((row.bits, row.precision), []).append(abs(exact(_until(row))))
-    found = []
+    sentences = []
     for _, name in dict.fromkeys((min(formats), max(formats))):
         low, high = (f"{float(pick(formats[_, name])):.3g}" for pick in (min, max))
-        found.append(f"{low if low == high else f'{low} to {high}'} in {name}")
-    return ", ".join(found)
+        sentences.append(f"{low if low == high else f'{low} to {high}'} in {name}")
+    return ", ".join(sentences)
 
 
 def _end(case: Case, bits: int) -> float:
@@ -246,9 +246,9 @@ def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict
     times = tuple(time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits))
     # another package's integrator may not do the same again
     again = _again if reruns.integrator.ensemble else _again.__wrapped__
-    found, escaped = again(case, reruns, times)
-    metrics = banded(run, metrics, found)
-    escapes = [abs(each) for each in escaped if each is not None]
+    measured, escaped = again(case, reruns, times)
+    metrics = banded(run, metrics, measured)
+    escapes = [abs(escape) for escape in escaped if escape is not None]
     own = metrics[ESCAPE.text]
     if own.log10 is not None and len(escapes) == len(escaped):
         band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
@@ -263,5 +263,7 @@ def _again(
     """Metrics and escape times of the reruns, the same for every format that the case is measured in."""
     assert case.homoclinic is not None
     truth = Truth(Against("proven", case.homoclinic.method), case.homoclinic.state).remembered()
-    scorers = reruns.of(times, lambda given: _scorer(case, given, truth))
-    return [each.metrics() for each in scorers], [each.error.escape for each in scorers if each.error is not None]
+    scorers = reruns.of(times, lambda problem: _scorer(case, problem, truth))
+    return [scorer.metrics() for scorer in scorers], [
+        scorer.error.escape for scorer in scorers if scorer.error is not None
+    ]

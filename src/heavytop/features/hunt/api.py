@@ -83,14 +83,14 @@ def hunt(
     """
     which, form = named(integrator), arguments.precision(precision)
     other = None if against is None else named(against)
-    for each in (which, other):
-        if each is not None:
-            registry.require(each)
+    for chosen in (which, other):
+        if chosen is not None:
+            registry.require(chosen)
     if not isinstance(family, str) or family not in FAMILIES:
-        raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
+        raise InputError(f"family must be a known one; got {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")
     if not time:
-        raise InputError("horizon = 0 is no time.", "Give a time other than 0, such as 100.")
+        raise InputError("horizon must not be zero.", "Give a time other than 0, such as 100.")
     if which == "heyoka" and form == DOUBLE_DOUBLE:
         raise InputError("heyoka has no double-double.", "Use --integrator multiword, or another format.")
     motions, seconds = _budget(budget)
@@ -113,7 +113,7 @@ def hunt(
 def _seed(value: int) -> int:
     number = as_integer(value, "seed")
     if not 0 <= number <= 10**9:
-        raise InputError(f"There is no seed {quoted(number)}.", "Give a number from 0 to 1000000000.")
+        raise InputError(f"seed must be in range; got {quoted(number)}.", "Give a number from 0 to 1000000000.")
     return number
 
 
@@ -126,7 +126,7 @@ def _budget(value: int | str) -> tuple[int | None, float | None]:
         return int(text), None
     if re.fullmatch(r"[0-9]{1,7}(\.[0-9]{1,3})?s", text) and 0 < float(text[:-1]) <= _MOST_SECONDS:
         return None, float(text[:-1])
-    raise InputError(f"budget = {quoted(value)} is none.", _BUDGET)
+    raise InputError(f"budget must be a time or a number of motions; got {quoted(value)}.", _BUDGET)
 
 
 def _again(asked: Asked, name: str, against: str | Callable[..., Any] | None, planned: int) -> str:

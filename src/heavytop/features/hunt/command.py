@@ -18,7 +18,9 @@ def hunt(
     budget: Annotated[str, typer.Option(help="Motions, 5000, or seconds, 60s.")] = "5000",
     family: Annotated[str, typer.Option(help="any, euler, lagrange, kovalevskaya or heavy_gyrostat.")] = "any",
     against: Annotated[str | None, typer.Option(help="Search for the largest ratio to its error.")] = None,
-    limit: Annotated[str | None, typer.Option(help="What is found: an error in eps T^1.5, or a ratio.")] = None,
+    limit: Annotated[
+        str | None, typer.Option(help="Report errors above LIMIT eps T^1.5; with --against, above that ratio.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Search otherwise.")] = 1,
     json: Json = False,
 ) -> int:

@@ -220,7 +220,7 @@ def possible(motion: Motion, family: Family, horizon: Fraction) -> Motion | None
     elif family == "kovalevskaya":
         inertia[:2], centre[2] = [2 * inertia[2]] * 2, Fraction(0)
     rotor = list(map(_short, top.rotor or (Fraction(0),) * 3)) if family == "heavy_gyrostat" else None
-    inertia, centre, omega = (list(map(_short, each)) for each in (inertia, centre, start.omega))
+    inertia, centre, omega = (list(map(_short, vector)) for vector in (inertia, centre, start.omega))
     weight = _short(top.weight)
     if min(inertia) <= 0 or 2 * max(inertia) > sum(inertia) or max(inertia) > _MOST_RATIO * min(inertia):
         return None
@@ -258,8 +258,8 @@ def _simple(motion: Motion, dice: Dice) -> Motion:
 def _edge(motion: Motion, dice: Dice) -> Motion:
     """Moments at the edge of the triangle inequality: almost a rod or a disc, or exactly."""
     second = [1 + abs(dice.part()) for _ in range(3)]
-    for place in range(1 + dice.below(2)):
-        second[(place + dice.below(3)) % 3] *= dice.pick([Fraction(0), dice.power(-5, -2)])
+    for k in range(1 + dice.below(2)):
+        second[(k + dice.below(3)) % 3] *= dice.pick([Fraction(0), dice.power(-5, -2)])
     x, y, z = second
     inertia = (y + z, z + x, x + y)
     return (with_data(motion[0], inertia=inertia) if min(inertia) else motion[0]), motion[1]
@@ -279,8 +279,8 @@ def _spun(motion: Motion, dice: Dice) -> Motion:
     """One component of Ω many times as large, or small; or alone."""
     top, start = motion
     omega = [Fraction(0)] * 3 if dice.below(3) == 0 else list(start.omega)
-    place = dice.below(3)
-    omega[place] = (start.omega[place] or Fraction(1)) * dice.power(-4, 2)
+    axis = dice.below(3)
+    omega[axis] = (start.omega[axis] or Fraction(1)) * dice.power(-4, 2)
     return top, State(omega, start.gamma)
 
 
@@ -464,7 +464,7 @@ class Meter:
         if not motions:
             return []
         problems = [Problem.of(*motion, self.precision, system_of(None, motion[0])) for motion in motions]
-        rates = [rate(each.system, each.parameters, each.start.flat) for each in problems]
+        rates = [rate(problem.system, problem.parameters, problem.start.flat) for problem in problems]
         truths = self._truths(problems, rates)
         runs = self._runs(self.integrator, problems, motions, self._apart)
         others = [] if self.against is None else self._runs(self.against, problems, motions, None)
@@ -486,11 +486,11 @@ class Meter:
             return self._apart.follow(*motion, self.times, self.precision)
         return follow(integrator, *motion, self.times, self.precision)
 
-    def sharper(self, found: MeasuredMotion) -> MeasuredMotion:
+    def sharper(self, motion: MeasuredMotion) -> MeasuredMotion:
         """The motion with the amplification over all directions and from every time on."""
-        problem = Problem.of(*found.motion, self.precision, system_of(None, found.motion[0]))
+        problem = Problem.of(*motion.motion, self.precision, system_of(None, motion.motion[0]))
         largest = amplification(problem.system, problem.parameters, problem.start.flat, self.horizon)
-        return replace(found, amplification=max(largest, found.amplification))
+        return replace(motion, amplification=max(largest, motion.amplification))
 
     def _runs(
         self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
@@ -506,9 +506,10 @@ class Meter:
         self, problems: Sequence[Problem], rates: Sequence[Fraction]
     ) -> list[tuple[list[list[Fraction]] | None, float]]:
         """The true states and the amplification of each; None where no run reached the horizon."""
-        fine = [replace(each, precision=self._fine) for each in problems]
+        fine = [replace(problem, precision=self._fine) for problem in problems]
         moved = [
-            replace(each, start=_moved(each.start, unit, self._shift)) for each, unit in zip(fine, rates, strict=True)
+            replace(problem, start=_moved(problem.start, unit, self._shift))
+            for problem, unit in zip(fine, rates, strict=True)
         ]
         runs = self._finely([*fine, *moved])
         truths: list[tuple[list[list[Fraction]] | None, float]] = []
@@ -589,10 +590,10 @@ def class_of(top: HeavyTop, start: State) -> str:
     return NO_CLASS if solution is None else solution.method
 
 
-def special(found: MeasuredMotion) -> list[str]:
+def special(motion: MeasuredMotion) -> list[str]:
     """Sentences: moments, spin, equilibrium, separatrix, energy, what the motion amplifies; the telling ones alone."""
-    top, start = found.motion
-    return [each for each in (*_moments(top), *_start(top, start), *_growth_text(found)) if each]
+    top, start = motion.motion
+    return [text for text in (*_moments(top), *_start(top, start), *_growth_text(motion)) if text]
 
 
 def _moments(top: HeavyTop) -> list[str]:
@@ -641,10 +642,10 @@ def _start(top: HeavyTop, start: State) -> list[str]:
     return [*sentences, f"energy {float(energy):.4g}, P|r| = {height:.4g}"]
 
 
-def _growth_text(found: MeasuredMotion) -> list[str]:
-    chaotic = found.amplification > 100 * (1 + found.turns)
+def _growth_text(motion: MeasuredMotion) -> list[str]:
+    chaotic = motion.amplification > 100 * (1 + motion.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
-    sentences = [f"{found.turns:.3g} radians until the horizon"]
-    if digits_eaten(found.amplification) >= _FEW or chaotic:
-        sentences.append(f"the motion itself amplifies by {found.amplification:.2g}{kind}")
+    sentences = [f"{motion.turns:.3g} radians until the horizon"]
+    if digits_eaten(motion.amplification) >= _FEW or chaotic:
+        sentences.append(f"the motion itself amplifies by {motion.amplification:.2g}{kind}")
     return sentences

@@ -90,12 +90,12 @@ def shrunk(motion: Motion, shows: Shows) -> Motion:
 def _first(motion: Motion, simpler: Iterator[Motion], shows: Shows) -> Motion:
     """The first of those, the simplest first, that is simpler and shows it; else the motion itself."""
     here = complexity(motion)
-    waiting = sorted((each for each in simpler if complexity(each) < here), key=complexity)
+    waiting = sorted((candidate for candidate in simpler if complexity(candidate) < here), key=complexity)
     for begin in range(0, len(waiting), _TOGETHER):
         group = waiting[begin : begin + _TOGETHER]
-        for each, good in zip(group, shows(group), strict=True):
+        for candidate, good in zip(group, shows(group), strict=True):
             if good:
-                return each
+                return candidate
     return motion
 
 
@@ -106,10 +106,10 @@ def _of_body(motion: Motion) -> Iterator[Motion]:
         if 2 * max(inertia) <= sum(inertia):
             yield with_data(top, inertia, top.weight, top.centre), start
             yield with_data(top, inertia, 1, (0, 0, 0)), start
-    for place in range(3):
-        centre = [each if i == place else Fraction(0) for i, each in enumerate(top.centre)]
+    for axis in range(3):
+        centre = [value if i == axis else Fraction(0) for i, value in enumerate(top.centre)]
         yield with_data(top, top.inertia, top.weight, centre), start
-        yield with_data(top, top.inertia, 1, [top.weight * each for each in centre]), start
+        yield with_data(top, top.inertia, 1, [top.weight * value for value in centre]), start
 
 
 def _of_units(motion: Motion) -> Iterator[Motion]:
@@ -125,11 +125,11 @@ def _of_units(motion: Motion) -> Iterator[Motion]:
 def _of_start(motion: Motion) -> Iterator[Motion]:
     """Ω none, or along one axis, and γ on the poles."""
     top, start = motion
-    for place in range(3):
-        omega = [each if i == place else Fraction(0) for i, each in enumerate(start.omega)]
+    for axis in range(3):
+        omega = [value if i == axis else Fraction(0) for i, value in enumerate(start.omega)]
         yield top, State(omega, start.gamma)
         for sign in (1, -1):
-            pole = [Fraction(sign * (i == place)) for i in range(3)]
+            pole = [Fraction(sign * (i == axis)) for i in range(3)]
             yield top, State(start.omega, pole)
             yield top, State((0, 0, 0), pole)
             yield with_data(top, top.inertia, 1, pole), State((0, 0, 0), pole)
@@ -143,26 +143,26 @@ def _of_inertia(motion: Motion) -> Iterator[Motion]:
         for simple in _simpler(value):
             if simple > 0:
                 for also in ((i,), (i, (i + 1) % 3), (i, (i + 2) % 3)):
-                    inertia = [simple if k in also else each for k, each in enumerate(top.inertia)]
+                    inertia = [simple if k in also else moment for k, moment in enumerate(top.inertia)]
                     if 2 * max(inertia) <= sum(inertia):
                         yield with_data(top, inertia, top.weight, top.centre), start
 
 
-def _of_number(place: int) -> Callable[[Motion], Iterator[Motion]]:
+def _of_number(index: int) -> Callable[[Motion], Iterator[Motion]]:
     """The weight, a component of the centre or of Ω."""
 
     def change(motion: Motion) -> Iterator[Motion]:
         top, start = motion
         numbers = [top.weight, *top.centre, *start.omega]
-        for simple in _simpler(numbers[place]):
-            weight, *vectors = _replaced(numbers, place, simple)
+        for simple in _simpler(numbers[index]):
+            weight, *vectors = _replaced(numbers, index, simple)
             yield with_data(top, top.inertia, weight, vectors[:3]), State(vectors[3:], start.gamma)
 
     return change
 
 
-def _replaced(values: Sequence[Fraction], place: int, value: Fraction) -> list[Fraction]:
-    return [value if i == place else each for i, each in enumerate(values)]
+def _replaced(values: Sequence[Fraction], index: int, value: Fraction) -> list[Fraction]:
+    return [value if i == index else old for i, old in enumerate(values)]
 
 
 def _of_rotor(motion: Motion) -> Iterator[Motion]:
@@ -170,9 +170,9 @@ def _of_rotor(motion: Motion) -> Iterator[Motion]:
     top, start = motion
     if top.rotor is not None:
         yield with_data(top, rotor_times=0), start
-        for place, value in enumerate(top.rotor):
+        for index, value in enumerate(top.rotor):
             for simple in _simpler(value):
-                yield HeavyTop(top.inertia, top.weight, top.centre, _replaced(top.rotor, place, simple)), start
+                yield HeavyTop(top.inertia, top.weight, top.centre, _replaced(top.rotor, index, simple)), start
 
 
 def _of_gamma(motion: Motion) -> Iterator[Motion]:
@@ -182,8 +182,8 @@ def _of_gamma(motion: Motion) -> Iterator[Motion]:
     norms = table[:, 0]
     apart = numpy.abs(table[:, 1:] / table[:, :1] - numpy.array([float(value) for value in start.gamma])).max(axis=1)
     nearest = (int(apart[: int((norms <= most).sum())].argmin()) for most in _DIRECTION_NORMS)
-    for place in dict.fromkeys(nearest):
-        norm, *parts = table[place].tolist()
+    for axis in dict.fromkeys(nearest):
+        norm, *parts = table[axis].tolist()
         yield top, State(start.omega, [Fraction(part, norm) for part in parts])
 
 
@@ -202,7 +202,7 @@ def _directions() -> Any:
                 u, v, w, norm = u // common, v // common, w // common, norm // common
                 for part in (w, -w):
                     directions |= dict.fromkeys([(norm, u, v, part), (norm, v, part, u), (norm, part, u, v)])
-    return numpy.array(sorted(directions, key=lambda each: each[0]))
+    return numpy.array(sorted(directions, key=lambda entry: entry[0]))
 
 
 def _simpler(value: Fraction) -> list[Fraction]:
@@ -215,7 +215,7 @@ def _simpler(value: Fraction) -> list[Fraction]:
         candidates |= {Fraction(decimal_text(value, n)) for n in (1, 2, 3)}
         power = Fraction(10) ** len(str(int(abs(value)))) if abs(value) >= 1 else Fraction(1)
         candidates |= {power * (1 if value > 0 else -1), power / 10 * (1 if value > 0 else -1)}
-    return [each for each in candidates if digits(each) <= digits(value) and each != value]
+    return [candidate for candidate in candidates if digits(candidate) <= digits(value) and candidate != value]
 
 
 _CHANGES: tuple[Callable[[Motion], Iterator[Motion]], ...] = (
@@ -247,16 +247,16 @@ class Proof:
     proven: bool
 
 
-def proof(meter: Meter, found: MeasuredMotion, other: Integrator) -> Proof:
+def proof(meter: Meter, motion: MeasuredMotion, other: Integrator) -> Proof:
     """The error of a found motion and of ``other`` on it, against the best that is known of it.
 
     Raises Contradiction where two proofs exclude each other.
     """
-    problem = Problem.of(*found.motion, meter.precision, system_of(None, found.motion[0]))
+    problem = Problem.of(*motion.motion, meter.precision, system_of(None, motion.motion[0]))
     known = truth(problem, meter.times)
-    runs = [meter.run_of(each, found.motion) for each in (meter.integrator, other)]
+    runs = [meter.run_of(integrator, motion.motion) for integrator in (meter.integrator, other)]
     if isinstance(known, str):
-        return Proof(found.error, None, f"nothing: {known}", False)
+        return Proof(motion.error, None, f"nothing: {known}", False)
     errors = [_distance(problem, known, meter, run) for run in runs]
     return Proof(errors[0], errors[1], known.against.text, known.against.how == "proven")
 
@@ -277,7 +277,7 @@ def _distance(problem: Problem, known: Truth, meter: Meter, run: IntegratedRun) 
                 apart = [to_ball(a) - b for a, b in zip(state[:6], known.state(time, bits), strict=True)]
             except (ValueError, TypeError, ArithmeticError):
                 return math.inf
-            if not all(each.is_finite() for each in apart):
+            if not all(distance.is_finite() for distance in apart):
                 return math.inf
             scaled: arb = largest((largest(apart[:3]) / rational(unit), largest(apart[3:])))
             distance = max(distance, float(scaled.abs_lower()))
@@ -425,8 +425,8 @@ class _Hunt:
     def _done(self) -> int:
         return len(self.all)
 
-    def _changed(self, batch: int, place: int) -> Motion:
-        seed = f"{self.asked.seed}/change/{batch}/{place}"
+    def _changed(self, batch: int, index: int) -> Motion:
+        seed = f"{self.asked.seed}/change/{batch}/{index}"
         dice = Dice(f"{seed}/which")
         # the worse, the oftener
         one = self.pool[min(dice.below(len(self.pool)), dice.below(len(self.pool)))]
@@ -436,8 +436,12 @@ class _Hunt:
     def _take(self, measured: Sequence[MeasuredMotion]) -> None:
         self.all += measured
         self.pool = sorted([*self.pool, *measured], key=self._score, reverse=True)[:_POOL]
-        for each in sorted(measured, key=self._score, reverse=True):
-            if len(self.hits) < _MOST_HITS and self.exceeds(each) and self.exceeds(sharp := self.meter.sharper(each)):
+        for motion in sorted(measured, key=self._score, reverse=True):
+            if (
+                len(self.hits) < _MOST_HITS
+                and self.exceeds(motion)
+                and self.exceeds(sharp := self.meter.sharper(motion))
+            ):
                 self.hits.append(sharp)
 
     def _is_lost(self, m: MeasuredMotion) -> bool:
@@ -491,7 +495,7 @@ class _Hunt:
         asked = self.asked
 
         def shows(motions: Sequence[Motion]) -> list[bool]:
-            good = [possible(each, asked.family, asked.horizon) == each for each in motions]
+            good = [possible(motion, asked.family, asked.horizon) == motion for motion in motions]
             tried = iter(self.meter.measure([m for m, ok in zip(motions, good, strict=True) if ok]))
             return [ok and self._as_bad(next(tried), hit, careful) for ok in good]
 
@@ -502,7 +506,7 @@ class _Hunt:
         same = math.isinf(m.error) == math.isinf(hit.error) and self.exceeds(m)
         return same and (not careful or self.exceeds(self.meter.sharper(m)))
 
-    def _ended(self, done: int, found: list[MeasuredMotion]) -> Hunted:
+    def _ended(self, done: int, motions: list[MeasuredMotion]) -> Hunted:
         good = [m for m in self.all if m.outcome == "success" and not self._is_lost(m)]
         ordered = sorted(good, key=lambda m: m.error, reverse=True)
         sharp = map(self.meter.sharper, list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHARPENED])
@@ -510,9 +514,9 @@ class _Hunt:
         middle = median(m.error for m in self.plain) if self.plain else math.inf
         unknown = sum(not m.outcome for m in self.all)
         lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.all)
-        proofs = tuple(proof(self.meter, m, self.asked.other) for m in found)
+        proofs = tuple(proof(self.meter, m, self.asked.other) for m in motions)
         return Hunted(
-            self.asked, tuple(found), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
+            self.asked, tuple(motions), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
         )
 
 
@@ -520,7 +524,7 @@ def _shape(motion: Motion) -> object:
     """A key that motions share which differ in the names and senses of their axes alone, or nearly."""
     top, start = motion
     vectors = (top.moment, top.rotor or (Fraction(0),) * 3, start.omega, start.gamma)
-    axes = zip(top.inertia, *(map(abs, each) for each in vectors), strict=True)
+    axes = zip(top.inertia, *(map(abs, vector) for vector in vectors), strict=True)
     return tuple(sorted(axes))
 
 
@@ -588,7 +592,7 @@ def kept(path: Path) -> tuple[Motion, ...]:
         document = document_of(path.read_text("utf-8"))
         if document.keys() - {"top"}:
             raise msgspec.ValidationError(f"unknown key {min(document.keys() - {'top'})}")
-        cases = [each.case() for each in msgspec.convert(document.get("top", []), list[Top])]
+        cases = [top.case() for top in msgspec.convert(document.get("top", []), list[Top])]
     except FileNotFoundError:
         return ()
     except (OSError, ValueError, RecursionError) as error:
@@ -606,7 +610,7 @@ def keep(path: Path, motions: Sequence[Motion]) -> None:
     every = dict.fromkeys([*map(_plain, before), *map(_plain, motions)])
     if len(every) == len(before):
         return
-    tables = [forms(case_of(each, i))["toml"] for i, each in enumerate(every, 1)]
+    tables = [forms(case_of(motion, i))["toml"] for i, motion in enumerate(every, 1)]
     try:
         replace(path, ("\n\n".join(tables) + "\n").encode())
     except OSError as error:

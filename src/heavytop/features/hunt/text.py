@@ -15,12 +15,12 @@ from heavytop.precision import time_text
 _WIDTH = 80
 
 
-def hunt_text(hunted: Hunted, found: Sequence[dict[str, Any]], again: str) -> str:
+def hunt_text(hunted: Hunted, documents: Sequence[dict[str, Any]], again: str) -> str:
     """Each motion found with its table; else the worst and what explains it.  again: the command that searches so."""
     lines = [_searched(hunted), ""]
-    for number, (each, m, p) in enumerate(zip(found, hunted.found, hunted.proofs, strict=True), 1):
-        lines += [*_found(hunted, number, each, m, p), ""]
-    if not found:
+    for number, (document, m, p) in enumerate(zip(documents, hunted.found, hunted.proofs, strict=True), 1):
+        lines += [*_found(hunted, number, document, m, p), ""]
+    if not documents:
         lines += [*_nothing(hunted), ""]
     return "\n".join([*lines, "The same search again:", f"  {again}"])
 
@@ -72,7 +72,7 @@ def _nothing(hunted: Hunted) -> list[str]:
     return lines
 
 
-def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion, p: Proof) -> list[str]:
+def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMotion, p: Proof) -> list[str]:
     eps = float(hunted.asked.precision.eps)
     if math.isinf(m.error):
         head = f"{number}. The run ends as {m.outcome}" + (f": {m.said}" if m.said else "")
@@ -83,15 +83,15 @@ def _found(hunted: Hunted, number: int, each: dict[str, Any], m: MeasuredMotion,
         proof = f"{word}: compared with {p.against.removeprefix('known: ')}."
     usual = f"Random tops: {_right(hunted.median, eps)} digits right (median)."
     beside = f"{_beside(hunted.asked.other, p, eps)}"
-    what = "; ".join([each["class"], *special(m)])
+    what = "; ".join([document["class"], *special(m)])
     return [
         fill(f"{head}.", _WIDTH),
         *_folded([f"{usual} {beside}", f"What is special: {what}.", proof]),
         "",
-        each["toml"],
+        document["toml"],
         "",
         "It shows again by:",
-        f"  {each['command']}",
+        f"  {document['command']}",
     ]
 
 

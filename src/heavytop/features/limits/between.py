@@ -114,10 +114,10 @@ class _Sampled:
         setup = Setup.of(self.body, self.start, arguments.precision("double"), self.system)
         run = propagator("heyoka", {"xi": setup.xi})
         times = check_times(numpy.arange(count * _PARTS + 1) * float(self.until / (count * _PARTS)))
-        found = run(setup.top, setup.start, times, system=self.system)
-        found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
-        y, q = found.states.T, found.quaternions().T
-        rates = numpy.array(numpy.broadcast_arrays(*self.system.field(found.problem.parameters.mapped(float), y)))
+        trajectory = run(setup.top, setup.start, times, system=self.system)
+        trajectory = replace(trajectory, states=trajectory.states[:, :6], attitude=trajectory.states[:, 6:])
+        y, q = trajectory.states.T, trajectory.quaternions().T
+        rates = numpy.array(numpy.broadcast_arrays(*self.system.field(trajectory.problem.parameters.mapped(float), y)))
         return _compared(y, q, rates[:, ::_PARTS] * float(self.until / count))
 
 
@@ -125,7 +125,7 @@ def _compared(y: Array, q: Array, slopes: Array) -> dict[str, float | None]:
     """y, q: at every eighth of an interval, shape (6 or 4, 8 n + 1).  slopes: y' Δt at the samples."""
     nodes, turns = y[:, ::_PARTS], q[:, ::_PARTS]
     a, b, da, db = nodes[:, :-1], nodes[:, 1:], slopes[:, :-1], slopes[:, 1:]
-    found: dict[str, float | None] = dict.fromkeys(METHODS, 0.0)
+    largest: dict[str, float | None] = dict.fromkeys(METHODS, 0.0)
     for part in range(1, _PARTS):
         u, true = part / _PARTS, y[:, part::_PARTS]
         hermite = (1 - u) ** 2 * ((1 + 2 * u) * a + u * da) + u**2 * ((3 - 2 * u) * b - (1 - u) * db)
@@ -134,8 +134,8 @@ def _compared(y: Array, q: Array, slopes: Array) -> dict[str, float | None]:
         errors["slerp"] = float(_angles(_slerp(turns[:, :-1], turns[:, 1:], u), q[:, part::_PARTS]).max())
         if nodes.shape[1] > 3:
             errors["lagrange"] = _relative(_lagrange(nodes, u), true[:, 1:-1])
-        found |= {name: max(found[name] or 0.0, error) for name, error in errors.items()}
-    return found if nodes.shape[1] > 3 else found | {"lagrange": None}
+        largest |= {name: max(largest[name] or 0.0, error) for name, error in errors.items()}
+    return largest if nodes.shape[1] > 3 else largest | {"lagrange": None}
 
 
 def _relative(value: Array, true: Array) -> float:
@@ -143,7 +143,7 @@ def _relative(value: Array, true: Array) -> float:
 
 
 def _lagrange(nodes: Array, u: float) -> Array:
-    """Of the inner intervals, by the two samples on either side."""
+    """Interpolation on inner intervals by the two samples on either side."""
     w, x, y, z = (nodes[:, k : nodes.shape[1] - 3 + k] for k in range(4))
     weights = (-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2, -(u + 1) * u * (u - 2) / 2)
     return weights[0] * w + weights[1] * x + weights[2] * y + (u + 1) * u * (u - 1) / 6 * z
@@ -160,8 +160,8 @@ def _slerp(a: Array, b: Array, u: float) -> Array:
 def _angles(a: Array, b: Array) -> Array:
     """The angles between attitudes, radians."""
     chord = numpy.minimum(numpy.linalg.norm(a - b, axis=0), numpy.linalg.norm(a + b, axis=0))
-    found: Array = 4 * numpy.arcsin(numpy.clip(chord / 2, 0, 1))
-    return found
+    angles: Array = 4 * numpy.arcsin(numpy.clip(chord / 2, 0, 1))
+    return angles
 
 
 def _largest(errors: Any, name: str, wanted: float, end: Fraction, count: int) -> Fraction | None:

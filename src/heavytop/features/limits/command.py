@@ -17,7 +17,7 @@ _SECONDS = 1.0
 @command
 def power(
     until: Annotated[str, typer.Option(help="Where the test ends.")],
-    tolerance: Annotated[str, typer.Option(help="Of the test: the largest error that passes, relative above 1.")],
+    tolerance: Annotated[str, typer.Option(help="Largest error that passes: absolute below 1, relative above.")],
     case: Annotated[str | None, typer.Option(help="A case of `heavytop list`.", autocompletion=cases)] = None,
     file: Annotated[str | None, typer.Option(help="In its place the file of a robot, with --omega.")] = None,
     link: Annotated[str | None, typer.Option(help="Link of the file.")] = None,

@@ -69,22 +69,25 @@ class DigitsEnd(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """The entry ``digits_end`` of a document."""
-        ends = {name: each and each.to_json() for name, each in (("first", self.first), ("last", self.last))}
+        ends = {
+            name: crossing and crossing.to_json() for name, crossing in (("first", self.first), ("last", self.last))
+        }
         return {"precision": self.precision, "of_digits": round(self.of_digits, 2)} | ends
 
     def sentences(self) -> list[str]:
-        """What it says of the first digit and of the last."""
-        found = []
+        """Sentences on the times at which the first and the last digit end."""
+        lines = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:
-                found.append(f"{what}: not lost at any of {_TIMES} times up to t = {decimal_text(self.times[-1], 6)}")
+                end = decimal_text(self.times[-1], 6)
+                lines.append(f"{what}: not lost at any of {_TIMES} times up to t = {end}")
                 continue
             how = "proven" if loss.proven else "computed, beyond the reach of a proof"
-            found.append(
+            lines.append(
                 f"{what}: lost at t = {decimal_text(loss.time, 6)} by whoever rounds the state to {self.precision} "
                 f"at t = {decimal_text(loss.rounded_at, 6)}, with exact arithmetic before and after ({how})"
             )
-        return found
+        return lines
 
     def _table(self) -> TitledTable:
         rows = [
@@ -133,8 +136,8 @@ def digits_end(
     reached = [max(error for error, _ in worst[: k + 1]) for k in range(_TIMES)]
     ends = []
     for least in (10 ** (1 - of_digits), _ALL):
-        place = next((k for k in range(_TIMES) if worst[k][0] >= least), None)
-        ends.append(None if place is None else _loss(problem, times, place + 1, worst[place], least))
+        index = next((k for k in range(_TIMES) if worst[k][0] >= least), None)
+        ends.append(None if index is None else _loss(problem, times, index + 1, worst[index], least))
     left = tuple(_digits(error, of_digits) for error in reached)
     return DigitsEnd(form.name, of_digits, times[1:], left, *ends)
 
@@ -149,8 +152,8 @@ def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, 
     run = propagator("multiword", {})
 
     def states(start: State, instants: Sequence[Fraction]) -> list[list[Fraction]]:
-        found = run(problem.top, start, instants, form, system=problem.system)
-        return [[exact(value) for value in state[:6]] for state in found.states]
+        states = run(problem.top, start, instants, form, system=problem.system)
+        return [[exact(value) for value in state[:6]] for state in states.states]
 
     known = [list(problem.start.flat), *states(problem.start, times[1:])]
     errors = {}
@@ -172,10 +175,10 @@ def _rounded(state: Sequence[Fraction], form: Precision) -> State:
     return State(values[:3], values[3:])
 
 
-def _loss(problem: Problem, times: Sequence[Fraction], place: int, worst: tuple[float, int], least: float) -> Loss:
+def _loss(problem: Problem, times: Sequence[Fraction], index: int, worst: tuple[float, int], least: float) -> Loss:
     """The loss of one rounding, proven where enclosures reach."""
     error, rounded = worst
-    time, at = times[place], times[rounded]
+    time, at = times[index], times[rounded]
     bits = 2 * problem.precision.bits + _SPARE_BITS
     try:
         apart = _apart(problem, at, time, bits)

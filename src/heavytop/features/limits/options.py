@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Ends = Annotated[
-    bool, typer.Option("--digits-end", help="Also when one rounding of the state has cost the first digit, and all.")
+    bool,
+    typer.Option("--digits-end", help="Also when one rounding of the state has cost the first digit, and all digits."),
 ]
 Between = Annotated[
     str | None, typer.Option(metavar="DT", help="Also the error of interpolation between samples DT apart.")

@@ -48,7 +48,7 @@ class PlantedFault:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Power(Tabular):
-    """What a test detects.
+    """The faults that a test detects.
 
     times: of its samples.  tolerance: of it.  error: the largest of a right run; passes: whether that is within it.
     faults: planted, a :class:`PlantedFault` each.  left_out: why a fault is not planted, by its name.
@@ -149,8 +149,8 @@ def power(
             left_out[name] = rows
             continue
         errors = _off(rows, true).max(axis=1)
-        place = int(numpy.argmax(errors > limit)) if (errors > limit).any() else None
-        faults.append(PlantedFault(name, errors, None if place is None else times[place], float(errors.max())))
+        first = int(numpy.argmax(errors > limit)) if (errors > limit).any() else None
+        faults.append(PlantedFault(name, errors, None if first is None else times[first], float(errors.max())))
     return Power(tuple(times), limit, error, tuple(faults), left_out)
 
 
@@ -166,8 +166,8 @@ def _names(planted: str | Sequence[str]) -> list[str]:
 
 
 def _off(rows: Array, true: Array) -> Array:
-    found: Array = abs(rows - true) / numpy.maximum(1, abs(true))
-    return numpy.where(numpy.isfinite(found), found, numpy.inf)
+    errors: Array = abs(rows - true) / numpy.maximum(1, abs(true))
+    return numpy.where(numpy.isfinite(errors), errors, numpy.inf)
 
 
 def _states(
@@ -177,9 +177,9 @@ def _states(
     body, start, system = motion
     setup = Setup.of(body, start, form, system)
     run = setup.given(propagator(which, options or {})(setup.top, setup.start, times, form, system=system))
-    found = numpy.full((len(times), 6), numpy.inf)
-    found[: len(run.states)] = run.to_numpy()[:, :6]
-    return found
+    states = numpy.full((len(times), 6), numpy.inf)
+    states[: len(run.states)] = run.to_numpy()[:, :6]
+    return states
 
 
 def _rows(motion: Motion, times: Sequence[Fraction], form: Precision = DOUBLE) -> Array:
@@ -203,7 +203,7 @@ def _no_gyroscopic_term(motion: Motion, times: Sequence[Fraction]) -> Array:
     def rates(y: Array) -> Array:
         return numpy.vstack([numpy.cross(y[3], moment) / inertia, numpy.cross(y[1:], y[0])])
 
-    found, step = [], float(times[0])
+    states_reached, step = [], float(times[0])
     fastest = float(abs(_rows(motion, times)[:, :3]).max()) + math.sqrt(float(abs(moment).max() / inertia.min()))
     count = max(1, math.ceil(fastest * step / _SUBSTEP))
     h = step / count
@@ -213,11 +213,11 @@ def _no_gyroscopic_term(motion: Motion, times: Sequence[Fraction]) -> Array:
             b = rates(rows + h / 2 * a)
             c = rates(rows + h / 2 * b)
             rows = rows + h / 6 * (a + 2 * b + 2 * c + rates(rows + h * c))
-        found.append(rows)
-    given = numpy.array(found)
+        states_reached.append(rows)
+    states = numpy.array(states_reached)
     if setup.frame is not None:
-        given = given @ numpy.array([[float(v) for v in row] for row in setup.frame.axes]).T
-    return given.reshape(-1, 12)
+        states = states @ numpy.array([[float(v) for v in row] for row in setup.frame.axes]).T
+    return states.reshape(-1, 12)
 
 
 def _transposed(motion: Motion, times: Sequence[Fraction]) -> Array:

@@ -75,15 +75,15 @@ class LocalErrorKind(Kind):
     def measure(self, task: Task, saved: Saved) -> Row:
         """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
         case, precision = task.given, task.precision
-        given = case.top, case.start, task.times[-1], precision
+        parameters = case.top, case.start, task.times[-1], precision
         if not task.integrator.one_step:
             return _of_runs(task, stepped(task.integrator))
         steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
         if task.integrator.steps:
-            run, taken = load(task.integrator.steps)(*given, system=case.system)
+            run, taken = load(task.integrator.steps)(*parameters, system=case.system)
             steps = zip(run.times, taken, strict=True)
         else:
-            run, steps = single_calls(task.integrator, *given, case.system)
+            run, steps = single_calls(task.integrator, *parameters, case.system)
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
@@ -161,7 +161,7 @@ def _cells(row: Row) -> list[Cell]:
 def _told(rows: Sequence[Row]) -> list[Row]:
     """Those that have an error; of third-party integrators alone where there are any."""
     theirs = [row for row in rows if row.key.subject.name != HEYOKA]
-    return [row for row in theirs or rows if any(_number(row, each) for each in (_LARGEST, ERROR.text))]
+    return [row for row in theirs or rows if any(_number(row, metric) for metric in (_LARGEST, ERROR.text))]
 
 
 def _size(row: Row) -> float:
@@ -195,7 +195,7 @@ def _order(row: Row) -> str:
 
     Of a third-party integrator it is that of whole runs: one of single steps may be that of a starting method.
     """
-    single, runs = (_number(row, each.text) for each in (OBSERVED_ORDER, ORDER_OF_RUNS))
+    single, runs = (_number(row, name.text) for name in (OBSERVED_ORDER, ORDER_OF_RUNS))
     order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
     if not order:
         return ""

@@ -109,13 +109,13 @@ class LocalError:
         The order is left out where no step shows one.
         """
         with working_precision(self.bits):
-            found = self.running.metrics(LOCAL_ERROR)
+            metrics = self.running.metrics(LOCAL_ERROR)
             if self.orders:
-                found[OBSERVED_ORDER] = metric(arb(round(median(self.orders))), "value")
+                metrics[OBSERVED_ORDER] = metric(arb(round(median(self.orders))), "value")
             elif not self.running.count:
-                found[OBSERVED_ORDER] = Metric("missing", None, "value")
-        found.pop(LOCAL_ERROR.over("final"))
-        return by_name(found)
+                metrics[OBSERVED_ORDER] = Metric("missing", None, "value")
+        metrics.pop(LOCAL_ERROR.over("final"))
+        return by_name(metrics)
 
 
 def _end(step: TaylorStep | Call, n: int) -> list[arb]:
@@ -255,12 +255,12 @@ def order_of_runs(integrator: Integrator, whole: Trajectory) -> float | None:
     top, start = p.given or (p.top, p.start)
     size: Fraction = max(map(abs, p.start.flat))
 
-    def error(place: int) -> Fraction | None:
+    def error(level: int) -> Fraction | None:
         """At the step h 2^place; None where the run fails, or rounding may have made it."""
-        taken = step * Fraction(2) ** place
+        taken = step * Fraction(2) ** level
         refined = replace(integrator, set_to=("step", taken))
         try:
-            run = refined.propagate(top, start, [until], p.precision, p.system, again=False) if place else whole
+            run = refined.propagate(top, start, [until], p.precision, p.system, again=False) if level else whole
         except PeerFailed:
             return None
         if run.outcome is not Outcome.SUCCESS:
@@ -270,19 +270,19 @@ def order_of_runs(integrator: Integrator, whole: Trajectory) -> float | None:
         return off if off > roundings * p.precision.eps * size else None
 
     errors: list[Fraction] = []
-    for place in _REFINED:
-        off = error(place)
+    for level in _REFINED:
+        off = error(level)
         if off is None:
             break
         errors.append(off)
         if (order := _settled(errors)) is not None:
             return order
     errors = errors[:3]
-    for place in _COARSENED if len(errors) < 3 else ():
-        taken = step * Fraction(2) ** place
+    for level in _COARSENED if len(errors) < 3 else ():
+        taken = step * Fraction(2) ** level
         if taken**2 * _rate_squared(p) > _LONGEST**2:
             break
-        if (off := error(place)) is not None:
+        if (off := error(level)) is not None:
             errors.insert(0, off)
         if (order := _settled(errors[:3])) is not None:
             return order
@@ -305,9 +305,9 @@ def _rate_squared(problem: Problem) -> Fraction:
     return max(turning, falling)
 
 
-def _reached(runs: dict[int, list[Trajectory]], place: int) -> dict[int, Any]:
+def _reached(runs: dict[int, list[Trajectory]], level: int) -> dict[int, Any]:
     """Where the runs from one state end, without those that failed."""
-    return {n: many[place].states[0] for n, many in runs.items() if len(many[place].states)}
+    return {n: many[level].states[0] for n, many in runs.items() if len(many[level].states)}
 
 
 def _from(problem: Problem, state: Sequence[Any]) -> Problem:

@@ -15,7 +15,7 @@ import numpy
 from heavytop.cases import Case
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
-from heavytop.features.score.diagnose.diagnosis import diagnose
+from heavytop.features.score.diagnose.diagnosis import diagnose, rounded
 from heavytop.features.score.diagnose.readings import Seen, disagreement
 from heavytop.features.score.diagnose.samples import Diagnosis, FileAxes, turning_rate
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
@@ -31,9 +31,9 @@ from heavytop.measure.scalar import (
     digits_kept,
     digits_of,
     digits_right,
-    explains,
     relative_error,
     rounding,
+    roundings,
     to_ball,
 )
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
@@ -100,9 +100,9 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
     if (observed := trajectory.observed) is not None:
         seen = observed.seen(times)
         said = [] if seen is None else _disagreements(seen, times)
-        rounded = _rounded(observed, rounding(states, trajectory.precision), error)
-        if error is not None and (error <= _WORTH_ASKING or rounded):
-            return said + rounded
+        digits_written = rounded(_amplified(observed, roundings(states, trajectory.precision)), error)
+        if error is not None and (error <= _WORTH_ASKING or digits_written):
+            return said + digits_written
         lengths = _lengths(observed, times, trajectory.precision)
         if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
             return [*said, lengths]
@@ -113,15 +113,12 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
     return said + diagnose(top, start, trajectory.system, times, states, trajectory.precision, error, errors, **about)
 
 
-def _rounded(observed: Observed, written: Rounding | None, error: float | None) -> list[Diagnosis]:
-    """That the digits written explain the error of what follows from them."""
-    if written is None or error is None:
-        return []
+def _amplified(observed: Observed, written: Sequence[Rounding]) -> list[Rounding]:
+    """Roundings of the columns with the errors of what follows from them."""
     arm = math.sqrt(float(dot(observed.posed.centre, observed.posed.centre)))
     sizes = {"quaternion": 4.0, "euler": 3.0, "position": max(2.0, 2.0 / arm) if arm else 2.0}
-    amplified = replace(written, error=written.error * max(sizes.get(name, 1.0) for name in observed.names))
-    to = {"to": written.kind, "digits": str(written.digits)}
-    return [Diagnosis("rounded", to)] if explains(amplified, error) else []
+    factor = max(sizes.get(name, 1.0) for name in observed.names)
+    return [replace(rounding, error=rounding.error * factor) for rounding in written]
 
 
 def _frame(observed: Observed) -> FileAxes:

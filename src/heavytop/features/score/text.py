@@ -190,6 +190,7 @@ _SENTENCES = {
     "omega_scaled": "Ω is {factor} times what fits in these states: divided by it they fit",
     "gamma_scaled": "γ is {factor} times what fits in these states: divided by it they fit",
     "column_scaled": "{column} is {factor} times what fits in these states: divided by it they fit",
+    "column_negated": "{column} has the other sign in these states",
     "column_constant": "{column} is {value} in every state: the other five columns fit",
     "all_scaled": "Start and states give {factor}·Ω: with both divided by it they fit",
     "row_missing": "A row is missing: from t = {t} on, the states are those of the next times",
@@ -244,7 +245,8 @@ def _said(fit: Diagnosis, system: str) -> str:
         return " in these states".join(_MEANINGS[fit.kind])
     if fit.kind == "time_unit":
         return _time_unit(**numbers)
-    if (text := _SENTENCES.get(numbers.get("to", fit.kind))) is None:
+    kind = "column_negated" if (fit.kind, numbers.get("factor")) == ("column_scaled", "-1") else fit.kind
+    if (text := _SENTENCES.get(numbers.get("to", kind))) is None:
         return _integrals_off(numbers)
     more = {
         "columns_said": _columns(numbers),

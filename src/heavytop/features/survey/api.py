@@ -36,9 +36,9 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
     wanted = None if columns is None else [columns] if isinstance(columns, str) else ordered(columns, "columns", known)
     for name in wanted or ():
         if not isinstance(name, str) or name not in COLUMNS:
-            raise InputError(f"There is no column {quoted(name)} in a survey.", known)
+            raise InputError(f"column must be one of a survey; got {quoted(name)}.", known)
     if not file.is_file():
-        raise InputError(f"There is no survey at {where}.", f"Give the folder of a run that holds {FILE}.")
+        raise InputError(f"{where} holds no survey.", f"Give the folder of a run that holds {FILE}.")
     if arguments.flag(lazy, "lazy"):
         try:
             import polars

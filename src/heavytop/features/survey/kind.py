@@ -55,10 +55,10 @@ class SurveyTable(PlanTable, tag=NAME):
         """One for each sweep, of its first motion; a plan makes one of each chunk from it."""
         for name in self.cases:
             if not name.startswith(_SWEEP):
-                raise InputError(f"A survey of {quoted(name)} is none of a sweep.", "Name sweeps: sweep:NAME.")
+                raise InputError(f"A survey must name a sweep; got {quoted(name)}.", "Name sweeps: sweep:NAME.")
         precision = parse(self.precision)
         if precision not in (DOUBLE, EXTENDED):
-            raise InputError(f"There is no survey in {precision.name}.", "Use double or extended.")
+            raise InputError(f"precision must be that of a survey; got {precision.name}.", "Use double or extended.")
         (horizon,) = positive([self.horizon], "horizon")
         if self.tolerance:
             positive([self.tolerance], "tolerance")

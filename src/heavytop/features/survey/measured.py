@@ -106,7 +106,7 @@ class Drawn:
     @property
     def classes(self) -> list[str]:
         """The class of each motion, by the further integrals that it has."""
-        return [_class(each) for each in self.integrals]
+        return [_class(integral) for integral in self.integrals]
 
 
 def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
@@ -119,20 +119,20 @@ def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
         further = _may_have_more(numbers)
         integrals = [_integrals(cases[index]) if more else _ALWAYS for index, more in zip(places, further, strict=True)]
         return Drawn(
-            Lazy(chunk.count, lambda place: _problem(numbers[place])),
+            Lazy(chunk.count, lambda index: _problem(numbers[index])),
             integrals,
             Pairs.of(numbers),
         )
-    given = [cases[index] for index in places]
+    cases_drawn = [cases[index] for index in places]
     if seed:
-        given = [replace(case, top=scaled(case.top, factor(seed))) for case in given]
-    problems = [Problem.of(case.top, case.start, precision, case.system) for case in given]
-    return Drawn(problems, [_integrals(case) for case in given], _drawn_pairs(problems))
+        cases_drawn = [replace(case, top=scaled(case.top, factor(seed))) for case in cases_drawn]
+    problems = [Problem.of(case.top, case.start, precision, case.system) for case in cases_drawn]
+    return Drawn(problems, [_integrals(case) for case in cases_drawn], _drawn_pairs(problems))
 
 
 def _drawn_pairs(problems: Sequence[Problem]) -> Pairs:
     """Their numbers, which two doubles hold: of formats of 106 bits at most."""
-    rows = [[*each.system.entering(each.parameters), *each.start.flat] for each in problems]
+    rows = [[*problem.system.entering(problem.parameters), *problem.start.flat] for problem in problems]
     high = numpy.array(rows, float)
     low = [
         [float(v - Fraction(h)) for v, h in zip(*pair, strict=True)] for pair in zip(rows, high.tolist(), strict=True)
@@ -156,8 +156,8 @@ def _rounded(numbers: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
 
 def _problem(numbers: NDArray[numpy.float64]) -> Problem:
     i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
-    given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
-    return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)
+    parameters = Parameters((i1, i2, i3), (n1, n2, n3), 0)
+    return Problem(HEAVY_TOP, DOUBLE, parameters, State((w1, w2, w3), (g1, g2, g3)), None)
 
 
 def _may_have_more(p: Any) -> Any:
@@ -167,7 +167,7 @@ def _may_have_more(p: Any) -> Any:
 
 
 def _class(integrals: Sequence[Integral]) -> str:
-    classes = [kind for each in integrals for name, kind in _CLASSES.items() if each.name.rstrip("123") == name]
+    classes = [kind for integral in integrals for name, kind in _CLASSES.items() if integral.name.rstrip("123") == name]
     return classes[-1] if classes else GENERAL
 
 
@@ -201,10 +201,10 @@ def measured(
     with numpy.errstate(all="ignore"):
         wrong = (outcomes == Outcome.SUCCESS.value) & ~numpy.isfinite(states.high).all(axis=(1, 2))
         outcomes[wrong] = Outcome.NON_FINITE.value
-        found = _errors(states, truth, times, precision)
-        found |= _drifts(drawn, states)
+        errors = _errors(states, truth, times, precision)
+        errors |= _drifts(drawn, states)
     _require_agreement(drawn.problems[0], times, truth, float(apart[0]))
-    return {"outcome": outcomes.tolist(), "steps": steps} | found | {"reference_radius": apart}
+    return {"outcome": outcomes.tolist(), "steps": steps} | errors | {"reference_radius": apart}
 
 
 def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> bool:
@@ -222,11 +222,11 @@ def _runs(
     outcomes, steps = numpy.full(count, Outcome.SUCCESS.value, object), numpy.zeros(count, int)
     states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
     if integrator == described(HEYOKA) and _usual(drawn, times, precision):
-        given = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
-        found, steps, good = states_on_a_grid(drawn.system, *given, times, **options)
-        states = Pairs(found, numpy.zeros_like(found))
+        data = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
+        samples, steps, good = states_on_a_grid(drawn.system, *data, times, **options)
+        states = Pairs(samples, numpy.zeros_like(samples))
     rest = numpy.flatnonzero(~good)
-    problems = [drawn.problems[place] for place in rest.tolist()]
+    problems = [drawn.problems[index] for index in rest.tolist()]
     if problems:
         runs = _one_by_one(integrator, problems, times, options)
         outcomes[rest] = [run[0] for run in runs]
@@ -265,15 +265,15 @@ def _alone(
 def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
     """(motions, samples, 6) of native states, exact in two doubles; NaN where there is none."""
     high, low = (numpy.full((len(states), samples, 6), math.nan) for _ in range(2))
-    for place, run in enumerate(states):
+    for index, run in enumerate(states):
         if not len(run):
             continue
         rows = numpy.asarray(run)[:samples, :6]
         if rows.dtype == numpy.float64:
-            high[place, : len(rows)], low[place, : len(rows)] = rows, 0.0
+            high[index, : len(rows)], low[index, : len(rows)] = rows, 0.0
             continue
         first = rows.astype(float)
-        high[place, : len(rows)], low[place, : len(rows)] = first, (rows - first).astype(float)
+        high[index, : len(rows)], low[index, : len(rows)] = first, (rows - first).astype(float)
     return Pairs(high, low)
 
 
@@ -282,11 +282,11 @@ def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tup
     short motions often agree in every bit.
     """
     tolerances = _TOLERANCES if precision == DOUBLE else (None, _TOLERANCES[0])
-    found = [_reference(drawn, times, precision, tolerance) for tolerance in tolerances]
+    references = [_reference(drawn, times, precision, tolerance) for tolerance in tolerances]
     with numpy.errstate(all="ignore"):
-        apart = numpy.abs((found[0] - found[1]).high).max(axis=(1, 2))
-        size = numpy.abs(found[0].high).max(axis=(1, 2))
-        return found[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
+        apart = numpy.abs((references[0] - references[1]).high).max(axis=(1, 2))
+        size = numpy.abs(references[0].high).max(axis=(1, 2))
+        return references[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
 
 
 def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
@@ -297,7 +297,7 @@ def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, to
         numbers = drawn.numbers.high
         states, good = double_double_states(numbers[:, :6], numbers[:, 6:], times, tolerance, _STEP_LIMIT)
     rest = numpy.flatnonzero(~good)
-    problems = [replace(drawn.problems[place], precision=DOUBLE_DOUBLE) for place in rest.tolist()]
+    problems = [replace(drawn.problems[index], precision=DOUBLE_DOUBLE) for index in rest.tolist()]
     if problems:
         targets = [number(time, DOUBLE_DOUBLE) for time in times]
         runs = propagate_multiword_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
@@ -329,8 +329,8 @@ def _errors(states: Pairs, truth: Pairs, times: Sequence[Fraction], precision: P
 def _drifts(drawn: Drawn, states: Pairs) -> Columns:
     """The largest |I(t) - I(0)| over the samples, of each integral from the rounded start."""
     groups: dict[Any, list[int]] = defaultdict(list)
-    for place, integrals in enumerate(drawn.integrals):
-        groups[tuple((i.name, _axes(i)) for i in integrals)].append(place)
+    for index, integrals in enumerate(drawn.integrals):
+        groups[tuple((i.name, _axes(i)) for i in integrals)].append(index)
     drifts = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
     parameters, start = drawn.parameters, drawn.start
     for places in groups.values():
@@ -359,12 +359,12 @@ def _require_agreement(problem: Problem, times: Sequence[Fraction], truth: Pairs
     known = known_motion(problem, times[-1])
     if not isinstance(known, Known):
         return
-    for place, time in enumerate(times):
+    for index, time in enumerate(times):
         if not known.truth.covers(time):
             continue
         balls = known.truth.state(time, DOUBLE_DOUBLE.bits)
         for k, ball in enumerate(balls):
-            computed = Fraction(float(truth.high[0, place, k])) + Fraction(float(truth.low[0, place, k]))
+            computed = Fraction(float(truth.high[0, index, k])) + Fraction(float(truth.low[0, index, k]))
             middle = exact(midpoint(ball))
             off = abs(computed - middle) - exact(radius(ball))
             if off > _RADII * Fraction(apart) + Fraction(_FLOOR) * (1 + abs(middle)):

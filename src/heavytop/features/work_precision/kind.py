@@ -105,7 +105,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
         """A task for each row."""
         (horizon,) = positive([self.horizon], "horizon")
         times, keep = uniform(horizon, self.samples)
-        points = [(parse(each.precision), subject) for each in self.ladders for subject in each.subjects()]
+        points = [(parse(curve.precision), subject) for curve in self.ladders for subject in curve.subjects()]
         options = Options(self.timings, self.attitude)
         request = {"attitude": str(self.attitude)}
         more = {"suffix": f"/T={self.horizon}", "keep": keep, "options": options, "request": request}
@@ -118,7 +118,7 @@ class WorkPrecisionTable(PlanTable, tag=NAME):
     def with_integrator(self, which: str | IntegratorSource) -> PlanTable | None:
         """Four points of a curve in double, and the finest in other formats, where heyoka has a curve."""
         integrator = name_of(which)
-        formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
+        formats = dict.fromkeys(parse(curve.precision).name for curve in self.ladders if curve.integrator == OURS)
         control = registry.control_apart(which) if DOUBLE.name in formats else ""
         ladders = [
             Curve(integrator, name, **{"steps" if control == "step" else "tolerances": _RUNGS[control]})
@@ -233,10 +233,10 @@ class WorkPrecision(Kind):
         """Who is fastest at 1e-10 and by how much; a table a case; how heyoka compares, a sentence a case.  In short an
         integrator beside heyoka, setting by setting, where there is one.
         """
-        if (found := fastest(rows)) is not None:
-            yield found
-        for place, (case, lines) in enumerate(panels(rows).items()):
-            yield _table("" if place else _TITLE, case, lines)
+        if (headline := fastest(rows)) is not None:
+            yield headline
+        for index, (case, lines) in enumerate(panels(rows).items()):
+            yield _table("" if index else _TITLE, case, lines)
         yield from (Note(lead.text) for lead in leads(rows))
         shorter = [Note(f"{lead.case}: {lead.short}.", shown=In.SHORT) for lead in leads(rows) if lead.short]
         yield from beside_ours(rows) or shorter
@@ -253,11 +253,11 @@ def _table(title: str, case: str, lines: Sequence[WorkPrecisionLine]) -> Cells:
     cells = []
     for line in lines:
         best = line.best
-        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", line.takes(best.seconds)]
+        texts = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", line.takes(best.seconds)]
         at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
-        found += ["-" if seconds is None else line.takes(seconds) for seconds in at]
-        found.append(line.order_text)
-        cells.append([line.label, *found, str(len(line.failures) or "")])
+        texts += ["-" if seconds is None else line.takes(seconds) for seconds in at]
+        texts.append(line.order_text)
+        cells.append([line.label, *texts, str(len(line.failures) or "")])
     columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "order", "aborted"]
     return Cells(title, columns, cells)
 
@@ -291,8 +291,8 @@ def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
 
 def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
     """The largest drifts, and the errors."""
-    found = ((each.quantity, each) for each in scorer.drift.metrics().values())
-    metrics = {quantity: each for quantity, each in found if quantity and quantity.statistic == "max"}
+    measures = ((metric.quantity, metric) for metric in scorer.drift.metrics().values())
+    metrics = {quantity: metric for quantity, metric in measures if quantity and quantity.statistic == "max"}
     if scorer.error is not None and sampled:
         omega, gamma = (scorer.error.running[part] for part in ("omega", "gamma"))
         metrics[ERROR_FINAL] = metric(omega.final.max(gamma.final))
@@ -306,9 +306,9 @@ def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
 def _of_attitude(task: Task) -> dict[Quantity, Metric]:
     """The largest errors of attitude and position."""
     _, scorer = run_with_attitude(task)
-    measured = ((each.quantity, each) for each in scorer.metrics().values())
+    measured = ((metric.quantity, metric) for metric in scorer.metrics().values())
     names = (ATTITUDE_ERROR, POSITION_ERROR)
-    return {q: each for q, each in measured if q is not None and q.name in names and q.statistic == "max"}
+    return {q: metric for q, metric in measured if q is not None and q.name in names and q.statistic == "max"}
 
 
 def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:

@@ -138,19 +138,19 @@ class Stepper(SampledRun):
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
         return self.engine.tc.copy()
 
-    def take_up(self, place: ResumePoint, covered: Any) -> None:
+    def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
         """Go on from there and take the step again that covers the last sample.
 
         Raises ValueError for a state of another length.
         """
-        if len(place.state) != len(self.engine.state):
-            raise ValueError(f"a state of {len(place.state)} numbers")
-        self.engine.state[:] = numpy.array(place.state)
-        self.engine.dtime = place.time
-        self.steps, self.time = place.steps, self.engine.time
+        if len(resume_point.state) != len(self.engine.state):
+            raise ValueError(f"a state of {len(resume_point.state)} numbers")
+        self.engine.state[:] = numpy.array(resume_point.state)
+        self.engine.dtime = resume_point.time
+        self.steps, self.time = resume_point.steps, self.engine.time
         self.reach(covered)
         if self.rest is None:
-            place.require_covered(self.steps)
+            resume_point.require_covered(self.steps)
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> ResumePoint:
         """Where the last step began."""

@@ -62,9 +62,9 @@ class _Motion(LaneRun):
 
     def native(self, words: Doubles) -> Any:
         """A state in words of its units, rounded to the format; None where a number is too large for it."""
-        each = zip(words[:6].tolist(), words[6:].tolist(), self.exponents, strict=True)
-        found = sums_of_two(each, self.problem.precision)
-        return self.exactly(exact_state(words)) if found is None else numpy.array(found)
+        pairs = zip(words[:6].tolist(), words[6:].tolist(), self.exponents, strict=True)
+        numbers = sums_of_two(pairs, self.problem.precision)
+        return self.exactly(exact_state(words)) if numbers is None else numpy.array(numbers)
 
     def exactly(self, state: tuple[Fraction, ...]) -> Any:
         """An exact state, rounded to the format; None where a number is too large for it."""
@@ -184,8 +184,8 @@ class WordsLanes:
 
     def _sample(self, eight: Eight) -> None:
         """The next time of every motion: each lane that is left waits for it."""
-        found = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
-        for lane, words in found.items():
+        samples = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
+        for lane, words in samples.items():
             motion = self.lanes[lane]
             if self._record(motion, motion.native(words)):
                 self._aim(eight, lane)
@@ -450,9 +450,9 @@ class _Grid:
 
     def advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
         """All these motions, those of like rates side by side; gives those that need a larger n0."""
-        place = numpy.empty(len(self.order), int)
-        place[self.order] = numpy.arange(len(self.order))
-        ordered = pending[numpy.argsort(place[pending])]
+        position = numpy.empty(len(self.order), int)
+        position[self.order] = numpy.arange(len(self.order))
+        ordered = pending[numpy.argsort(position[pending])]
         eight = Eight(HEAVY_TOP, arithmetic.in_lanes, low_order)
         larger = []
         for first in range(0, len(ordered), LANES):
@@ -485,12 +485,12 @@ class _Grid:
 def _constants(parameters: NDArray[numpy.float64]) -> Doubles:
     """The coefficients of Ω × Ω and of the linear part, read off the field, three words each: (k, 3, motions)."""
     numbers = [Numerators(column, numpy.zeros(1)) for column in parameters.T]
-    given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
+    rounded = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
 
     def rate(component: int, *axes: int) -> Any:
-        return HEAVY_TOP.field(given, [sum((_UNITS[axis][i] for axis in axes), 0.0) for i in range(6)])[component]
+        return HEAVY_TOP.field(rounded, [sum((_UNITS[axis][i] for axis in axes), 0.0) for i in range(6)])[component]
 
-    cyclic = [each for each in permutations(range(3)) if each in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+    cyclic = [order for order in permutations(range(3)) if order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
     products = [rate(i, j, k) for i, j, k in cyclic]
     return numpy.array([*products, *(rate(component, source) for _, component, source in terms(HEAVY_TOP))])
 

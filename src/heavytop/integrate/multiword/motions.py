@@ -79,10 +79,10 @@ def propagate_multiword(
     Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
-    given = check_times(times)
+    instants = check_times(times)
     # doubles serve here as they are: to make reals of them takes as long as hundreds of steps
     wide = precision.bits >= DOUBLE.bits
-    targets = given.numbers if wide and isinstance(given, DoubleTimes) else numbers(given, precision)
+    targets = instants.numbers if wide and isinstance(instants, DoubleTimes) else numbers(instants, precision)
     return integrate_to_samples(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
 
 
@@ -111,7 +111,9 @@ def integrate_to_samples(
         _require_reach(problem, scaled, exact(targets[-1]))
     times: Sequence[Fraction]
     states: Any
-    if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
+    if all(option is None for option in (step_limit, observer, between, place, mark)) and _are_many(
+        pace, targets, problem
+    ):
         outcome, count, make = pace.sampled(targets, problem.precision)
         times, states = RoundedTimes(targets[:count]), make
         seconds = perf_counter() - began
@@ -177,14 +179,14 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
     """
     if precision.bits < DOUBLE.bits or precision.family == "quad":
         return None
-    widen, found = _widening(precision), []
+    widen, sums = _widening(precision), []
     for high, low, exponent in words:
         total = high + low
         if not (total == 0 or 1 / _LARGE < abs(total) < _LARGE) or abs(exponent) > _LARGE_EXPONENT:
             return None
         # a zero has no sign
-        found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
-    return found
+        sums.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
+    return sums
 
 
 def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
@@ -198,9 +200,9 @@ def _sums_of_columns(pair: Sequence[Doubles], sizes: Doubles, precision: Precisi
     lows = lows * sizes
     odd |= _outside(lows, _LEAST_LOW, math.inf)
     if precision.family == "extended":
-        found = (highs * sizes + 0.0).astype("longdouble")
-        found += lows
-        return found, odd
+        sums = (highs * sizes + 0.0).astype("longdouble")
+        sums += lows
+        return sums, odd
     return _added(_widening(precision)(0.0), [highs * sizes, lows]), odd
 
 
@@ -214,10 +216,10 @@ def _outside(values: Doubles, least: float, most: float) -> Any:
 
 def _added(start: Array, arrays: Sequence[Doubles]) -> Array:
     """start + the first + the second …, in the numbers of ``start``: one array of them is made, not one a sum."""
-    found = start + arrays[0]
-    for each in arrays[1:]:
-        found += each
-    return found
+    total = start + arrays[0]
+    for array in arrays[1:]:
+        total += array
+    return total
 
 
 def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array:
@@ -233,19 +235,19 @@ def _reals(words: list[Doubles], grid: Grid, sizes: Doubles, bits: int) -> Array
     if first > 0 and all(((abs(word) >= least) | (word == 0)).all() for word in words[first:]):
         if early := least * sizes.min() > _LEAST_LOW:
             words = [word * sizes for word in words]
-        found = _added(zero, words[:first])
+        sums = _added(zero, words[:first])
         for column in range(len(sizes)):
             rest = [word[:, column] for word in words[first:] if word[:, column].any()]
             if rest:
-                found[:, column] += rest[0] if len(rest) == 1 else _added(zero, rest)
+                sums[:, column] += rest[0] if len(rest) == 1 else _added(zero, rest)
         if early:
-            return found
+            return sums
     else:
         total = _added(heyoka.real(0, _EVERY_BIT), words)
         rounded = [heyoka.real(value, bits) for value in total.ravel()]
-        found = numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
-    found *= scale
-    return found
+        sums = numpy.array(rounded, dtype=heyoka.real).reshape(total.shape)
+    sums *= scale
+    return sums
 
 
 def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precision) -> tuple[Array, Any]:
@@ -253,11 +255,11 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
     only exact numbers tell.
     """
     heyoka = import_heyoka()
-    each = [words[:, k] for k in range(words.shape[1])]
+    columns = [words[:, k] for k in range(words.shape[1])]
     if precision.family == "real":
-        return _reals(each, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
+        return _reals(columns, grid, sizes, precision.bits), numpy.zeros(len(words), bool)
     # two words fill a quad, and what the others add to is added to them at once
-    first, second, third, *smaller = (word * sizes for word in each)
+    first, second, third, *smaller = (word * sizes for word in columns)
     rest, odd = third.astype(heyoka.real128), numpy.zeros(len(words), bool)
     for word in smaller:
         for column in numpy.flatnonzero(word.any(axis=0)):
@@ -265,14 +267,17 @@ def _sums_of_words(words: Doubles, grid: Grid, sizes: Doubles, precision: Precis
             total = own + added
             odd |= (total - own != added) | (total - added != own)
             rest[:, column] = total
-    found = first.astype(heyoka.real128) + second
-    found += rest
-    return found, odd
+    result = first.astype(heyoka.real128) + second
+    result += rest
+    return result, odd
 
 
 def _exact_sums(words: Iterable[Doubles]) -> tuple[Fraction, ...]:
     """The sum of the words of each component."""
-    return tuple(sum(map(Fraction, each), Fraction(0)) for each in zip(*(word.tolist() for word in words), strict=True))
+    return tuple(
+        sum(map(Fraction, words_of_number), Fraction(0))
+        for words_of_number in zip(*(word.tolist() for word in words), strict=True)
+    )
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:
@@ -327,9 +332,9 @@ class _Pace(SampledRun):
             outcome, count, make = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
             return outcome, count + 1, lambda: numpy.concatenate([[start], make()])
-        found = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
+        sampler = self._of_a_grid if isinstance(self.run, Fixed) else self._of_two_words
         sizes = numpy.array([float(size) for size in self.scaled.sizes])
-        status, count, others, make = found(targets, sizes, precision)
+        status, count, others, make = sampler(targets, sizes, precision)
         outcome, known = OUTCOMES[status], dict[int, Any]()
         for row, state in sorted(others.items()):
             rounded = None if state is None else native_state(self.scaled.back(state), precision)
@@ -354,16 +359,16 @@ class _Pace(SampledRun):
         times, rate = numpy.asarray(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
         highs = times.astype(float)
         lows = numpy.zeros(len(times)) if (times == highs).all() else (times - highs).astype(float)
-        places = [[place + word for place in PLACES[: len(sizes)]] for word in (0, 8)]
+        places = [[index + word for index in PLACES[: len(sizes)]] for word in (0, 8)]
         is_double, count, others = precision == DOUBLE, 0, dict[int, tuple[Fraction, ...]]()
         kept = [numpy.empty((len(times), len(sizes))) for _ in range(1 if is_double else 2)]
         for words in self.run.sampled(highs * rate, lows * rate):
-            found = [words.take(each, 1) for each in places]
+            sums = [words.take(indices, 1) for indices in places]
             if is_double:
-                total, odd = _sums_of_columns(found, sizes, precision)
-                others |= {count + int(row): _exact_sums(word[row] for word in found) for row in numpy.flatnonzero(odd)}
-                found = [total]
-            for array, values in zip(kept, found, strict=True):
+                total, odd = _sums_of_columns(sums, sizes, precision)
+                others |= {count + int(row): _exact_sums(word[row] for word in sums) for row in numpy.flatnonzero(odd)}
+                sums = [total]
+            for array, values in zip(kept, sums, strict=True):
                 array[count : count + len(words)] = values
             count += len(words)
 
@@ -379,9 +384,9 @@ class _Pace(SampledRun):
 
     def _of_a_grid(self, targets: Any, sizes: Doubles, precision: Precision) -> Any:
         assert isinstance(self.run, Fixed)
-        given, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
-        times: Doubles = given.astype(float)
-        if (given == times).all():  # the rate is a power of two
+        instants, rate, grid = numpy.asarray(targets), self.scaled.rate, self.run.grid
+        times: Doubles = instants.astype(float)
+        if (instants == times).all():  # the rate is a power of two
             status, words, others = self.run.sampled(abs(times) * float(rate))
         else:
             status, words, others = self.run.sampled([abs(exact(target)) * rate for target in targets])
@@ -425,11 +430,11 @@ class _Pace(SampledRun):
         words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
         return ResumePoint(samples, (), (), steps, seconds, flags, words)
 
-    def take_up(self, place: ResumePoint, covered: Any) -> None:
+    def take_up(self, resume_point: ResumePoint, covered: Any) -> None:
         """Go on from there; takes the step again that covers the last sample."""
-        if place.words:
-            self.run.restore(place.words, place.steps)
+        if resume_point.words:
+            self.run.restore(resume_point.words, resume_point.steps)
             self.reach(exact(covered))
-            place.require_covered(self.run.steps)
-            if self.run.place() != place.words:
+            resume_point.require_covered(self.run.steps)
+            if self.run.place() != resume_point.words:
                 raise ValueError("words that are no state of this arithmetic")

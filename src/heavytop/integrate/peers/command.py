@@ -113,7 +113,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     @property
     def declared(self) -> Declared:
         """Its capabilities."""
-        singular = tuple(vector(map(str, each), "singular_at") for each in self.singular_at)
+        singular = tuple(vector(map(str, point), "singular_at") for point in self.singular_at)
         able = self.systems, self.directions, self.precisions, self.attitude
         return Declared(*able, self.one_step, self.fixed_grid, singular)
 
@@ -132,12 +132,12 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     def argv(self) -> list[str]:
         """The program as an absolute path and its arguments; raises PeerFailed where there is none to run."""
         program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
-        place = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
-        if not os.path.isfile(place):
-            raise PeerFailed(f"{self.name}: there is no program {said(program)}")
-        if not os.access(place, os.X_OK):
+        path = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
+        if not os.path.isfile(path):
+            raise PeerFailed(f"{self.name}: the program {said(program)} does not exist")
+        if not os.access(path, os.X_OK):
             raise PeerFailed(f"{self.name}: {said(program)} is not executable")
-        return [os.path.abspath(place), *rest]
+        return [os.path.abspath(path), *rest]
 
 
 class CommandIntegrator:
@@ -178,16 +178,16 @@ class CommandIntegrator:
             reply = program.ask(request)
         return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
 
-    def _control(self, given: dict[str, Fraction], precision: Precision) -> Fraction | None:
+    def _control(self, settings: dict[str, Fraction], precision: Precision) -> Fraction | None:
         control = self.command.control
-        for name in given:
+        for name in settings:
             if name != control:
                 raise InputError(
                     f"The integrator {self.command.name} has no {name}.", f"It is set by: {control or '-'}."
                 )
         if not control:
             return None
-        value = given.get(control)
+        value = settings.get(control)
         if value is None:
             return self.default(precision)
         if value <= 0 or (control == "tolerance" and value > 1):
@@ -358,8 +358,8 @@ class Reply:
 
         0 where anything about them is odd: each line is then looked at by itself, and says what.
         """
-        place = len(self.states)
-        count = min(len(lines), len(self._doubles) - place)
+        index = len(self.states)
+        count = min(len(lines), len(self._doubles) - index)
         block = b" ".join(lines[:count])
         if count < 2 or block.translate(None, _OF_STATES) or b"-0 " in block + b" ":  # as an integer -0 has no sign
             return 0
@@ -373,7 +373,7 @@ class Reply:
         except msgspec.DecodeError:  # 1. or +1, which JSON does not know; or NaN
             return 0
         values = numpy.array(numbers).reshape(count, width - 1)
-        if values[:, 0].tolist() != self._doubles[place : place + count] or not numpy.isfinite(values).all():
+        if values[:, 0].tolist() != self._doubles[index : index + count] or not numpy.isfinite(values).all():
             return 0
         self.states += list(values[:, 1:].copy())
         return count
@@ -397,7 +397,7 @@ class Reply:
             self.failure = said(" ".join(words[1:])) or "without a reason"
             return True
         if words[0] != "done":
-            raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which is no line of the protocol")
+            raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which the protocol does not know")
         self._take_counts(words[1:])
         if self.due:
             raise PeerFailed(f"{self.name} said done after {len(self.states)} of {len(self.request.times)} states")
@@ -410,13 +410,13 @@ class Reply:
             raise PeerFailed(f"{self.name} wrote {said(line[:40])}, which is not UTF-8") from None
 
     def _take_state(self, words: list[str]) -> None:
-        place, width = len(self.states), self.request.width
-        if place >= len(self.request.times):
-            raise PeerFailed(f"{self.name} wrote more states than the {place} times that it was asked for")
+        index, width = len(self.states), self.request.width
+        if index >= len(self.request.times):
+            raise PeerFailed(f"{self.name} wrote more states than the {index} times that it was asked for")
         if len(words) != 1 + width:
             raise PeerFailed(f"{self.name} wrote a state of {len(words) - 1} numbers after its time instead of {width}")
         time, *values = (self._number(word) for word in words)
-        due = self.request.times[place]
+        due = self.request.times[index]
         if time is None or exact(time) != due:
             shown = decimal_text(due, 17)
             raise PeerFailed(f"{self.name} wrote the state at {said(words[0])} where that at {shown} was due")
@@ -502,8 +502,8 @@ class Session:
         except OSError as error:
             self._guard.end()
             raise PeerFailed(f"{self.name} cannot be started: {said(error)}") from None
-        self._pipes = [each for each in (self.process.stdin, self.process.stdout, self.process.stderr) if each]
-        self._in, self._out, self._err = (each.fileno() for each in self._pipes)
+        self._pipes = [pipe for pipe in (self.process.stdin, self.process.stdout, self.process.stderr) if pipe]
+        self._in, self._out, self._err = (pipe.fileno() for pipe in self._pipes)
         for descriptor in (self._in, self._out, self._err):
             os.set_blocking(descriptor, False)
         self._poll = select.poll()
@@ -591,13 +591,13 @@ class Session:
             return False
         *lines, self._unread = self._unread.split(b"\n")
         taken = reply.take_states(lines)
-        for place, line in enumerate(lines[taken:], taken + 1):
+        for count, line in enumerate(lines[taken:], taken + 1):
             try:
                 last = reply.take(line)
             except PeerFailed as error:
                 raise self._failed(error.cause.removeprefix(f"{self.name} "), error.answered) from None
             if last:
-                if place < len(lines) or self._unread:
+                if count < len(lines) or self._unread:
                     raise self._failed(f"wrote more after {said(repr(line.decode('utf-8', 'replace')))}")
                 return True
         return False
@@ -606,16 +606,16 @@ class Session:
         if self._err in readable:
             self._read_errors()
         if self._out in readable:
-            found = self._read(self._out)
-            if found == b"":
+            data = self._read(self._out)
+            if data == b"":
                 raise self._failed(f"{self._end()} before it said {awaited}")
-            self._unread += found or b""
+            self._unread += data or b""
 
     def _drained(self) -> bool:
         """Whether a program that has ended left something to read."""
-        found = self._read(self._out)
-        self._unread += found or b""
-        return bool(found)
+        data = self._read(self._out)
+        self._unread += data or b""
+        return bool(data)
 
     def _read(self, descriptor: int) -> bytes | None:
         """The bytes that are there; empty at the end, None where nothing is there yet."""
@@ -625,11 +625,11 @@ class Session:
             return None
 
     def _read_errors(self) -> None:
-        found = self._read(self._err)
-        if found == b"":
+        data = self._read(self._err)
+        if data == b"":
             with suppress(KeyError):
                 self._poll.unregister(self._err)
-        self._errors = (self._errors + (found or b""))[-_MOST_ERRORS:]
+        self._errors = (self._errors + (data or b""))[-_MOST_ERRORS:]
 
     def _end(self) -> str:
         with suppress(subprocess.TimeoutExpired):
@@ -677,8 +677,8 @@ _lock = Lock()
 def session(command: Command) -> Iterator[Session]:
     """A running program of its own for the caller's thread, ended where anything goes wrong, else kept for the next."""
     with _lock:
-        found = _idle.get(command, [])
-        program = found.pop() if found else None
+        sessions = _idle.get(command, [])
+        program = sessions.pop() if sessions else None
     if program is not None and program.lost_between_rows:
         program.close()
         program = None
@@ -703,7 +703,7 @@ def begin_row() -> None:
 def close_all() -> None:
     """Ends every program that is not in use."""
     with _lock:
-        programs = [program for found in _idle.values() for program in found]
+        programs = [program for sessions in _idle.values() for program in sessions]
         _idle.clear()
     for program in programs:
         program.close(_FAREWELL)

@@ -228,7 +228,7 @@ def of_quaternion(name: str, problem: Problem, state: Sequence[Any]) -> Any:
     """(Ω, γ), or (Ω, γ, ξ) of a problem with ξ, as numbers of the format, from (Ω, w, x, y, z), q of any length."""
     omega, q = state[:3], [exact(value) for value in state[3:]]
     if not any(q):
-        raise PeerFailed(f"{name} returned a quaternion that is 0, which is no attitude")
+        raise PeerFailed(f"{name} returned a quaternion that is zero")
     rows = rotation_of(q)
     vectors = rows[2] if problem.xi is None else (*rows[2], *rows[0])
     return numpy.array([*omega, *(number(value, problem.precision) for value in vectors)])
@@ -306,17 +306,17 @@ class CheckedPlugin:
             if self.declared.fixed_grid:
                 beside["step"] = self.declared.step(self.name, beside.get("step", DEFAULT_STEP), times)
         # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
-        given: list[Any]
+        arguments: list[Any]
         own: dict[str, Any]
         try:
-            *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
+            *arguments, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, beside)))
         except pickle.PicklingError as error:
             raise PeerFailed(f"{self.name} replaced modules of heavytop: {said(error)}") from None
         parts = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
             seconds = stopwatch()
             try:
-                run = self.call(*given, system=system, **own)
+                run = self.call(*arguments, system=system, **own)
                 spent = seconds()
             finally:
                 changed = [name for name, part in parts.items() if getattr(system, name) is not part]

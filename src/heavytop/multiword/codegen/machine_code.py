@@ -139,7 +139,7 @@ def compiled(module: ir.Module, signatures: Signatures, processor: Processor | N
 
 
 def _target(processor: Processor | None) -> Any:
-    """What compiles for a processor."""
+    """The compiler for a processor."""
     global _started
     from llvmlite import binding
 

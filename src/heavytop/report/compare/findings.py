@@ -22,7 +22,7 @@ from heavytop.measure.scorer import ERRORS, OBSERVED_ORDER, ORDER_OF_RUNS, SOLUT
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
-from heavytop.report.document.document import clip, short
+from heavytop.report.document.document import clip, integral_text, short
 
 MOST, _LONGEST, _CLIPPED = 8, 300, 20
 """Sentences, characters of one, and those that say how long a clipped text is."""
@@ -249,7 +249,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
     named = frozenset[Identity]().union(*(each.rows for each in ranked))
     rest = [change for change in changes.rows if change.identity not in named]
-    end = f"{plural(len(rest), 'other row')} changed." if rest else "Nothing else changed."
+    end = f"{plural(len(rest), 'other row')} changed." if rest else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
     return [clip(text, _LONGEST) for text in (*(each.text for each in ranked), *still, end, *beside)]
@@ -542,7 +542,7 @@ def _quantity(quantity: Quantity | None, name: str) -> str:
         return clip(name, 60)
     what = _WORDS.get(quantity.name, quantity.name.replace("_", " "))
     component = quantity.component
-    return f"{what} {_COMPONENTS.get(component, component.replace('_', ' '))}".strip()
+    return f"{what} {_COMPONENTS.get(component, integral_text(component))}".strip()
 
 
 def _others_moved(changes: Changes, rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:

@@ -214,7 +214,7 @@ def _not_negative(name: str, value: str | float) -> None:
 def glob(pattern: str) -> re.Pattern[str]:
     """A pattern of `*`, `?` and `[...]`; raises InputError for an empty one, or one whose bracket is not closed."""
     if not pattern or pattern.count("[") > pattern.count("]"):
-        raise InputError(f"{pattern!r} is no glob pattern.", "Use *, ? and [...], such as drift_*_max.")
+        raise InputError(f"A pattern must be a glob; got {pattern!r}.", "Use *, ? and [...], such as drift_*_max.")
     return re.compile(translate(pattern))
 
 
@@ -375,7 +375,7 @@ def apart(size: float, gap: float) -> float:
 def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: float) -> bool:
     """Whether value and band of the candidate together exceed those of the baseline: only then its noise matters.
 
-    What the value itself has gained, the noise may take of it, up to the allowed loss.
+    A gain of the value itself may be offset by noise, up to the allowed loss.
     """
     if new.kind == "value":
         return True

@@ -472,7 +472,7 @@ class RowComparison:
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
-                counts = [f"{len(each.values)} samples" for each in (series, match)]
+                counts = [f"{len(samples.values)} samples" for samples in (series, match)]
                 yield Finding(key, name, judged[0], counts[0], counts[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:

@@ -48,6 +48,7 @@ def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
 
 
 _INTEGRALS = {"gamma_squared": "|γ|²", "momentum_squared": "|M|²", "area": "M·γ"}
+_INTEGRALS |= {f"spin{axis}": f"Ω{axis}" for axis in (1, 2, 3)}  # about an axis of symmetry
 
 
 def integral_text(name: str) -> str:

@@ -63,6 +63,6 @@ class WorseMotions(msgspec.Struct, frozen=True):
         return f"{self.worse} of {self.joined} motions of {name} got worse; {self.first[0].text}."
 
     def to_json(self) -> dict[str, Any]:
-        """One of the surveys of `compare --json`."""
+        """An entry of the surveys of `compare --json`."""
         document = {"joined": self.joined, "worse": self.worse, "reason": self.reason}
         return self.row.named | document | {"motions": [msgspec.structs.asdict(motion) for motion in self.first]}

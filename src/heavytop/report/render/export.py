@@ -90,7 +90,7 @@ def measures(row: Row) -> Iterator[Measure]:
 def export(report: Report, to: str, kinds: Kinds) -> str:
     """The text of the file for that tool; raises InputError for another."""
     if to not in FORMATS:
-        raise InputError(f"There is no export to {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
+        raise InputError(f"The format of an export must be known; got {quoted(to)}.", f"Use {', '.join(FORMATS)}.")
     return str(resolve_name(FORMATS[to])(report, kinds))
 
 

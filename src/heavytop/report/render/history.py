@@ -65,12 +65,12 @@ def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[
     for number in range(1, len(reports)):
         for finding in compare(reports[number - 1], reports[number], policy, kinds).changed:
             identity = finding.row._replace(versions=())
-            found = track(identity, finding.metric)
-            found.steps[number] = finding.verdict, finding.reason
+            tracked = track(identity, finding.metric)
+            tracked.steps[number] = finding.verdict, finding.reason
             if not finding.metric:
-                found.values[:] = [outcome.get(identity) for outcome in outcomes]
+                tracked.values[:] = [outcome.get(identity) for outcome in outcomes]
             elif finding.timing:
-                found.values[number - 1], found.values[number] = finding.baseline, finding.candidate
+                tracked.values[number - 1], tracked.values[number] = finding.baseline, finding.candidate
     return [replace(t, row=t.row._replace(versions=tuple(versions.get(t.row, ())))) for t in tracks.values()]
 
 
@@ -176,7 +176,7 @@ def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
 
 def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
     """One for each row of the reports, in their order: those with a step, and those without."""
-    found: tuple[list[Section], list[Section]] = [], []
+    parts: tuple[list[Section], list[Section]] = [], []
     rows: dict[str, list[Track]] = {}
     for track in tracks:
         rows.setdefault(_row(track), []).append(track)
@@ -191,8 +191,8 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
         missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
         if missing > 0:
             section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
-        found[not any(track.steps for track in own)].append(section)
-    return found
+        parts[not any(track.steps for track in own)].append(section)
+    return parts
 
 
 def _interest(track: Track) -> tuple[bool, bool]:
@@ -224,8 +224,8 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
     reasons: list[str] = []
     ends: list[End] = []
     heights: list[float] = []
-    for place, (track, label) in enumerate(zip(tracks, labels, strict=True)):
-        points, key = _points(track), numbered(label, place)
+    for index, (track, label) in enumerate(zip(tracks, labels, strict=True)):
+        points, key = _points(track), numbered(label, index)
         draw(axes, key, [number + 1 for number in points], list(points.values()), every=None)
         for number, (verdict, reason) in sorted(track.steps.items()):
             mark = _STEPS.get(verdict)

@@ -18,7 +18,7 @@ from heavytop.measure.derivatives import PARAMETERS, STARTS, Ball, Derivatives
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.precision import REAL_BITS, dot, exact, exact_text
-from heavytop.report.document.document import short
+from heavytop.report.document.document import integral_text, short
 from heavytop.top.attitude import Output, perpendicular, rows_of
 from heavytop.top.equations import NAMES, VARIABLES
 
@@ -227,7 +227,7 @@ def _one_line(text: str) -> str:
 
 
 def _caption(facts: dict[str, str]) -> str:
-    """What a reader of the table alone must know."""
+    """Caption that makes the table readable alone."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
     known = [(key, facts[key]) for key in ("name", *_DATA, *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
@@ -308,7 +308,7 @@ def motion_text(motion: Motion, table: MotionTable) -> RenderableType:
         worst = [
             (quantity.component, metric) for quantity, metric in quantities if quantity and quantity.statistic == "max"
         ]
-        drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
+        drifts = ", ".join(f"{integral_text(name)} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
     if (steady := run.stability) is not None:
         parts += [Text(), Text(f"{steady.text(precision.bits).capitalize()}.")]
@@ -354,7 +354,7 @@ def _at_each_time(table: MotionTable) -> list[RenderableType]:
 
 
 def _undefined(table: MotionTable) -> list[RenderableType]:
-    """What is said where Euler angles are not defined."""
+    """Error text where Euler angles are not defined."""
     places = [
         time
         for time, line in zip(table.times, table.values, strict=True)

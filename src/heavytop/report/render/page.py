@@ -274,6 +274,8 @@ def render(template: str, **context: Any) -> str:
 
 
 _ALONG = Quantity(SOLUTION_ERROR, "along")
+_LOST = 3
+"""Motions, at most, that a headline says have lost all digits."""
 _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
 
 
@@ -302,7 +304,13 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     said += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
     cases = {row.case for row, _ in longest}
     said += f", worst of {len(cases)})" if len(cases) > 1 else ")"
-    said += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
+    said += f"; {other}: {digits_text(second[_place(row)])}" if _place(row) in second else ""
+    lost = [
+        f"{clip(each.case, 40)} has lost all from t = {short(each.reference.until)}"
+        for each in finished
+        if each.reference.until and (each.key.subject, each.precision) == (row.key.subject, row.precision)
+    ]
+    said = "; ".join([said, *sorted(lost)[:_LOST]]) + "."
     return Headline(said, shown=In.SHORT | In.FULL | In.PAGE)
 
 

@@ -172,7 +172,7 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
 
 
 def _largest(series: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
-    """Of several series the one whose last number is the largest."""
+    """The series whose last number is the largest."""
 
     def end(pair: tuple[Quantity, Series]) -> float:
         size = logarithm(pair[1].values[-1])

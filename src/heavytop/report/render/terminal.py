@@ -38,7 +38,7 @@ _STYLES = {"soft": "dim", "big": "bold"}
 
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
-    """What every kind of measurement says of its rows, then those that failed."""
+    """Summary of the rows of every kind, then those that failed."""
     blocks_by_kind = document(report, kinds, In.FULL)
     parts: list[RenderableType] = [head(report, len(report.rows))]
     parts += [_Sentence(headline.text, headline.word) for headline in headlines(blocks_by_kind, kinds)]
@@ -246,7 +246,7 @@ def _growths(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def _meaning(row: Row) -> str:
-    """What the law of a third-party integrator says about it."""
+    """Meaning of the law of a third-party integrator."""
     name = Quantity(SOLUTION_ERROR, "along").text
     law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth

@@ -313,7 +313,7 @@ def _check_row(file: Path, row: Row, kind: ReportedKind) -> None:
     where = _where(file, row)
     horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
     if row.outcome not in _OUTCOMES:
-        raise InputError(f"{where}, outcome: {printable(row.outcome)[:60]!r} is none.", REMEDY)
+        raise InputError(f"{where}: outcome must be a known one; got {printable(row.outcome)[:60]!r}.", REMEDY)
     if not row.bits and row.precision != "exact":
         raise InputError(f"{where}, bits: a format without any.", REMEDY)
     # a time is rounded to the format, the horizon need not be

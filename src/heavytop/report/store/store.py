@@ -154,7 +154,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
         cause = (error.strerror if isinstance(error, OSError) else "") or error
-        raise InputError(f"There is no report at {str(file)[:_NAME]}: {cause}.", REMEDY) from None
+        raise InputError(f"{str(file)[:_NAME]} holds no report: {cause}.", REMEDY) from None
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

@@ -138,7 +138,7 @@ class Arcs:
         )
 
     def _is_multiple_of_pi(self, weights: dict[int, int], angle: Fraction) -> bool:
-        """Of π is Σ weight · arc − angle · π, at each point."""
+        """Whether Σ weight · arc − angle · π is a multiple of π at each point."""
         field = self._field
         tower = field.tower
         numbers = tower.signs.numbers.keys()

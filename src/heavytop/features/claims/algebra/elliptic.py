@@ -45,7 +45,7 @@ class Analytic(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, *arguments: sympy.Expr) -> sympy.Expr | None:
-        """What it is at 0, at −u, and as the inverse of another."""
+        """Values at 0, at −u, and as the inverse of another function."""
         last = cls.moving - 1
         u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
@@ -216,7 +216,7 @@ def _lattice(g2: arb, g3: arb) -> tuple[arb, acb] | None:
 
 
 def _of_lattice(name: str, u: arb, g2: arb, g3: arb) -> arb:
-    """One of Weierstrass' functions, by FLINT's of the periods 1 and τ: ℘' is −σ(2z)/σ(z)⁴."""
+    """A function of Weierstrass, by FLINT's of the periods 1 and τ: ℘' is −σ(2z)/σ(z)⁴."""
     bounded = "3" in name
     periods = _lattice(g2, g3) if u.is_finite() and g2.is_finite() and g3.is_finite() else None
     if periods is None or (bounded and not periods[1].real.is_zero()):

@@ -84,7 +84,7 @@ def _power(base: arb, exponent: sympy.Expr) -> arb:
             base = base.sqrt()
         power = _whole_power(base, abs(int(exponent.p)))
         return power if exponent.p > 0 else 1 / power
-    raise Unprovable(f"The power {exponent} is no multiple of 1/4.")
+    raise Unprovable(f"A power must be a multiple of 1/4; got {exponent}.")
 
 
 def _whole_power(base: arb, exponent: int) -> arb:

@@ -168,7 +168,7 @@ class Field:
             except Refine:
                 if not self._complete:
                     raise
-                raise Unprovable("An exponential or angle is no whole multiple of those of the claim.") from None
+                raise Unprovable("An exponential or angle must be an integer multiple of one in the claim.") from None
         return self._known[expression]
 
     def is_zero(self, expression: sympy.Expr) -> bool:
@@ -326,7 +326,7 @@ class Field:
         if exponent.is_Rational and exponent.q in (2, 4) and abs(int(exponent.p)) <= _MAX_EXPONENT:
             root = self.tower.root(self.enter(base))
             return self.tower.power(root if exponent.q == 2 else self.tower.root(root), int(exponent.p))
-        raise Unprovable(f"The power {exponent} is no small multiple of 1/4.")
+        raise Unprovable(f"A power must be a small multiple of 1/4; got {exponent}.")
 
     # --- and back ---------------------------------------------------------------------------------------------------
 

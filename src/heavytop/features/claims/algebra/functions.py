@@ -519,7 +519,7 @@ class Transcendental:
         return index
 
     def _declare_order(self, index: int) -> None:
-        """Of a monotone function of constants in order: the values have an order too."""
+        """Declares the order of the values of a monotone function at ordered constants."""
         t, g = self._tower, self._tower.generators[index]
         for other, before in enumerate(t.generators[:index]):
             if before.kind == g.kind and g.constant and before.constant:

@@ -468,7 +468,7 @@ class Prover:
         return None
 
     def _kept_facts(self, statement: Statement) -> list[Need]:
-        """Of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
+        """Facts of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
         if statement.flow is None:
             return []
         needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not ConditionKind.NONZERO]

@@ -228,7 +228,7 @@ class _Parser(Descent):
         exponent, needs = power.expression, base.needs | power.needs
         if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
             raise self._error(
-                f"the exponent is no integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
+                f"the exponent must be an integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
             )
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
@@ -289,7 +289,7 @@ class _Parser(Descent):
     def _checked(self, expression: sympy.Expr, size: ExpressionBounds, needs: frozenset[Need] = frozenset()) -> Formula:
         self._check(size)
         if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
-            raise self._error(f"{expression} is no real number")
+            raise self._error(f"a formula must be real; got {expression}")
         return Formula(expression, size, needs)
 
     def _check(self, size: ExpressionBounds) -> None:

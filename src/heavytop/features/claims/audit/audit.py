@@ -67,7 +67,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
     entry, rest = split(table, where)
     if "entry" in rest:
-        raise InputError(f"{where}: entry is no key of a claim.", _REMEDY)
+        raise InputError(f"{where}: a claim has no key entry.", _REMEDY)
     if rest.get("kind") == "value":
         return _value_claim(rest, entry, where)
     try:

@@ -267,7 +267,7 @@ def _put(needs: frozenset[Need], u: sympy.Symbol, value: sympy.Expr) -> frozense
 
 
 def _off_pole(need: Need, u: sympy.Symbol | None) -> Need:
-    """What is left of it where γ is not vertical in the body; u: γ3 in it, where it is one."""
+    """The remainder of it where γ is not vertical in the body; u: γ3 in it, where it is one."""
     across = _ACROSS if u is None else 1 - u**2
     ratio = sympy.cancel(need.expression.subs(_GAMMA[2] ** 2, 1 - _ACROSS) / across)
     ours = need.kind is ConditionKind.NONZERO and not ratio.free_symbols & frozenset((*STATE, u))
@@ -307,7 +307,7 @@ def _alone(zero: sympy.Expr) -> bool:
 def _found(
     u: sympy.Symbol, q: sympy.Expr, zeros: Sequence[sympy.Expr], parts: Sequence[sympy.Expr]
 ) -> tuple[sympy.Expr, sympy.Expr, sympy.Expr] | None:
-    """What :func:`_through` returns, by these zeros alone."""
+    """Result of :func:`_through` by these zeros alone."""
     names: dict[sympy.Expr, sympy.Symbol] = {}
 
     def named(e: sympy.Expr, monic: bool) -> sympy.Expr:

@@ -75,11 +75,11 @@ class PrintedNumber:
     def read(cls, text: str, what: str) -> PrintedNumber:
         """Raises InputError for what is no decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
         plain = text.strip().replace(_MINUS, "-")
-        found = _DECIMAL.fullmatch(plain)
-        whole, part = (found["whole"], found["part"] or "") if found is not None else ("", "")
-        if found is None or not whole + part:
-            raise InputError(f"{what}: {quoted(text)} is no decimal number.", _REMEDY)
-        power = int(found["power"] or 0)
+        match = _DECIMAL.fullmatch(plain)
+        whole, part = (match["whole"], match["part"] or "") if match is not None else ("", "")
+        if match is None or not whole + part:
+            raise InputError(f"{what} must be a decimal number; got {quoted(text)}.", _REMEDY)
+        power = int(match["power"] or 0)
         if len(whole + part) > _MOST_DIGITS or abs(power) > _LARGEST_POWER:
             raise InputError(
                 f"{what}: {quoted(text)} is too long a number.",
@@ -256,13 +256,13 @@ class ValueClaim:
             motion.require_handy(self.figures)
         except OutOfReach as error:
             return tuple(_open_row(figure, "not known", f"{error.cause} {error.remedy}") for figure in self.figures)
-        found: dict[Figure, StatementVerdict] = {}
+        verdicts: dict[Figure, StatementVerdict] = {}
         groups: dict[tuple[Fraction, str], list[Figure]] = {}
         for figure in self.figures:
             groups.setdefault((figure.time, figure.quantity), []).append(figure)
         for group in groups.values():
-            found |= zip(group, _rows_of(group, motion), strict=True)
-        return tuple(found[figure] for figure in self.figures)
+            verdicts |= zip(group, _rows_of(group, motion), strict=True)
+        return tuple(verdicts[figure] for figure in self.figures)
 
 
 def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
@@ -276,11 +276,11 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
         if component > size or (table.component is None and size > 1):
             lacks = "of a component that is not named" if table.component is None else f"has no component {component}"
             raise InputError(f"{where}: {table.quantity[:40]} {lacks}.", f"Its components are 1 to {size}.")
-        place = time, table.quantity, component
-        if seen.setdefault(place, index) != index:
+        subject = time, table.quantity, component
+        if seen.setdefault(subject, index) != index:
             raise InputError(
                 f"{where}: {table.quantity[:40]} {component} at t = {table.time[:40]} stands in value "
-                f"{seen[place]} already.",
+                f"{seen[subject]} already.",
                 "Give each number once.",
             )
         tolerance = None if table.tolerance is None else _number(table.tolerance, f"{where}: tolerance")
@@ -289,7 +289,7 @@ def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
                 f"{where}: the tolerance {table.tolerance} is negative.", "Give it as 1e-10, or not at all."
             )
         number = PrintedNumber.read(table.number, f"{where}: number")
-        yield Figure(time, table.time.strip(), *place[1:], number, tolerance, (table.tolerance or "").strip())
+        yield Figure(time, table.time.strip(), *subject[1:], number, tolerance, (table.tolerance or "").strip())
 
 
 def _number(text: str, what: str) -> Fraction:
@@ -320,20 +320,20 @@ def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
 
 def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[StatementVerdict]:
     """The rows of the numbers of one quantity at one time, each judged by the narrowest ball that was made."""
-    found: list[Judgement] | None = None
+    judged: list[Judgement] | None = None
     missing = "the balls that can be proven do not decide whether that is within what is allowed"
     needed = min(_MOST_BITS, max(_FIRST_BITS, *(figure.bits for figure in group)))
     trials = [_FIRST_BITS, *(min(_MOST_BITS, needed << doubling) for doubling in range(_DOUBLINGS + 1))]
-    while trials and not (found and all(each.decided for each in found)):
+    while trials and not (judged and all(judgement.decided for judgement in judged)):
         bits = trials.pop(0)
         try:
-            found = _judged(group, motion.at(group[0].time, group[0].quantity, bits))
+            judged = _judged(group, motion.at(group[0].time, group[0].quantity, bits))
         except OutOfReach as error:
             missing = f"{error.cause} {error.remedy}".strip()
             trials = [_FEWEST_BITS] if bits == _FIRST_BITS else []
-    if found is None:
+    if judged is None:
         return [_open_row(figure, motion.method, missing) for figure in group]
-    return [_row(figure, each, motion.method, missing) for figure, each in zip(group, found, strict=True)]
+    return [_row(figure, judgement, motion.method, missing) for figure, judgement in zip(group, judged, strict=True)]
 
 
 def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Judgement]:
@@ -345,9 +345,9 @@ def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Ju
     other = [judge_figure(figure, opposite[figure.component - 1]) for figure in group]
 
     def rank(judged: Sequence[Judgement]) -> tuple[int, Fraction]:
-        verdicts = [each.holds for each in judged]
+        verdicts = [judgement.holds for judgement in judged]
         worst = 2 if False in verdicts else 1 if None in verdicts else 0
-        return worst, sum((each.off[1] ** 2 for each in judged), Fraction(0))
+        return worst, sum((judgement.off[1] ** 2 for judgement in judged), Fraction(0))
 
     return min(same, other, key=rank)
 
@@ -449,7 +449,7 @@ class _KnownNumbers:
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
                 known = ", ".join((*SIZES, *self._integrals))
                 raise InputError(
-                    f"quantity = {figure.quantity[:40]!r} is none of this motion.",
+                    f"quantity must be one of this motion; got {figure.quantity[:40]!r}.",
                     f"Use {known}: the first integrals are those that are constant along it.",
                 )
             turned = figure.quantity in ("quaternion", "omega_space")
@@ -465,8 +465,8 @@ class _KnownNumbers:
         """The first integrals that are constant along the motion, by name."""
 
         resolved = self.motion.resolved
-        found = holding(resolved.top, resolved.start, self.system)
-        return {each.name: each for each in found if self._exact or each.name in _INVARIANT}
+        integrals = holding(resolved.top, resolved.start, self.system)
+        return {integral.name: integral for integral in integrals if self._exact or integral.name in _INVARIANT}
 
     def at(self, time: Fraction, quantity: str, bits: int) -> Sequence[Fraction | arb]:
         """The components of a quantity, of ``bits`` bits: relative above 1, absolute below.
@@ -493,10 +493,10 @@ class _KnownNumbers:
     @whole_evaluation
     def _output(self, output: Output, whole: Sequence[arb], bits: int) -> list[arb]:
         with working_precision(bits + _SPARE_BITS):
-            found = list(output.at(whole[:3], whole[3:6], whole[6:], self.body.centre, FUNCTIONS, ball))
-        if not all(value.is_finite() for value in found):
+            components = list(output.at(whole[:3], whole[3:6], whole[6:], self.body.centre, FUNCTIONS, ball))
+        if not all(value.is_finite() for value in components):
             raise OutOfReach(f"The {output.name} is not known to {bits} bits.")
-        return found
+        return components
 
     def _integral(self, integral: Integral, bits: int) -> Fraction | arb:
         """A first integral at the start: exactly, or as a ball of an irrational attitude."""

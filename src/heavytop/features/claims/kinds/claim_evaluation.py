@@ -28,7 +28,7 @@ NAME = "claim_evaluation"
 _COUNT = "claim_evaluation"
 _WORST, _LOST, _SINCE = "max_finite", "samples_not_finite", "not_finite_from"
 _SECONDS = 0.02
-_SUMMED_UP = ("omega", "theta", "psi")
+_SYMBOLS = {"omega": "Ω", "theta": "θ", "psi": "ψ"}
 
 
 class ClaimEvaluationTable(PlanTable, tag=NAME):
@@ -65,7 +65,7 @@ class ClaimEvaluation(Kind):
     table = ClaimEvaluationTable
     needed = tuple(
         quantity.text
-        for what in _SUMMED_UP
+        for what in _SYMBOLS
         for quantity in (Quantity(EVALUATION_ERROR, what, _WORST), Quantity(_COUNT, what, _SINCE))
     )
     may_overflow = True
@@ -141,16 +141,22 @@ class ClaimEvaluation(Kind):
 
 
 def _cells(row: Row) -> list[Cell]:
-    errors = (row.metric(EVALUATION_ERROR, quantity, _WORST) for quantity in _SUMMED_UP)
+    errors = (row.metric(EVALUATION_ERROR, quantity, _WORST) for quantity in _SYMBOLS)
     times = (row.metric(_COUNT, quantity, _SINCE) for quantity in ("psi", "omega"))
     return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
 
 
 def _said(rows: Sequence[Row]) -> str:
-    """``is off by up to 6.7e-8 in Ω, not finite from |t| = 37``."""
-    errors = [row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text] for row in rows]
-    worst = max((error for error in errors if error.log10 is not None), default=None)
-    times = [row.metrics[Quantity(_COUNT, quantity, _SINCE).text] for row in rows for quantity in _SUMMED_UP]
-    since = min((time for time in times if time.log10 is not None), default=None)
-    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst.value)} in Ω"
-    return off + (", finite throughout" if since is None else f", not finite from |t| = {short(since.value)}")
+    """``is off by up to 6.7e-8 in Ω (ershkov-partial-6/forward), ψ not finite from |t| = 7.4``."""
+    errors = ((row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text], row.case) for row in rows)
+    times = ((row.metrics[Quantity(_COUNT, name, _SINCE).text], name) for row in rows for name in _SYMBOLS)
+    worst = max(
+        ((metric.log10, metric.value, case) for metric, case in errors if metric.log10 is not None), default=None
+    )
+    since = min(
+        ((metric.log10, metric.value, name) for metric, name in times if metric.log10 is not None), default=None
+    )
+    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst[1])} in Ω ({worst[2]})"
+    if since is None:
+        return f"{off}, finite throughout"
+    return f"{off}, {_SYMBOLS[since[2]]} not finite from |t| = {short(since[1])}"

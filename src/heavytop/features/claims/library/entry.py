@@ -110,7 +110,7 @@ def library() -> dict[str, Entry]:
                 raise InputError(f"{name} is the name of {names[name]} and of {entry.id}.", _REMEDY)
         for name in entry.corrected:
             if name not in entries or entries[name].expects == "holds":
-                raise InputError(f"{entry.id} corrects {name}, which is no entry that fails.", _REMEDY)
+                raise InputError(f"{entry.id} must correct an entry that fails; got {name}.", _REMEDY)
     return entries
 
 

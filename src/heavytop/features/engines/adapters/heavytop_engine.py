@@ -20,7 +20,7 @@ os.dup2(2, 1)  # what engines print, when they are imported or from C++, goes to
 
 
 class RigidBody:
-    """What the engine is given, in body axes, SI or any units that fit together.
+    """The body of an engine, in body axes, SI or any units that fit together.
 
     mass, gravity (it points down, −z of space), centre (from the pivot), inertia (3 × 3, about the centre of mass),
     quaternion (w, x, y, z) and rotation (3 × 3, body to space), omega (in body axes), omega_space.

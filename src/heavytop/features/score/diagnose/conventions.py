@@ -51,6 +51,8 @@ WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""
 _NEIGHBOURS = 60
 """Samples whose attitudes are compared with Ω."""
+_TWO_MISTAKES = 0.05
+"""Relative errors below it are not those of two mistakes of convention at once."""
 _CONTRADICTS = 0.1
 """Ω that is off the rate of the attitude by less, relative to it, may be as right as the method."""
 AS_LIKELY = 3.0
@@ -63,15 +65,13 @@ _MOST_OTHERS = 3
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
 _LENGTHS = {"1000": 1e3, "100": 1e2, "1/1000": 1e-3, "1/100": 1e-2, "1/0.3048": 1 / 0.3048, "0.3048": 0.3048}
+_STANDARD = ("9.8", "9.80665", "9.81", "10")
+"""Values of g that one who writes another of them may have meant."""
 _GRAVITIES = {
     "9.81": 9.81,
     "9.80665": 9.80665,
     "1/9.81": 1 / 9.81,
     "1/9.80665": 1 / 9.80665,
-    "9.80665/9.81": 9.80665 / 9.81,
-    "9.81/9.80665": 9.81 / 9.80665,
-    "9.8/9.81": 9.8 / 9.81,
-    "10/9.81": 10 / 9.81,
     **_LENGTHS,
 }
 _INERTIAS = {f"1e{power}": 10.0**power for power in (-9, -7, -6, -4, -3, -2, 2, 3, 4, 6, 7, 9)}
@@ -148,7 +148,7 @@ class Suppositions:
             self.tried = [(attempt, self._left(attempt)) for attempt in _suppositions(self)]
         tried = [(attempt, each_error) for attempt, each_error in self.tried if first is None or attempt.drop == DROP]
         best = self._best(tried, own, looked, drop)
-        if best is None and first is None and not drop and _forms(self.seen) & set(FORMS):
+        if best is None and first is None and not drop and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
             pairs = [(attempt, self._left(attempt)) for attempt in _pairs(self.seen)]
             best = self._best(pairs, own, looked)
         return best
@@ -388,7 +388,9 @@ def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
         for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
             named_so, again = axes @ turn, turn.T * moments @ turn
             yield "tensor_axes_conjugated", {}, replace(body, inertia=named_so.T @ again @ named_so)
-    for name, factor in _GRAVITIES.items():
+    here = next((name for name in _STANDARD if float(name) == body.gravity), None)
+    standard = {f"{name}/{here}": float(name) / body.gravity for name in _STANDARD if here not in (None, name)}
+    for name, factor in (_GRAVITIES | standard).items():
         yield "gravity_unit", {"factor": name}, replace(body, gravity=body.gravity * factor)
     yield "centre_reversed", {}, replace(body, centre=-body.centre)
     yield from _in_space_axes(seen)

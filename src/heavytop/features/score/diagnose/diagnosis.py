@@ -35,7 +35,7 @@ from heavytop.features.score.diagnose.samples import (
     examined,
     in_units,
 )
-from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, rounding
+from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, roundings
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
@@ -89,18 +89,18 @@ def diagnose(
     step: of the method, where it is known.
     """
 
-    def written_so(least: int) -> Rounding | None:
-        return None if frame else rounding([[value for value in row if value] for row in states], precision, least)
+    def written_so(least: int) -> list[Rounding]:
+        return [] if frame else roundings([[value for value in row if value] for row in states], precision, least)
 
     measured, written = numpy.array(errors, dtype=float), written_so(LEAST)
     if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= WORTH_ASKING:
-        return _rounded(written, relative_error)
+        return rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
         samples = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
-        if frame is None and _only_rounded(
-            written_so(1), relative_error, None if samples is None else samples.trusted()
-        ):
-            return _rounded(written, relative_error)
+        trusted = None if samples is None or frame is not None else samples.trusted()
+        alone = [rounding for rounding in written_so(1) if _only_rounded(rounding, relative_error, trusted)]
+        if alone:
+            return rounded([rounding for rounding in alone if rounding in written], relative_error)
         mistake = _still(samples, states, relative_error) or _reset(samples) or _off_alone(samples, times, measured)
         if mistake is None:
             if seen is None and system in WITH_ATTITUDE:
@@ -142,16 +142,15 @@ def _explanation(examined: Examined | None, columns: Suppositions | None, column
     return exact or likely or (None if examined is None else _looked_at(examined, _integrals_off(examined)))
 
 
-def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
+def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
     """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
-    if written is None or error is None or not explains(written, error):
-        return []
-    return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
+    explaining = (each for each in written if error is not None and explains(each, error))
+    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
 
 
-def _only_rounded(written: Rounding | None, error: float | None, examined: Examined | None) -> bool:
+def _only_rounded(written: Rounding, error: float | None, examined: Examined | None) -> bool:
     """Whether every component that is looked at is the true one, rounded as it is written."""
-    if written is None or (error is not None and error > EXPLAINS * written.error):
+    if error is not None and error > EXPLAINS * written.error:
         return False
     truth = None if examined is None or not examined.rows else examined.supposed(examined.times)
     if examined is None or truth is None:
@@ -189,9 +188,10 @@ def _mistake(tried: _Tried, drop: float) -> Diagnosis | None:
     examined, error = tried.given, tried.error
     explained = [hypothesis for hypothesis in tried.hypotheses if hypothesis.left * (drop or hypothesis.drop) <= error]
     explained = [hypothesis for hypothesis in explained if hypothesis.drop == DROP or not drop]
-    if not explained and error > _WRONG and tried.fitted and not drop:
+    # a sign in the equations of a symmetric body is another top as well
+    if all(hypothesis.kind == "top" for hypothesis in explained) and error > _WRONG and tried.fitted and not drop:
         others = hypotheses.of_equations(examined, tried.truth)
-        explained = [hypothesis for hypothesis in others if hypothesis.left * FITTED_DROP <= error]
+        explained = [hypothesis for hypothesis in others if hypothesis.left * FITTED_DROP <= error] + explained
     if not explained:
         return None
     best = min(max(hypothesis.left, FLOOR) for hypothesis in explained)

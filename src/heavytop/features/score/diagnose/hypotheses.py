@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import permutations, product
-from math import isfinite
+from math import ceil, isfinite
 from typing import Any, TypeVar
 
 import numpy
@@ -21,8 +21,10 @@ from heavytop.errors import InputError
 from heavytop.features.score.diagnose.samples import (
     ALIKE,
     FARTHEST,
+    FIRST,
     FITTED_DROP,
     FLOOR,
+    LIKELY_DROP,
     SHORT,
     SMALL,
     Array,
@@ -148,7 +150,7 @@ def scaled(given: Examined, truth: Array) -> Iterator[Hypothesis]:
             continue
         left = _divided(given, truth, columns, fitted)
         factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
-        if factor and factor != -1 and notable(factor, Fraction(1)):
+        if factor and (factor != -1 or true.shape[1] == 1) and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
             numbers["factor"] = decimal_text(factor, 8)
             yield Hypothesis(kind, numbers, _divided(given, truth, columns, float(factor)), FITTED_DROP)
@@ -445,6 +447,8 @@ def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
 _TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_velocity)
 _ANOTHER_MOTION = 0.03
 """Relative errors below it are not those of another field, each of which is compiled anew."""
+_STEP = 0.05
+"""Radians that the body turns in a step of that method."""
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
@@ -461,8 +465,33 @@ def of_equations(given: Examined, truth: Array | None) -> Iterator[Hypothesis]:
     if given.is_whole and error > _ANOTHER_MOTION and all(each.left * FITTED_DROP > error for each in found):
         for place, name in enumerate(NAMES):
             system = _negated(given.system, place, tuple(map(tuple, given.frame.axes.tolist())))
-            supposed = replace(given, system=system).supposed(given.times)
-            yield Hypothesis("component_sign", {"column": name}, given.error(supposed), FITTED_DROP)
+            other = replace(given, system=system)
+            if _begins_so(other, error / LIKELY_DROP):
+                left = given.error(other.supposed(given.times))
+                yield Hypothesis("component_sign", {"column": name}, left, FITTED_DROP)
+
+
+def _begins_so(given: Examined, allowed: float) -> bool:
+    """Whether the first samples are those of the system within ``allowed``, by the classical Runge-Kutta method: no
+    field has to be compiled for that.
+    """
+    p = given.system.parameters(given.top, given.start).mapped(float)
+    y, time, states = numpy.array([float(value) for value in given.start.flat]), 0.0, []
+
+    def rates(y: Array) -> Array:
+        return numpy.array(given.system.field(p, y.tolist()))
+
+    early = given.at(given.rows[: FIRST[0]])
+    for end in map(float, early.times):
+        count = ceil(abs(end - time) * given.rate / _STEP)
+        for h in [(end - time) / max(count, 1)] * count:
+            a = rates(y)
+            b = rates(y + h / 2 * a)
+            c = rates(y + h / 2 * b)
+            y = y + h / 6 * (a + 2 * b + 2 * c + rates(y + h * c))
+        time = end
+        states.append(y)
+    return early.error((numpy.array(states).reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)) <= allowed
 
 
 @lru_cache(maxsize=18)
@@ -535,6 +564,8 @@ _WITHIN = 0.3
 """A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
 _TRIED = 12
 _REFINED = 6
+_FALLS = 1.5
+"""Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is no shift."""
 _NEAR_ONE = 0.05
@@ -662,18 +693,21 @@ def _moved(kind: str, number: float, times: Array) -> Array:
 
 def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, float]]:
     """The number by Gauss-Newton, with its error; the rate of the motion is a difference quotient of the motion."""
-    small = 1e-6 / given.rate
+    small, count, before = 1e-6 / given.rate, len(times), numpy.inf
     for _ in range(_REFINED):
         at = _moved(kind, number, times)
-        here = given.supposed([Fraction(value) for value in at])
-        there = given.supposed([Fraction(value) for value in at + small])
-        if here is None or there is None:
+        both = given.supposed([*map(Fraction, at), *map(Fraction, at + small)])
+        if both is None:
             return
-        slope = (there - here) / small / sizes * (1.0 if kind == "times_shifted" else times[:, None])
+        here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
+        off = (given.states - here) / sizes
+        if not _FALLS * (size := float(numpy.nansum(off * off))) < before:
+            break  # at the least of it
+        slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
         square = float((slope * slope)[~numpy.isnan(given.states)].sum())
         if not square:
             return
-        number += float(numpy.nansum(slope * (given.states - here) / sizes)) / square
+        number += float(numpy.nansum(slope * off)) / square
         if not abs(_moved(kind, number, times)).max() * given.rate <= FARTHEST:
             return
     yield number, given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))

@@ -10,8 +10,7 @@ from types import SimpleNamespace
 
 import numpy
 
-from heavytop.errors import HeavyTopError
-from heavytop.features.score.diagnose.samples import Array, motion, principal
+from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
 from heavytop.measure.attitude_error import UPS, Convention
 from heavytop.top.attitude import matrix_of_quaternion, rows_of_euler
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
@@ -103,20 +102,11 @@ def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Cou
         return None
     rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
     rate, size = _power(_rate(moments, moment, omega)), _power(float(moments.max()))
-    try:
-        whirl = None if body.rotor is None or not body.rotor.any() else axes.T @ body.rotor / (size * rate)
-        top = HeavyTop(
-            [Fraction(m / size) for m in moments],
-            1,
-            [Fraction(n / size / rate / rate) for n in moment],
-            rotor=None if whirl is None else [Fraction(k) for k in whirl],
-        )
-        system = HEAVY_TOP if whirl is None else HEAVY_GYROSTAT
-        state = State([Fraction(w / rate) for w in omega], [Fraction(g) for g in rows[2]])
-        xi = (Fraction(rows[0, 0]), Fraction(rows[0, 1]), Fraction(rows[0, 2]))
-        values = motion(top, state, system, [time * Fraction(rate) for time in times], xi)
-    except (HeavyTopError, OverflowError, ValueError):
-        return None
+    whirl = numpy.zeros(0) if body.rotor is None or not body.rotor.any() else axes.T @ body.rotor / (size * rate)
+    system = HEAVY_GYROSTAT if len(whirl) else HEAVY_TOP
+    numbers = numpy.concatenate([moments / size, moment / size / rate / rate, whirl])
+    first = numpy.concatenate([omega / rate, rows[2], rows[0]])
+    values = motion_in_double(system, numbers, first, rate * floats(times))
     if values is None:
         return None
     gamma, along = values[:, 3:6], values[:, 6:9]

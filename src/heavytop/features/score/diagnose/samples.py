@@ -16,7 +16,8 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.errors import HeavyTopError
-from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
@@ -333,25 +334,29 @@ def motion(
     xi: tuple[Fraction, ...] | None = None,
 ) -> Array | None:
     """States of heyoka in double at ``times``, shape (n, 6), or (n, 9) with ξ; None where it does not get there."""
-    first = [float(value) for value in (*start.flat, *(xi or ()))]
-    states = numpy.empty((len(times), len(first)))
-    for sign in (1, -1):
-        asked = {time: [] for time in sorted({t for t in times if sign * t > 0}, key=abs)}  # type: dict[Fraction, list[int]]
-        if not asked:
+    try:
+        numbers = floats(system.entering(system.parameters(top, start)))
+        first, ends = floats((*start.flat, *(xi or ()))), floats(times)
+    except (HeavyTopError, OverflowError):  # beyond the range of double, or a start that the system does not admit
+        return None
+    return motion_in_double(system, numbers, first, ends)
+
+
+def motion_in_double(system: System, numbers: Array, first: Array, times: Array) -> Array | None:
+    """:func:`motion` of the numbers that enter the field, of a start and of times in double."""
+    motion = numpy.tile(first, (len(times), 1))
+    for sign in (1.0, -1.0):
+        rows = numpy.flatnonzero(sign * times > 0)
+        if not len(rows):
             continue
-        for row, time in enumerate(times):
-            if time in asked:
-                asked[time].append(row)
-        try:
-            run = propagate(top, start, list(asked), DOUBLE, system=system, xi=xi, step_limit=_STEPS)
-        except HeavyTopError:  # beyond the range of double, or a start that the system does not admit
+        targets, places = numpy.unique(sign * times[rows], return_inverse=True)
+        with compiled(system, DOUBLE, attitude=len(first) > 6).borrowed() as engine:
+            ends = (sign * targets).tolist()
+            states, outcome, *_ = states_at(engine, numbers, first, ends, _STEPS, DOUBLE)
+        if outcome is not Outcome.SUCCESS:
             return None
-        if run.outcome is not Outcome.SUCCESS:
-            return None
-        for rows, state in zip(asked.values(), run.states, strict=True):
-            states[rows] = state
-    states[[row for row, time in enumerate(times) if time == 0]] = first
-    return states
+        motion[rows] = numpy.array(states)[places]
+    return motion
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:

@@ -100,7 +100,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What the columns of a table are.
+    """The quantities in the columns of a table.
 
     time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
     their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
@@ -365,7 +365,7 @@ def is_observed(document: Mapping[str, Any]) -> bool:
 
 
 def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
-    """What the file says of its conventions; raises InputError for what is not known."""
+    """Conventions that the file states; raises InputError for what is not known."""
     said: dict[str, Any] = {}
     if (order := _word(document, "quaternion_order")) is not None:
         if order.lower() not in _ORDERS:
@@ -599,7 +599,7 @@ def start(
         if known is None:
             raise InputError(
                 "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
-                "and there is no row t = 0 that gives it.",
+                "and no row t = 0 gives it.",
                 "Give one of them, or the row t = 0, or --case NAME.",
             )
         from_row, form, values = True, known, list(first[known] or ())
@@ -629,7 +629,7 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
         if first.get(name):
             return vector(list(first[name] or ()), name), name == "omega_space"
     raise InputError(
-        "The key omega is missing, and there is no row t = 0 that gives it.",
+        "The key omega is missing, and no row t = 0 gives it.",
         "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
     )
 

@@ -61,7 +61,7 @@ def nearest(key: str, known: Sequence[str]) -> str:
 
 
 def unknown(key: str, known: Sequence[str]) -> InputError:
-    """What is said of a key that is none."""
+    """Error text for an unknown key."""
     near = nearest(key, known)
     return InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?" if near else REMEDY)
 
@@ -157,7 +157,7 @@ class TextTable:
             )
         if width != len(COLUMNS):
             raise InputError(
-                f"The first line is not {','.join(COLUMNS)}: there is no header, and Row 1 has {width} columns, "
+                f"The first line is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, "
                 f"not {len(COLUMNS)}.",
                 "Give a header that names the columns.",
             )
@@ -166,7 +166,7 @@ class TextTable:
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
-    """What is said of columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
+    """Note on columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
     more = [name for name in names if name.strip() not in own]
@@ -352,7 +352,7 @@ def _json(text: str) -> dict[str, Any]:
 def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
-        raise InputError("This is no text: it holds a byte 0.", REMEDY)
+        raise InputError("A table must be text; this holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
     table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}))
@@ -467,7 +467,7 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
-            raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
+            raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
@@ -494,7 +494,7 @@ def _start(document: dict[str, Any], case: Case | None, at_start: State | None) 
     if case is None and not {"omega", "gamma"} <= document.keys():
         missing = "omega" if "omega" not in document else "gamma"
         raise InputError(
-            f"The key {missing} is missing, and there is no row t = 0 that gives the start.",
+            f"The key {missing} is missing, and no row t = 0 gives the start.",
             "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
         )
     return State(*(_vector(document, key, case) for key in ("omega", "gamma")))

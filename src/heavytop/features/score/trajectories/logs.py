@@ -157,7 +157,7 @@ def _repeats(count: int) -> list[str]:
 
 
 def quaternions_of(parameters: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²), exact; the shadow set gives the same rotation."""
+    """Quaternions of modified Rodrigues parameters σ: ((1 − σ²), 2σ)/(1 + σ²); the shadow set is the same rotation."""
     return [None if s is None else _ordered(_of_rodrigues(s), scalar_last) for s in parameters]
 
 
@@ -167,7 +167,7 @@ def _of_rodrigues(s: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 
 def quaternions_of_vectors(vectors: Sequence[Sequence[Fraction] | None], scalar_last: bool) -> list[Any]:
-    """Of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
+    """Quaternions of rotation vectors v, the axis times the angle: (cos |v|/2, sin(|v|/2) v/|v|), to 50 digits."""
     from flint import arb, fmpq
 
     from heavytop.exact.flint.balls import midpoint, working_precision
@@ -257,7 +257,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
         try:
             loaded = numpy.load(BytesIO(content), allow_pickle=False)
         except ValueError as error:
-            raise InputError(f"This is no array: {error}.", "Save plain numbers, without pickle.") from None
+            raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
         columns = {"": loaded} if suffix == ".npy" else {name: loaded[name] for name in loaded.files}
     names: list[str] = []
     parts: list[Any] = []

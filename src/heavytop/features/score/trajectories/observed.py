@@ -136,7 +136,7 @@ class RawStart:
     degrees: bool = False
 
     def rounded(self, precision: Precision) -> RawStart:
-        """The same in numbers of a format."""
+        """These quantities in numbers of a format."""
 
         def both(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
             return tuple(round_to(value, precision.bits) for value in values)
@@ -213,7 +213,7 @@ def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
 def require_direction(values: Sequence[Fraction], what: str) -> None:
     """Raises InputError for a quaternion 0, which is no attitude."""
     if not any(values):
-        raise InputError(f"{what} is 0, which is no attitude.", "Give a quaternion of length 1.")
+        raise InputError(f"{what} must not be zero.", "Give a quaternion of length 1.")
 
 
 def require_rotation(form: str, values: Sequence[Fraction], slack: Fraction, what: str) -> None:
@@ -222,7 +222,7 @@ def require_rotation(form: str, values: Sequence[Fraction], slack: Fraction, wha
         off = dot((*values[:3],), (*values[:3],)) + values[3] ** 2 - 1
         if abs(off) > 2 * slack:
             raise InputError(
-                f"{what} has not length 1: |q|^2 - 1 = {decimal_text(off, 6)}.",
+                f"{what} must have length 1; |q|^2 - 1 = {decimal_text(off, 6)}.",
                 "Divide it by its length, or use --normalize (normalize=True in Python).",
             )
     if form == "matrix":
@@ -359,7 +359,7 @@ def require_states(times: list[Fraction], rows: list[Any]) -> None:
 
 
 def too_many(count: int) -> InputError:
-    """What is said of so many states."""
+    """Error text for too many states."""
     every = -(-count // MOST_STATES)
     return InputError(
         f"{count} states are too many to score.", f"Give at most {MOST_STATES} of them, such as one row in {every}."
@@ -406,7 +406,7 @@ _SPARE_BITS = 160
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """What a trajectory gives in place of Ω and γ in principal axes.
+    """Quantities that a trajectory has in place of Ω and γ in principal axes.
 
     columns: by the name of the quantity, the rounded numbers of each sample up to the first that is not finite.
     said: their conventions.  posed: the body and its start, rounded to the format and exact from there.
