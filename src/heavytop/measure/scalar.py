@@ -193,11 +193,6 @@ class Rounding:
         return numpy.where(values == 0, 0.0, base ** (numpy.floor(numpy.log(size) / numpy.log(base)) + 1 - self.digits))
 
 
-def rounding(states: Sequence[Sequence[Fraction]], precision: Precision) -> Rounding | None:
-    """The coarsest rounding that all numbers have; None where they are written in full."""
-    return next(iter(roundings(states, precision)), None)
-
-
 def roundings(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = LEAST) -> list[Rounding]:
     """Every rounding that all numbers have, the coarsest first; none where they are fewer than ``least``."""
     numbers = [value for state in states for value in state if value]

@@ -10,7 +10,7 @@ from heavytop.cases import CASES
 from heavytop.features.score.diagnose.diagnosis import diagnose
 from heavytop.features.score.diagnose.samples import motion
 from heavytop.features.score.text import diagnosis_text
-from heavytop.measure.scalar import rounding
+from heavytop.measure.scalar import roundings
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
@@ -335,7 +335,7 @@ def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: 
     # an error that rounding does not explain
     assert found(top, start, times, spoilt, 100 * error) == []
     rows = [tuple(Fraction(v) for v in row) for row in y]
-    assert rounding(rows, DOUBLE) is None
+    assert roundings(rows, DOUBLE) == []
 
 
 @pytest.mark.slow

@@ -32,7 +32,6 @@ from heavytop.measure.scalar import (
     digits_of,
     digits_right,
     relative_error,
-    rounding,
     roundings,
     to_ball,
 )
@@ -294,8 +293,8 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
     explained = scored if told is None else told[1]
     said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
-    written = None if trajectory.observed is not None else rounding(_finite(trajectory), trajectory.precision)
-    single = written is not None and written.kind == "single"
+    written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
+    single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
     columns = "" if trajectory.observed is None else used(trajectory)
     clock = [] if told is None else [told[0]]
