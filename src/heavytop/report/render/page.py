@@ -303,14 +303,14 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     said = f"{clip(row.key.subject.name, 40)} in {clip(row.precision, 20)}: {at_least}{digits_text(kept)} of "
     said += f"{digits_of(row.bits)} digits right to T = {short(row.horizon)} ({clip(row.case, 40)}"
     cases = {row.case for row, _ in longest}
-    said += f", worst of {len(cases)})" if len(cases) > 1 else ")"
-    said += f"; {other}: {digits_text(second[_place(row)])}" if _place(row) in second else ""
     lost = [
-        f"{clip(each.case, 40)} has lost all from t = {short(each.reference.until)}"
+        clip(each.case, 40)
         for each in finished
         if each.reference.until and (each.key.subject, each.precision) == (row.key.subject, row.precision)
     ]
-    said = "; ".join([said, *sorted(lost)[:_LOST]]) + "."
+    said += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
+    said += f", none on {', '.join(lost[:_LOST])}" if lost else ""
+    said += f"; {other}: {digits_text(second[_place(row)])}." if _place(row) in second else "."
     return Headline(said, shown=In.SHORT | In.FULL | In.PAGE)
 
 
