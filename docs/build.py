@@ -2,9 +2,9 @@
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
 from `results/claims/library.json`, or by new audits where that is not of the entries as they stand; that of the command
-line from the program (command_reference.py), of published numbers and reports from `results/`.  Then every link inside
-the site is followed, the reference of Python is searched for names that are no part of the interface, and the words of
-pages, docstrings and messages are looked up among common misspellings.
+line from the program (command_reference.py), of published numbers, engines and reports from `results/`.  Then every
+link inside the site is followed, the reference of Python is searched for names that are no part of the interface, and
+the words of pages, docstrings and messages are looked up among common misspellings.
 Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
@@ -28,6 +28,7 @@ DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
 CLAIMS = DOCS / "_build" / "claims.md"
 COMMANDS = DOCS / "_build" / "commands.md"
+ENGINES = DOCS / "_build" / "engines.md"
 PUBLIC_NUMBERS = DOCS / "_build" / "public.md"
 REPORTS = OUT / "results"
 ROOT = DOCS.parent
@@ -124,6 +125,13 @@ def write_public() -> None:
     PUBLIC_NUMBERS.write_text(page(json.loads((ROOT / "results" / "public" / "verdicts.json").read_bytes())), "utf-8")
 
 
+def write_engines() -> None:
+    """The tables and pictures of the page of engines."""
+    from engines_page import page
+
+    ENGINES.write_text(page(sorted((ROOT / "results" / "engines").iterdir()), ENGINES.parent), "utf-8")
+
+
 def write_reports() -> None:
     """The page of each report of `results/`, as `show --html` writes it."""
     import heavytop as ht
@@ -143,6 +151,7 @@ def main() -> int:
     write_claims()
     write_public()
     COMMANDS.write_text(command_reference.markdown(), "utf-8")
+    write_engines()
     sphinx = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-n", "-b", "html", str(DOCS), str(OUT)]
     built = subprocess.run(sphinx, stderr=subprocess.PIPE, text=True, check=False)
     # the kernels of notebooks talk over the loopback device, and say so each time

@@ -2,7 +2,7 @@
 
 import os
 import subprocess
-import sys
+from unittest import mock
 
 import pytest
 import typer
@@ -10,14 +10,15 @@ import typer
 from heavytop.cli import app
 from heavytop.cli.app import SHELLS
 from heavytop.harness.plan import BUILT_IN
+from support import in_process
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 MOST = 55
 
 
 def heavytop(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-m", "heavytop", *arguments]
-    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60, env=os.environ | more)
+    with mock.patch.dict(os.environ, more):
+        return in_process.heavytop(*arguments)
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -22,7 +22,7 @@ from heavytop.harness import plan
 from heavytop.integrate.registry import commands_in
 from heavytop.report.compare import noise
 from heavytop.report.render.terminal import brief
-from support import from_a_wheel, in_process
+from support import audits, from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 
 NOT_CODE = {
@@ -35,6 +35,7 @@ NOT_CODE = {
     "{include} ../CHANGELOG.md",
     "{include} _build/claims.md",
     "{include} _build/commands.md",
+    "{include} _build/engines.md",
     "{include} _build/public.md",
     "{thumbnails}",
 }
@@ -56,6 +57,7 @@ def test_the_code_of_a_page_runs(
     environment = folder_like_a_checkout(tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
+    audits.here(monkeypatch)
     if "--language c\n" in page.read_text("utf-8") and any("make -C" in block.text for block in to_run(page)):
         for program in ("cc", "make"):
             if shutil.which(program) is None:

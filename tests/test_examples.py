@@ -24,7 +24,6 @@ import yaml
 
 from heavytop.api.integrators import LANGUAGES, new_integrator
 from heavytop.cli import app
-from test_from_wheel import packages
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / ".github" / "workflows" / "heavytop.yml"
@@ -293,6 +292,12 @@ def test_the_comment_is_there_whatever_became_of_the_job(folder: Path) -> None:
     # a comment takes 65,536 characters, whatever anyone writes
     assert on_github(folder, "x" * 60_000, 1, contract=("violated " + "y" * 4000 + "\n") * 30)[0] == 1
     assert len(comments(folder)[-1][1]) < 65_536
+
+
+def packages() -> str:
+    """Where the other packages are, but not this project's own sources."""
+    sources = str(ROOT / "src")
+    return "\n".join(path for path in sys.path if path.endswith("site-packages") and path != sources) + "\n"
 
 
 def git(folder: Path, *words: str) -> str:

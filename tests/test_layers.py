@@ -1,6 +1,12 @@
-"""The plan of rooms, enforced by reading the imports."""
+"""The plan of rooms, enforced by reading the imports; each feature can be deleted.
+
+One a run, chosen by the commit; all of them by ``python -m validation.deletion``.
+"""
 
 import ast
+import subprocess
+import sys
+import zlib
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -11,6 +17,7 @@ import pytest
 import heavytop
 from heavytop import features
 from heavytop.features.kinds import KINDS
+from heavytop.version import commit
 
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 """Names that are quantities, sections or commands as well."""
@@ -163,3 +170,20 @@ MOST_ANY = 0.08
 def test_few_annotations_say_nothing() -> None:
     silent = [says_any for path in FILES for says_any in read(path).annotations]
     assert sum(silent) / len(silent) <= MOST_ANY
+
+
+CHOSEN = features.NAMES[zlib.crc32((commit() or "").encode()) % len(features.NAMES)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "code", "printed"),
+    [([CHOSEN], 0, "can be deleted"), (["events", "--plant"], 1, "without events: imports")],
+    ids=["as it is", "a shared room imports it"],
+)
+def test_a_feature_can_be_deleted_unless_a_shared_room_imports_it(
+    arguments: list[str], code: int, printed: str
+) -> None:
+    line = [sys.executable, "-m", "validation.deletion", *arguments, "--few"]
+    done = subprocess.run(line, cwd=SOURCE.parents[1], capture_output=True, text=True)
+    assert (done.returncode, printed in done.stdout) == (code, True), done.stdout

@@ -77,10 +77,9 @@ def test_characters_that_an_encoding_lacks_are_replaced(encoding: str) -> None:
 
 def test_json_loses_nothing_in_any_encoding(tmp_path: Path) -> None:
     (tmp_path / "Ω é.csv").write_text(TRAJECTORY, "utf-8")
-    for encoding in ("ascii", "utf-8"):
-        done = shell("heavytop score 'Ω é.csv' --json", cwd=tmp_path, PYTHONIOENCODING=encoding)
-        assert_said(done, 0)
-        assert json.loads(done.stdout)["case"] == "Ω é"
+    done = shell("heavytop score 'Ω é.csv' --json", cwd=tmp_path, PYTHONIOENCODING="ascii")
+    assert_said(done, 0)
+    assert json.loads(done.stdout)["case"] == "Ω é"
 
 
 @pytest.mark.parametrize(
@@ -136,13 +135,12 @@ def results() -> Path:
     return Path(__file__).parents[1] / "results" / "long"
 
 
-@pytest.mark.parametrize("name", ["a b", "new\nline", "Ω é 漢", "-dash", "quote'\""], ids=ascii)
-def test_any_name_of_a_path_is_taken(tmp_path: Path, name: str) -> None:
+def test_any_name_of_a_path_is_taken(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 
     from heavytop.cli import app
 
-    folder = tmp_path / name
+    folder = tmp_path / "-dash a b\nΩ é 漢 quote'\""
     folder.mkdir()
     (folder / "mine.csv").write_text(TRAJECTORY)
     (folder / "plan.toml").write_text(PLAN)
@@ -230,14 +228,14 @@ if wrong:
 """
 
 
-@pytest.mark.parametrize("options", [["-W", "error"], ["-OO"]], ids=" ".join)
-def test_threads_and_jumps_of_the_clock_under_strict_and_stripped_python(options: list[str]) -> None:
-    done = subprocess.run([sys.executable, *options, "-c", STRICT], capture_output=True, timeout=120, check=False)
+def test_threads_and_jumps_of_the_clock_under_strict_and_stripped_python() -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-OO", "-c", STRICT], capture_output=True, timeout=120, check=False
+    )
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-@pytest.mark.parametrize("options", [("-W", "error"), ("-OO",)], ids=" ".join)
-def test_the_command_line_under_strict_and_stripped_python(options: tuple[str, ...], tmp_path: Path) -> None:
+def test_the_command_line_under_strict_and_stripped_python(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN)
     run = ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
-    assert_said(limited(run, lambda: None, options), 0)
+    assert_said(limited(run, lambda: None, ("-W", "error", "-OO")), 0)

@@ -120,9 +120,8 @@ def delete(copy: Path, name: str, feature: Feature) -> None:
     words = "|".join(map(re.escape, added(feature)))
     naming = re.compile(rf"""features\.{name}\b|kind *= *['"]({words})\b|['"]({words})['"]|\bht\.({words})\b""")
     for test in naming_tests(copy / "tests", naming):
-        if test.name not in ("test_layers.py", "test_deletion.py"):
+        if test.name != "test_layers.py":
             test.unlink()
-    (copy / "tests/test_deletion.py").unlink(missing_ok=True)
 
 
 def naming_tests(folder: Path, naming: re.Pattern[str]) -> Iterator[Path]:

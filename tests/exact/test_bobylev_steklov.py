@@ -9,7 +9,7 @@ from flint import arb
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, attitude_of, initial_xi, renamed_state, renamed_top
+from heavytop.exact.closed_form import ALL, initial_xi, renamed_state, renamed_top
 from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import bobylev_steklov_motion
 from support.proofs import (
@@ -18,6 +18,7 @@ from support.proofs import (
     assert_meets,
     assert_narrow,
     assert_solves,
+    attitude_of,
     positive,
     rational,
 )

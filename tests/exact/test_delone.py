@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
@@ -20,6 +20,7 @@ from support.proofs import (
     assert_meets,
     assert_narrow,
     assert_solves,
+    attitude_of,
     positive,
     rational,
 )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from flint import arb
 
+from derivatives import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of
 from heavytop.exact.enclosure import derivatives as module
 from heavytop.exact.enclosure.derivatives import EnclosedDerivatives, derivatives, moved, step_derivatives
 from heavytop.exact.enclosure.run import Validated
@@ -18,7 +19,6 @@ from heavytop.exact.enclosure.step import Errors, Node, in_other_bits, start_nod
 from heavytop.exact.flint.balls import largest_singular_value, midpoint, radius, relative_bits, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from support.derivative_laws import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 WITH_ROTOR = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), rotor=("1/4", "-1/3", "2"))

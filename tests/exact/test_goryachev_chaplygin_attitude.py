@@ -10,9 +10,9 @@ from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, Torus, _motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
-from support.proofs import assert_attitude, assert_meets
+from support.proofs import assert_attitude, assert_meets, attitude_of
 
 F = Fraction
 PLAIN = motion_from((F(1), F(0)), ("3/2", 1, 0), UP)

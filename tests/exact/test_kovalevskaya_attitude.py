@@ -10,11 +10,11 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya, along_gamma, level_vector
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, start_of
 from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.precision import cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_meets, positive, rational, triple
+from support.proofs import assert_attitude, assert_meets, attitude_of, positive, rational, triple
 
 F = Fraction
 UP, TILTED, OTHER = (F(0), F(0), F(1)), (F(2, 7), F(3, 7), F(6, 7)), (F(2, 3), F(2, 3), F(1, 3))

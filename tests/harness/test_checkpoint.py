@@ -26,7 +26,7 @@ from support.reports import Row, expand, load, measure, replace, store
 
 pytestmark = pytest.mark.slow
 
-SUPPORT = Path(__file__).parents[1] / "support"
+VALIDATION = Path(__file__).parents[2] / "validation"
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
 PLAN = """name = "tiny"
 [[measure]]
@@ -358,7 +358,7 @@ def test_a_kill_at_every_call_that_changes_the_disk_changes_nothing(tmp_path: Pa
     plan.write_text(PLAN.split("[[measure]]\nkind")[0] + '[[measure]]\nkind = "drift"\ncases = ["euler", "lagrange"]\n'
                     'runs = [{ precision = "double", horizon = "2", samples = 2 }]\n')  # fmt: skip
     done = subprocess.run(
-        [sys.executable, str(SUPPORT / "killed_everywhere.py"), str(plan), str(tmp_path / "out")],
+        [sys.executable, str(VALIDATION / "killed_everywhere.py"), str(plan), str(tmp_path / "out")],
         capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -36,8 +36,8 @@ pytestmark = pytest.mark.slow
 PLAN = """name = "tiny"
 [[measure]]
 kind = "drift"
-cases = ["euler", "gyrostat", "pendulum"]
-runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "extended", horizon = "5", samples = 5 }]
+cases = ["euler", "lagrange", "pendulum"]
+runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "double", horizon = "6", samples = 5 }]
 """
 
 
@@ -174,13 +174,12 @@ class Slow(Poison):
         return exec, (f"import time; time.sleep(60); open({str(self.path)!r}, 'w').close()",)
 
 
-@pytest.mark.parametrize("stop", [GeneratorExit, KeyboardInterrupt, InputError])
-def test_a_run_that_is_stopped_does_not_wait_for_what_is_under_way(tasks, tmp_path: Path, stop) -> None:
+def test_a_run_that_is_stopped_does_not_wait_for_what_is_under_way(tasks, tmp_path: Path) -> None:
     slow = with_case(tasks[0], "slow", Slow(tmp_path / "done"))
     stream = rows([tasks[0], slow], 2, None)
     next(stream)
-    with pytest.raises(stop):
-        stream.throw(stop("stopped"))
+    with pytest.raises(KeyboardInterrupt):
+        stream.throw(KeyboardInterrupt)
     for process in active_children():
         process.join()
     assert not (tmp_path / "done").exists()

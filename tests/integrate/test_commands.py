@@ -359,9 +359,7 @@ def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, li
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("end", "fault"), [(signal.SIGINT, "silent"), (signal.SIGKILL, "silent"), (signal.SIGKILL, "leaves its group")]
-)
+@pytest.mark.parametrize(("end", "fault"), [(signal.SIGINT, "silent"), (signal.SIGKILL, "leaves its group")])
 def test_the_program_ends_with_this_process_however_that_ends(tmp_path: Path, end: int, fault: str) -> None:
     words = '", "'.join(["{program}", *fault.split()])
     path = toml(tmp_path, table=TABLE.replace("{program}", words))

@@ -8,7 +8,7 @@ import pytest
 
 from heavytop.measure.growth import BENT, FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
 from heavytop.report.store.checks import inconsistent
-from support.synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
+from law_coverage import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 
 @pytest.mark.slow

@@ -6,11 +6,11 @@ from random import Random
 
 import pytest
 
+from edited_reports import EDITS, document_of, trials
 from heavytop.errors import InputError
 from heavytop.records import Against, Certified, Law, Metric, Row, Series
 from heavytop.report.compare.noise import Policy
 from heavytop.report.compare.rows import judge_law, judge_series
-from support.edited_reports import EDITS, document_of, trials
 from support.reports import compare, contradictions, replace, store
 from support.small_reports import error, report, row
 

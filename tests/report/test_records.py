@@ -122,7 +122,7 @@ def test_metrics_under_their_names_are_others_than_those_given() -> None:
 
 
 def test_a_compressed_report_is_read_as_it_was_and_a_damaged_one_refused(tmp_path: Path) -> None:
-    original = Path(__file__).parents[2] / "results" / "long"
+    original = Path(__file__).parents[2] / "results" / "growth"
     for name in ("report.json", "report.json.sha256"):
         (tmp_path / name).write_bytes((original / name).read_bytes())
     content = (tmp_path / "report.json").read_bytes()

@@ -8,6 +8,8 @@ from fractions import Fraction
 
 import pytest
 
+import degraded_integrators as degraded
+from degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
 from heavytop.features.kinds import KINDS
 from heavytop.harness.rows import computed
 from heavytop.measure.rounding_noise import some_of
@@ -23,8 +25,6 @@ from heavytop.report.compare.noise import (
 )
 from heavytop.top.amplification import FOLLOWED, amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from support import degraded_integrators as degraded
-from support.degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
 from support.reports import compare, replace
 from support.small_reports import error, report, row
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import mpmath
 from flint import arb
 
-from heavytop.exact.closed_form import attitude_of
+from heavytop.exact.closed_form import state_and_attitude
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.top.equations import HEAVY_TOP, Parameters
@@ -59,6 +59,12 @@ def assert_attitude(solution, time, step=Fraction(1, 10**12)):
         for a, b, w in zip(later, earlier, wanted, strict=True):
             # the error of the central difference is step²/6 times a third derivative
             assert abs((a - b) / (2 * ball(step)) - w).abs_upper() < size.abs_upper() ** 2 * arb("1e-20")
+
+
+def attitude_of(solution, latest, bits):
+    """How the attitude of ``solution`` is known, and ξ alone."""
+    method, both = state_and_attitude(solution, latest, bits)
+    return method, lambda time, bits: both(time, bits)[6:]
 
 
 def assert_meets(solution, times, bits=170):

@@ -279,12 +279,6 @@ class BodyMotion:
 
         return self._evaluated(time, bits, evaluate)
 
-    @property
-    def start_xi(self) -> Vector | None:
-        """ξ at t = 0 in the axes given, to 256 bits where irrational; None for |γ| ≠ 1 where no attitude was given."""
-        xi = self.resolved.xi
-        return None if xi is None else rotated(self.resolved.axes, xi)
-
     def _evaluated(self, time: Fraction, bits: int, evaluate: Evaluate) -> list[arb]:
         """The vectors of ``evaluate`` in the axes given, with so many bits."""
         known = self._known(_DATA_BITS)

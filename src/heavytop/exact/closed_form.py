@@ -385,12 +385,6 @@ def state_and_attitude(
     return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
 
 
-def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
-    """How the attitude of ``solution`` is known, and ξ alone of :func:`state_and_attitude`."""
-    method, whole = state_and_attitude(solution, latest, bits)
-    return method, lambda time, bits: whole(time, bits)[6:]
-
-
 # Renaming of the principal axes, once for all cases.
 #
 # With Q a permutation of the axes and d = det Q = ±1, Q (u × v) = d Qu × Qv.  So if (Ω, γ) solves the equations of

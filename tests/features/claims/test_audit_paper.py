@@ -105,6 +105,16 @@ def test_the_reason_is_proven_and_the_system_that_is_solved_is_named(name):
     assert (found.verdict, found.exit_code) == ("refuted", 1)
 
 
+@pytest.mark.slow
+def test_the_papers_angles_list_their_pole_as_removable():
+    for system in ("heavy_top", "gyrostat"):
+        rows = [row for row in report("ershkov-partial", system).rows if row.equation in ("3.1", "4.5", "4.6", "6.1")]
+        assert rows
+        for row in rows:
+            poles = [c for c in row.conditions if c.text == "t ≠ 0 (pole of the angles)"]
+            assert [(c.discharged, c.reason) for c in poles] == [(True, "removable in gamma")]
+
+
 def test_the_json_has_the_keys_that_scripts_read():
     document = report("ershkov-partial").to_json()
     assert document.keys() >= {"claim", "system", "verdict", "equations"}

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.conditions import written
-from heavytop.features.claims.audit.audit import audit, audit_claim, claim_from_table
+from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.judge import Audit
 from heavytop.top.equations import HEAVY_TOP
 
@@ -219,16 +219,6 @@ def test_conditions_stand_in_the_text_and_in_the_json(tmp_path):
     assert all(row["holds"] is None for row in document["equations"])
     conditions = document["equations"][0]["conditions"]
     assert {"text": "t ≠ 0", "discharged": False, "reason": "not shown"} in conditions
-
-
-@pytest.mark.slow
-def test_the_papers_angles_list_their_pole_as_removable():
-    for system in ("heavy_top", "gyrostat"):
-        rows = [row for row in audit("ershkov-partial", system).rows if row.equation in ("3.1", "4.5", "4.6", "6.1")]
-        assert rows
-        for row in rows:
-            poles = [c for c in row.conditions if c.text == "t ≠ 0 (pole of the angles)"]
-            assert [(c.discharged, c.reason) for c in poles] == [(True, "removable in gamma")]
 
 
 LOOSE = {

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 import sympy
 
+import disguised_claims as disguised
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.combinations import nonnegative_combination
 from heavytop.features.claims.algebra.conditions import solve_relations
@@ -18,23 +16,13 @@ from heavytop.features.claims.algebra.structure import Defined, at_values, rate_
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.top.equations import HEAVY_TOP
 
-_PATH = Path(__file__).parents[3] / "validation" / "disguised_claims.py"
 T = sympy.Symbol("t", real=True)
 A, B, C = sympy.symbols("a b c", real=True)
 P, Q = sympy.symbols("p q", positive=True)
 
 
-@pytest.fixture(scope="module")
-def disguised():
-    spec = importlib.util.spec_from_file_location("disguised_claims", _PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
-def test_a_part_of_the_family_is_decided_and_nothing_false_holds(disguised):
+def test_a_part_of_the_family_is_decided_and_nothing_false_holds():
     """The whole of it is in validation/disguised_claims.py; one of some twenty takes seconds."""
     chosen = [claim for claim in disguised.claims() if claim.family != "definitions"][4::23]
     found = [(claim, disguised.verdict(claim)[0]) for claim in chosen]

@@ -16,7 +16,7 @@ from heavytop.integrate.registry import INTEGRATORS, Integrator, described
 from heavytop.precision import exact
 from support.in_process import heavytop
 
-FAULTS = Path(__file__).parents[2] / "support" / "hunted_integrators.py"
+FAULTS = Path(__file__).parents[3] / "validation" / "hunts.py"
 NUMBERS = ("inertia", "centre", "omega", "gamma")
 
 
@@ -28,7 +28,7 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
-    planted = Integrator(f"planted:{fault}", f"support.hunted_integrators:{fault}")
+    planted = Integrator(f"planted:{fault}", f"hunts:{fault}")
     monkeypatch.setitem(INTEGRATORS, planted.name, planted)
     hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
     assert hunt.found
@@ -48,7 +48,7 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
 
 @pytest.mark.slow
 def test_a_fault_of_heavy_gyrostats_is_found_shrunk_and_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    planted = Integrator("planted:rotor", "support.hunted_integrators:rotor")
+    planted = Integrator("planted:rotor", "hunts:rotor")
     monkeypatch.setitem(INTEGRATORS, planted.name, planted)
     hunt = ht.hunt("planted:rotor", budget=10, horizon=1, family="heavy_gyrostat")
     worst = hunt.found[0]

@@ -2,26 +2,19 @@
 file; the joint and the clock measured by themselves.
 """
 
-import importlib.util
 import json
 import random
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import engine_files
+from engine_files import Log
 from heavytop.features.score.measurement import Assessment
 from heavytop.features.score.text import to_json
 from support.in_process import heavytop
-
-FILE = Path(__file__).parents[3] / "validation" / "engine_files.py"
-SPEC = importlib.util.spec_from_file_location("engine_files", FILE)
-engine_files = importlib.util.module_from_spec(SPEC)
-sys.modules["engine_files"] = engine_files
-SPEC.loader.exec_module(engine_files)
-Log = engine_files.Log
 
 COARSE = replace(engine_files.random_engine(random.Random(5), "semi-implicit Euler"), step=1e-3, every=50, samples=12)
 FINE = replace(COARSE, method="Munthe-Kaas", step=0.005, every=40, omega=np.array([0.7, -0.4, 3.0]))

@@ -4,30 +4,23 @@ of convention named, right ones not accused, bad input refused by its place.
 The motions are those of validation/conventions.py: Taylor series on the full tensor, in extended precision.
 """
 
-import importlib.util
 import json
 import random
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import conventions
 import heavytop as ht
+from conventions import Written
 from heavytop.errors import InputError
 from heavytop.features.score.measurement import Assessment, assess
 from heavytop.features.score.text import to_json
 from heavytop.features.score.trajectories.files import read
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import Body
-
-FILE = Path(__file__).parents[3] / "validation" / "conventions.py"
-SPEC = importlib.util.spec_from_file_location("conventions", FILE)
-conventions = importlib.util.module_from_spec(SPEC)
-sys.modules["conventions"] = conventions
-SPEC.loader.exec_module(conventions)
-Written = conventions.Written
 
 BODY = conventions.general(random.Random(3))
 """A body, its motion at 20 times, its quaternion and Ω at the start."""

@@ -330,3 +330,16 @@ def test_the_order_of_a_method_with_a_tolerance_is_seen_in_its_mean_steps() -> N
     (bounded,) = panels([at("1e-4", -3, 12), at("1e-6", -5, 100), at("eps", -14.9, 5000)])["top/T=9"]
     (ours,) = panels([msgspec.structs.replace(each, order=20) for each in OURS])["top/T=9"]
     assert bounded.order is ours.order is None
+
+
+def test_no_order_is_read_where_the_motion_amplifies_rounding_to_the_error() -> None:
+    """The rounding of an unstable motion, from which RK4 at 1/1000 gains no more, is no second order."""
+
+    def at(step: str, log10: float, steps: int, factor: float) -> Row:
+        made = row(f"mine step={step}", log10, 1.0)
+        return msgspec.structs.replace(made, steps=steps, order=4, amplification=factor)
+
+    points = ("1/50", -5.2, 500), ("1/100", -6.4, 1000), ("1/1000", -9.3, 10_000)
+    for factor, order in ((7e4, "4.0"), (60.0, "2.9")):
+        (line,) = panels([at(*point, factor) for point in points])["top/T=9"]
+        assert line.order_text == f"{order} (declared: 4)"

@@ -6,7 +6,7 @@ rational place on it; N, Ω and γ follow as square roots of rational numbers, |
 
 What a program integrates are rational data near them, :meth:`AlgebraicMotion.rounded`.  These are outside the class:
 their own truth is the validated enclosure (:mod:`heavytop.exact.enclosure.run`), as for any top, up to its reach and no
-farther.  :meth:`AlgebraicMotion.departure` encloses how far the two motions are apart.
+farther.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from heavytop.errors import InputError
 from heavytop.exact.cases.lagrange import polynomial
 from heavytop.exact.cases.one_interval import IntervalCurve, OneGapMotion, gaps, value
 from heavytop.exact.closed_form import cached_per_precision
-from heavytop.exact.enclosure.run import Validated
-from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import BallLike, ball, exponent, midpoint, to_bits
 from heavytop.exact.separable.oscillation import Azimuth, Bearing, WithBearing
 from heavytop.precision import Vector, decimal_text, round_to, shown
 from heavytop.top.heavy_top import HeavyTop, State
@@ -115,14 +114,6 @@ class AlgebraicMotion(WithBearing, Algebraic):
         """
         return _motion(self).bearing(_azimuth(self), ball(time))
 
-    def departure(self, top: HeavyTop, start: State, time: Fraction, bits: int) -> arb:
-        """A ball that holds the largest difference of a component of the motion from that start to this one's.
-
-        Raises OutOfReach where the enclosure of the other motion does not reach that time with so many bits.
-        """
-        other = Validated(top, start).state(time, bits)
-        return _largest(self.state(time, bits), other, bits)
-
 
 @cached_per_precision
 def _azimuth(motion: AlgebraicMotion) -> Azimuth:
@@ -133,15 +124,6 @@ def _azimuth(motion: AlgebraicMotion) -> Azimuth:
 def _motion(motion: AlgebraicMotion) -> OneGapMotion:
     q, r = motion.curve.squares(motion.place)
     return OneGapMotion.of(motion.curve, motion.place, (motion.signs[0] * (q > 0), motion.signs[1] * (r > 0)))
-
-
-@whole_evaluation
-def _largest(one: list[arb], other: list[arb], bits: int) -> arb:
-    with working_precision(bits + 64):
-        largest = arb(0)
-        for a, b in zip(one, other, strict=True):
-            largest = largest.max(abs(a - b))
-        return largest
 
 
 def _signs(squares: tuple[Fraction, Fraction]) -> str:

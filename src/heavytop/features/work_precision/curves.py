@@ -70,7 +70,7 @@ class WorkPrecisionLine:
     def order_text(self) -> str:
         """The order seen, and the declared one behind it; "-" where none is seen."""
         declared = f" (declared: {self.declared})" if self.declared else ""
-        return "-" if self.order is None else f"{self.order + 0.0:.1f}{declared}"
+        return "-" if self.order is None else f"{round(self.order, 1) + 0.0:.1f}{declared}"
 
     @property
     def label(self) -> str:
@@ -196,9 +196,11 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
 
 def _step(row: Row, log10: float) -> float:
     """The step of a row, mean where a tolerance sets it, whose error is more than its roundings, in one direction, come
-    to; else 0, as where samples bound the steps, and of heyoka, whose order is another for each tolerance.
+    to as the motion amplifies them; else 0, as where samples bound the steps, and of heyoka, whose order is another for
+    each tolerance.
     """
-    rounding = math.log10(_ABOVE_ROUNDING * max(row.steps, 1) * float(parse(row.precision).eps))
+    factor = max(_ABOVE_ROUNDING, row.amplification or 1)
+    rounding = math.log10(factor * max(row.steps, 1) * float(parse(row.precision).eps))
     if log10 <= rounding:
         return 0.0
     subject = row.key.subject

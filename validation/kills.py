@@ -1,4 +1,4 @@
-"""Kill a run again and again, go on, and compare: ``python tests/support/kills.py PLAN KILLS [WORKERS [PART]] [each]``.
+"""Kill a run again and again, go on, and compare: ``python validation/kills.py PLAN KILLS [WORKERS [PART]] [each]``.
 
 PLAN: smoke, or kills.toml beside this, of middle size.
 PART: of the time that a whole run takes, within which each process is killed; 1.1.

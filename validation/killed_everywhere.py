@@ -1,4 +1,6 @@
-"""Runs of a plan, each killed at another call that changes the disk: ``python killed_everywhere.py PLAN FOLDER``.
+"""Runs of a plan, each killed at another call that changes the disk.
+
+    python validation/killed_everywhere.py PLAN FOLDER
 
 The rows are measured once; what is killed is the keeping of them.  Prints how many calls there are.
 """
