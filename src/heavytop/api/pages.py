@@ -22,7 +22,7 @@ def topics() -> dict[str, str]:
 
 
 def page(topic: str) -> str:
-    """The page in Markdown, its formulas as text; raises InputError for a topic without a page."""
+    """The page in Markdown, formulas as text, without tables that the site makes; raises InputError for no page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
         near = get_close_matches(name.lower(), files, 1)
@@ -31,7 +31,7 @@ def page(topic: str) -> str:
     return re.sub(
         r"\$\$\n(.*?)\$\$",
         lambda formula: f"```text\n{plain_formula(formula[1])}\n```",
-        files[name].read_text("utf-8"),
+        re.sub(r"```\{include\} .*\n```\n\n?", "", files[name].read_text("utf-8")),
         flags=re.DOTALL,
     )
 

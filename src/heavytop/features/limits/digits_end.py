@@ -79,7 +79,8 @@ class DigitsEnd(Tabular):
         lines = []
         for what, loss in (("the first digit", self.first), ("all digits", self.last)):
             if loss is None:
-                lines.append(f"{what}: not lost before t = {decimal_text(self.times[-1], 6)}")
+                end = decimal_text(self.times[-1], 6)
+                lines.append(f"{what}: not lost at any of {_TIMES} times up to t = {end}")
                 continue
             how = "proven" if loss.proven else "computed, beyond the reach of a proof"
             lines.append(

@@ -92,7 +92,9 @@ class Change(NamedTuple):
         """Digits lost; of errors of other kinds the decades of the largest loss."""
         if self.digits is not None:
             return self.digits[0] - self.digits[1]
-        return max((moved for each in self.findings if (moved := self.decades(each.metric)) is not None), default=0.0)
+        return max(
+            (moved for finding in self.findings if (moved := self.decades(finding.metric)) is not None), default=0.0
+        )
 
     def decades(self, name: str) -> float | None:
         """Decades by which the error of that name grew; None for what is no error, or not a number in both rows."""
@@ -109,7 +111,7 @@ class Change(NamedTuple):
     @property
     def largest_loss(self) -> float:
         """Decades of the largest loss of an error."""
-        worse = (self.decades(each.metric) for each in self.findings if each.verdict is Verdict.WORSE)
+        worse = (self.decades(finding.metric) for finding in self.findings if finding.verdict is Verdict.WORSE)
         return max((moved for moved in worse if moved is not None), default=0.0)
 
     def about(self, finding: Finding) -> Quantity | None:
@@ -151,9 +153,9 @@ class Changes:
         """Take in the findings about one row, in one report or in both; returns them as they are."""
         subject = None if old is None else old.key.subject
         self._third_party |= subject is not None and subject.what == "computed" and is_third_party(subject.name)
-        changed = [each for each in findings if each.verdict is not Verdict.SAME]
+        changed = [finding for finding in findings if finding.verdict is not Verdict.SAME]
         if changed:
-            changed.sort(key=lambda each: RANK.index(each.verdict))
+            changed.sort(key=lambda finding: RANK.index(finding.verdict))
             before, after = (old, new) if len(self.rows) < _MOST_KEPT else (None, None)
             self.rows.append(Change(changed[0].row, _without_samples(before), _without_samples(after), changed))
         if old is not None and new is not None:
@@ -177,10 +179,10 @@ class Changes:
         gained: dict[tuple[str, str], float] = {}
         lost: dict[tuple[str, str], float] = {}
         for change in self.rows:
-            for each in change.findings:
-                if each.slight or (each.verdict is Verdict.BETTER and not each.of):
-                    side, moved = (lost if each.slight else gained), change.decades(each.metric)
-                    side[each.method] = max(side.get(each.method, 0.0), math.inf if moved is None else abs(moved))
+            for finding in change.findings:
+                if finding.slight or (finding.verdict is Verdict.BETTER and not finding.of):
+                    side, moved = (lost if finding.slight else gained), change.decades(finding.metric)
+                    side[finding.method] = max(side.get(finding.method, 0.0), math.inf if moved is None else abs(moved))
 
         def is_mended(finding: Finding) -> bool:
             return finding.slight and gained.get(finding.method, 0.0) > lost[finding.method]
@@ -188,7 +190,7 @@ class Changes:
         def is_yardstick(finding: Finding) -> bool:
             return self._third_party and finding.of_yardstick
 
-        rows = (c._replace(findings=[each for each in c.findings if not is_mended(each)]) for c in self.rows)
+        rows = (c._replace(findings=[finding for finding in c.findings if not is_mended(finding)]) for c in self.rows)
         verdicts = [change for change in rows if change.findings]
         self.yardstick = [change for change in verdicts if is_yardstick(change.findings[0])]
         self.rows = [change for change in verdicts if not is_yardstick(change.findings[0])]
@@ -201,15 +203,20 @@ class Changes:
         What it has lost by then falls more slowly than the method's own error, which is larger at the others.
         """
         curve = _curve(change.identity)
-        points, changed = self.points.get(curve, []), [each for each in self.rows if _curve(each.identity) == curve]
-        if len(points) < 2 or not all(each.old and each.old.steps and each.new and each.new.steps for each in changed):
+        points, changed = (
+            self.points.get(curve, []),
+            [change for change in self.rows if _curve(change.identity) == curve],
+        )
+        if len(points) < 2 or not all(
+            change.old and change.old.steps and change.new and change.new.steps for change in changed
+        ):
             return ""
         finest = max(point.steps[0] for point in points)
-        lost = {math.log10(each.old.steps): each.largest_loss for each in changed if each.old}
-        if finest not in lost or any(abs(_steps(each)) > _STEPS_MOVED for each in changed):
+        lost = {math.log10(change.old.steps): change.largest_loss for change in changed if change.old}
+        if finest not in lost or any(abs(_steps(change)) > _STEPS_MOVED for change in changed):
             return ""
         most = lost.pop(finest)
-        if any(each > _LESS * most for each in lost.values()):
+        if any(loss > _LESS * most for loss in lost.values()):
             return ""
         return "lost less" if lost else "are the same"
 
@@ -247,12 +254,12 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     ranked += [sentence for moved, sentence in orders if moved > 0]
     still, beside = _still_failed(failed), _yardstick(changes)
     ranked = [*ranked, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still) - len(beside)]
-    named = frozenset[Identity]().union(*(each.rows for each in ranked))
+    named = frozenset[Identity]().union(*(group.rows for group in ranked))
     rest = [change for change in changes.rows if change.identity not in named]
     end = f"{plural(len(rest), 'other row')} changed." if rest else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
-    return [clip(text, _LONGEST) for text in (*(each.text for each in ranked), *still, end, *beside)]
+    return [clip(text, _LONGEST) for text in (*(group.text for group in ranked), *still, end, *beside)]
 
 
 def _yardstick(changes: Changes) -> list[str]:
@@ -282,7 +289,9 @@ def _why(row: Row) -> str:
 
 def line(change: Change) -> str:
     """The change of one row in a few words: digits lost or gained, else its largest change for the worse."""
-    worst = max(change.findings, key=lambda each: (-RANK.index(each.verdict), change.decades(each.metric) or -math.inf))
+    worst = max(
+        change.findings, key=lambda finding: (-RANK.index(finding.verdict), change.decades(finding.metric) or -math.inf)
+    )
     if not worst.metric:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
     digits, count = change.digits, len(list(folded(change)))
@@ -309,8 +318,10 @@ def folded(change: Change) -> Iterator[tuple[str, list[Finding]]]:
 
 def statistics(change: Change, name: str, findings: Sequence[Finding]) -> str:
     """Which statistics of a quantity changed: ``drift_energy: max, rms, series``."""
-    measured = ((each, change.measured(each)) for each in findings)
-    parts = ("series" if each.of == "series" else found.statistic if found else "" for each, found in measured)
+    measured = ((finding, change.measured(finding)) for finding in findings)
+    parts = (
+        "series" if finding.of == "series" else quantity.statistic if quantity else "" for finding, quantity in measured
+    )
     listed = ", ".join(part for part in parts if part)
     return f"{name}: {listed}" if listed else name
 
@@ -319,7 +330,7 @@ def _without_samples(row: Row | None) -> Row | None:
     """A row whose series say only what they are about: sentences need no more, and they are most of its size."""
     if row is None or not row.series:
         return row
-    series = {name: Series([], [], each.quantity) for name, each in row.series.items()}
+    series = {name: Series([], [], series.quantity) for name, series in row.series.items()}
     return msgspec.structs.replace(row, series=series)
 
 
@@ -367,7 +378,7 @@ def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
     for name, moved, sentence in chain(_orders_of_steps(changes), _orders_of_settings(changes)):
         if name not in largest or abs(moved) > abs(largest[name][0]):
             largest[name] = moved, sentence
-    yield from sorted(largest.values(), key=lambda each: each[0])
+    yield from sorted(largest.values(), key=lambda entry: entry[0])
 
 
 _SHOW_ORDER = {OBSERVED_ORDER: "single steps", ORDER_OF_RUNS: "whole runs"}
@@ -396,7 +407,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                 falls = [a - b for a, b in zip(coarse.errors, fine.errors, strict=True)]
                 before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
-                    steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
+                    steps = " to ".join(f"{10 ** steps_range.steps[0]:.0f}" for steps_range in (coarse, fine))
                     first = next(iter(rows))
                     where = f"{_case(first)} from {steps} steps ({clip(first.program, 40)}, {precision})"
                     text = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
@@ -407,7 +418,7 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
     """The explanations of states that are far off now and were not: of each integrator that of most rows."""
     by_integrator: dict[str, dict[str, list[tuple[str, Identity]]]] = {}
     for change in changes.worst_first:
-        new, old = (each.explained if each else msgspec.UNSET for each in (change.new, change.old))
+        new, old = (row.explained if row else msgspec.UNSET for row in (change.new, change.old))
         if new and (not old or old.kind != new.kind):
             kinds = by_integrator.setdefault(change.identity.key.subject.name, {})
             kinds.setdefault(new.kind, []).append((new.text, change.identity))
@@ -501,7 +512,7 @@ def _ends_as_before(change: Change) -> bool:
     """Whether of a computed row whose digits fell the last state is as right as it was: files do not say steps."""
     computed = change.old is not None and change.old.key.subject.what == "computed"
     moved = [] if change.old is None or not computed else [change.decades(name) for name in _finals(change.old)]
-    return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
+    return bool(moved) and all(error is not None and error < _ENDS_AS_BEFORE for error in moved)
 
 
 def _finals(row: Row) -> list[str]:

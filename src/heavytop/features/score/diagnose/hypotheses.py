@@ -124,55 +124,60 @@ READINGS = sorted((reading for reading in _readings() if reading.changes), key=l
 """Every reading that is tried, the simplest first."""
 
 
-def reading(given: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
+def reading(run: Examined, truth: Array) -> tuple[ColumnsHypothesis, float] | None:
     """The simplest reading of the columns that fits about as well as the best, and its error."""
-    if len(given.frame.columns) < 6:
+    if len(run.frame.columns) < 6:
         return None
-    errors = [given.error(each.columns(truth[:, :6], given.tensor)) for each in READINGS]
+    errors = [run.error(reading.columns(truth[:, :6], run.tensor)) for reading in READINGS]
     best = min(errors)
     return next(
-        ((each, error) for each, error in zip(READINGS, errors, strict=True) if error <= ALIKE * max(best, FLOOR)), None
+        (
+            (reading, error)
+            for reading, error in zip(READINGS, errors, strict=True)
+            if error <= ALIKE * max(best, FLOOR)
+        ),
+        None,
     )
 
 
-def scaled(given: Examined, truth: Array) -> Iterator[Hypothesis]:
+def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Ω, γ or one column times a constant factor: kind, numbers, and the error of the states divided by the factor."""
     groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
     groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
     for kind, columns in groups:
-        if not set(range(6)[columns]) <= set(given.frame.columns):
+        if not set(range(6)[columns]) <= set(run.frame.columns):
             continue
         true, whole = truth[:, columns], truth[:, :3] if columns.start < 3 else truth[:, 3:]
         if true.size < _FEWEST or numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
             continue
-        fitted = float((given.states[:, columns] * true).sum() / (true * true).sum())
+        fitted = float((run.states[:, columns] * true).sum() / (true * true).sum())
         if not numpy.isfinite(fitted) or not fitted:
             continue
-        left = _divided(given, truth, columns, fitted)
+        left = _divided(run, truth, columns, fitted)
         factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
         if factor and (factor != -1 or true.shape[1] == 1) and notable(factor, Fraction(1)):
             numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
             numbers["factor"] = decimal_text(factor, 8)
-            yield Hypothesis(kind, numbers, _divided(given, truth, columns, float(factor)), FITTED_DROP)
+            yield Hypothesis(kind, numbers, _divided(run, truth, columns, float(factor)), FITTED_DROP)
 
 
-def _divided(given: Examined, truth: Array, columns: slice, factor: float) -> float:
-    states = given.states.copy()
+def _divided(run: Examined, truth: Array, columns: slice, factor: float) -> float:
+    states = run.states.copy()
     states[:, columns] /= factor
-    return replace(given, states=states).error(truth)
+    return replace(run, states=states).error(truth)
 
 
-def constant_column(given: Examined, truth: Array) -> Iterator[Hypothesis]:
+def constant_column(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """A column that is the same in every state, and the error of the other five."""
-    if len(given.rows) < _FEWEST:
+    if len(run.rows) < _FEWEST:
         return
-    still = (given.all_states == given.all_states[0]).all(axis=0)
-    for column in (column for column in given.frame.columns if still[column]):
-        states = given.states.copy()
+    still = (run.all_states == run.all_states[0]).all(axis=0)
+    for column in (column for column in run.frame.columns if still[column]):
+        states = run.states.copy()
         states[:, column] = truth[:, column]
-        value = Fraction(float(given.states[0, column])) / (given.units.time if column < 3 else 1)
+        value = Fraction(float(run.states[0, column])) / (run.units.time if column < 3 else 1)
         numbers = {"column": NAMES[column], "value": decimal_text(value, 6)}
-        yield Hypothesis("column_constant", numbers, replace(given, states=states).error(truth), FITTED_DROP)
+        yield Hypothesis("column_constant", numbers, replace(run, states=states).error(truth), FITTED_DROP)
 
 
 _SINGULAR = 1e-4
@@ -191,29 +196,29 @@ _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
 
 
-def without_numbers(given: Examined) -> Iterator[Hypothesis]:
+def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     """Mistakes of the data that need no fitted number, the likeliest first."""
-    top, start = given.top, given.start
+    top, start = run.top, run.start
     if top.weight:
-        yield _tried(given, "no_gravity", replace(top, weight=Fraction(0)))
-    yield _tried(given, "weight_sign", replace(top, weight=-top.weight))
-    yield _tried(given, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
-    yield _tried(given, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
+        yield _tried(run, "no_gravity", replace(top, weight=Fraction(0)))
+    yield _tried(run, "weight_sign", replace(top, weight=-top.weight))
+    yield _tried(run, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
+    yield _tried(run, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
     k = top.rotor or (Fraction(0),) * 3
     momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
-    yield _tried(given, "start_momentum", start=momentum)
-    yield _as_momentum(given, momentum)
+    yield _tried(run, "start_momentum", start=momentum)
+    yield _as_momentum(run, momentum)
     for unit, factor in UNITS_OF_OMEGA.items():
-        yield Hypothesis(f"all_in_{unit}", {}, _all_times(given, factor))
-    other = GYROSTAT if given.system is HEAVY_TOP else HEAVY_TOP
-    yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
+        yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
+    other = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
+    yield _tried(replace(run, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
     if top.rotor is not None:
-        yield _tried(given, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
-    own = given.tensor, given.in_file(top.centre), given.in_file(k)
+        yield _tried(run, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
+    own = run.tensor, run.in_file(top.centre), run.in_file(k)
     for kind, numbers, *body in other_axes(*own):
         if not all(map(numpy.array_equal, body, own)):
-            supposed = given.with_body(body[0], float(top.weight) * body[1], body[2])
-            yield Hypothesis(kind, numbers, supposed.error(supposed.supposed(given.times)))
+            supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
+            yield Hypothesis(kind, numbers, supposed.error(supposed.supposed(run.times)))
 
 
 def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
@@ -229,89 +234,89 @@ def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str
         yield "centre_signs", {"centre": ", ".join(texts)}, tensor, centre * signs, rotor
 
 
-def _tried(given: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Hypothesis:
-    tops = (top or given.top, given.top)
+def _tried(run: Examined, kind: str, top: HeavyTop | None = None, start: State | None = None) -> Hypothesis:
+    tops = (top or run.top, run.top)
     same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
-    if same and (start is None or start == given.start) and kind != "system":
+    if same and (start is None or start == run.start) and kind != "system":
         return Hypothesis(kind, {}, float("inf"))
-    return Hypothesis(kind, {}, given.error(given.supposed(given.times, top, start)))
+    return Hypothesis(kind, {}, run.error(run.supposed(run.times, top, start)))
 
 
-def _as_momentum(given: Examined, start: State) -> Hypothesis:
+def _as_momentum(run: Examined, start: State) -> Hypothesis:
     """Start and states give M in place of Ω."""
-    truth = given.supposed(given.times, start=start)
+    truth = run.supposed(run.times, start=start)
     if truth is not None:
-        truth[:, :3] = truth[:, :3] @ given.tensor + given.in_file(given.top.rotor or (Fraction(0),) * 3)
-    return Hypothesis("all_momentum", {}, given.error(truth))
+        truth[:, :3] = truth[:, :3] @ run.tensor + run.in_file(run.top.rotor or (Fraction(0),) * 3)
+    return Hypothesis("all_momentum", {}, run.error(truth))
 
 
-def _all_times(given: Examined, factor: float) -> float:
+def _all_times(run: Examined, factor: float) -> float:
     """The error where start and states give Ω times ``factor``."""
-    start = State([w / Fraction(factor) for w in given.start.omega], given.start.gamma)
-    truth = given.supposed(given.times, start=start)
-    return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
+    start = State([w / Fraction(factor) for w in run.start.omega], run.start.gamma)
+    truth = run.supposed(run.times, start=start)
+    return run.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
 
 
-def all_scaled(given: Examined) -> Hypothesis | None:
+def all_scaled(run: Examined) -> Hypothesis | None:
     """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
-    square = _weight_ratio(given)
+    square = _weight_ratio(run)
     if square is None or square <= 0:
         return None
     fitted = square**0.5
-    left = _all_times(given, fitted)
+    left = _all_times(run, fitted)
     factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
     if not factor or not notable(factor, Fraction(1)):
         return None
     numbers = {"factor": decimal_text(factor, 8)}
-    return Hypothesis("all_scaled", numbers, _all_times(given, float(factor)), FITTED_DROP)
+    return Hypothesis("all_scaled", numbers, _all_times(run, float(factor)), FITTED_DROP)
 
 
-def _weight_ratio(given: Examined) -> float | None:
+def _weight_ratio(run: Examined) -> float | None:
     """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
-    if not given.is_whole:
+    if not run.is_whole:
         return None
-    tensor, start = given.tensor, given.in_file(given.start.flat)
-    omega = given.states[:, :3]
+    tensor, start = run.tensor, run.in_file(run.start.flat)
+    omega = run.states[:, :3]
     kinetic = 0.5 * (numpy.einsum("ni,ij,nj->n", omega, tensor, omega) - start[:3] @ tensor @ start[:3])
-    height = (given.states[:, 3:6] - start[3:]) @ given.in_file(given.top.moment)
+    height = (run.states[:, 3:6] - start[3:]) @ run.in_file(run.top.moment)
     square = float(height @ height)
     ratio = -float(kinetic @ height) / square if square else float("nan")
     return ratio if isfinite(ratio) else None
 
 
-def another_weight(given: Examined) -> Hypothesis | None:
+def another_weight(run: Examined) -> Hypothesis | None:
     """P from the energy."""
-    ratio, old = _weight_ratio(given), given.top.weight
+    ratio, old = _weight_ratio(run), run.top.weight
     if ratio is None or not isfinite(ratio * float(old)):
         return None
     fitted = ratio * float(old)
     candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
-    tops = [(weight, replace(given.top, weight=weight)) for weight in candidates]
-    weight, error = _roundest([(weight, given.error(given.supposed(given.times, top))) for weight, top in tops])
+    tops = [(weight, replace(run.top, weight=weight)) for weight in candidates]
+    weight, error = _roundest([(weight, run.error(run.supposed(run.times, top))) for weight, top in tops])
     if not notable(weight, old):
         return None
-    return Hypothesis("weight", {"P": _text(weight * given.units.moment)}, error, FITTED_DROP)
+    return Hypothesis("weight", {"P": _text(weight * run.units.moment)}, error, FITTED_DROP)
 
 
-def another_start(given: Examined) -> Hypothesis | None:
+def another_start(run: Examined) -> Hypothesis | None:
     """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
 
     The error must fall by more than the motion itself magnifies it from the start to the first sample: where
     neighbouring motions part quickly, the errors of a method look like those of a start.
     """
-    times = given.times
-    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(given.states[0]).any():
+    times = run.times
+    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]) or numpy.isnan(run.states[0]).any():
         return None
-    back = given.starting(given.states[0]).supposed([-times[0]])
-    truth = given.supposed(times[:1])
-    if back is None or truth is None or not _shows_at_once(given, truth):
+    back = run.starting(run.states[0]).supposed([-times[0]])
+    truth = run.supposed(times[:1])
+    if back is None or truth is None or not _shows_at_once(run, truth):
         return None
-    start = given.in_file(given.start.flat)
-    error = given.error(given.starting(back[0]).supposed(times))
+    start = run.in_file(run.start.flat)
+    error = run.error(run.starting(back[0]).supposed(times))
     off = numpy.abs(back[0, :6] - start)
-    magnified = float(numpy.abs(given.states[0] - truth[0]).max() / (off.max() or 1.0))
-    sizes = [max(given.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
-    units = [given.units.time] * 3 + [Fraction(1)] * 3
+    magnified = float(numpy.abs(run.states[0] - truth[0]).max() / (off.max() or 1.0))
+    sizes = [max(run.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
+    units = [run.units.time] * 3 + [Fraction(1)] * 3
     noise = _MARGIN * max(error, 1e-12)
     changed = [
         (name, named(float(value), noise * size), unit, change > _BIAS * size, noise * size)
@@ -330,26 +335,26 @@ def _is_round(new: Fraction, near: float) -> bool:
     return new == Fraction(decimal_text(new, SHORT)) and near <= _SPARSE * 10.0**-SHORT * abs(float(new))
 
 
-def _shows_at_once(given: Examined, first: Array) -> bool:
+def _shows_at_once(run: Examined, first: Array) -> bool:
     """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
     method may look like one from another start.
     """
-    early, largest = given.at(given.rows[:1]).error(first), given.error(given.supposed(given.times))
+    early, largest = run.at(run.rows[:1]).error(first), run.error(run.supposed(run.times))
     return early >= _AT_ONCE * largest
 
 
-def another_top(given: Examined) -> Hypothesis | None:
+def another_top(run: Examined) -> Hypothesis | None:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
-    entries = _PRODUCTS if _is_full(given) else _PRODUCTS[:3]
-    direction = _conserving(given, entries) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
-    before = [Fraction(given.tensor[place]) for place in entries] + [*map(Fraction, given.in_file(given.top.moment))]
+    entries = _PRODUCTS if _is_full(run) else _PRODUCTS[:3]
+    direction = _conserving(run, entries) if run.system is HEAVY_TOP and len(run.rows) >= 3 else None
+    before = [Fraction(run.tensor[entry]) for entry in entries] + [*map(Fraction, run.in_file(run.top.moment))]
     if direction is None or not (direction * floats(before)).any():
         return None
     scaled = [_scaled(direction, before, near) for near in _NEAR]
-    tried = [(numbers, _with(given, numbers[:-3], numbers[-3:])) for numbers in scaled]
+    tried = [(numbers, _with(run, numbers[:-3], numbers[-3:])) for numbers in scaled]
     numbers, error = _roundest(tried)
-    units = [given.units.inertia] * len(numbers[3:]) + [given.units.moment] * 3
-    names = [f"I{i + 1}{j + 1}" if _is_full(given) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
+    units = [run.units.inertia] * len(numbers[3:]) + [run.units.moment] * 3
+    names = [f"I{i + 1}{j + 1}" if _is_full(run) else f"I{i + 1}" for i, j in entries] + ["P a", "P b", "P c"]
     entries_of = zip(names, before, numbers, units, strict=True)
     changed = {name: _text(new * unit) for name, old, new, unit in entries_of if new != old}
     told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
@@ -362,25 +367,25 @@ _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a tensor: three of a diagonal one."""
 
 
-def _is_full(given: Examined) -> bool:
-    return bool((given.frame.axes != numpy.eye(3)).any())
+def _is_full(run: Examined) -> bool:
+    return bool((run.frame.axes != numpy.eye(3)).any())
 
 
-def _conserving(given: Examined, entries: Sequence[tuple[int, int]]) -> Array | None:
+def _conserving(run: Examined, entries: Sequence[tuple[int, int]]) -> Array | None:
     """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
-    if not given.is_whole:
+    if not run.is_whole:
         return None
-    start = given.in_file(given.start.flat)
+    start = run.in_file(run.start.flat)
 
     def products(one: Array, other: Array) -> Array:
-        found = [one[..., i] * other[..., j] + (one[..., j] * other[..., i] if i != j else 0) for i, j in entries]
-        return numpy.stack(found, axis=-1)
+        products = [one[..., i] * other[..., j] + (one[..., j] * other[..., i] if i != j else 0) for i, j in entries]
+        return numpy.stack(products, axis=-1)
 
-    omega, gamma = given.states[:, :3], given.states[:, 3:6]
+    omega, gamma = run.states[:, :3], run.states[:, 3:6]
     area = products(omega, gamma) - products(start[:3], start[3:])
     turning = 0.5 * (products(omega, omega) - products(start[:3], start[:3]))
     energy = numpy.hstack([turning, gamma - start[3:]])
-    size = given.rate or 1.0
+    size = run.rate or 1.0
     units = numpy.array([size**2] * len(entries) + [1.0] * 3)
     rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(gamma)]), energy]) / units
     if not numpy.isfinite(rows).all():
@@ -388,8 +393,8 @@ def _conserving(given: Examined, entries: Sequence[tuple[int, int]]) -> Array | 
     _, values, directions = numpy.linalg.svd(rows)
     if len(values) < len(units) or values[-1] > _SINGULAR * values[-2]:
         return None
-    found: Array = directions[-1] / units
-    return found
+    direction: Array = directions[-1] / units
+    return direction
 
 
 def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[Fraction]:
@@ -405,16 +410,16 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
     ]
 
 
-def _with(given: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
+def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
     """The error with those entries of the tensor, and P r."""
     tensor = numpy.zeros((3, 3))
     for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
         tensor[i, j] = tensor[j, i] = value
     try:
-        supposed = given.with_body(tensor, floats(moment))
+        supposed = run.with_body(tensor, floats(moment))
     except InputError:  # a moment that is not positive
         return float("inf")
-    return supposed.error(supposed.supposed(given.times))
+    return supposed.error(supposed.supposed(run.times))
 
 
 _Numbers = TypeVar("_Numbers")
@@ -452,22 +457,26 @@ _STEP = 0.05
 _OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
 
 
-def of_equations(given: Examined, truth: Array | None) -> Iterator[Hypothesis]:
+def of_equations(run: Examined, truth: Array | None) -> Iterator[Hypothesis]:
     """Other equations, axes and orders; one equation with the other sign only where nothing else fits."""
-    found: list[Hypothesis] = []
+    hypotheses: list[Hypothesis] = []
     if truth is not None:
-        found += constant_column(given, truth)
-        found += [_any_order(given, truth), *_axes_of_space(given, truth)] if len(given.frame.columns) == 6 else []
-    if given.system is HEAVY_TOP and given.is_whole:
-        found += _signs(given)
-    yield from found
-    error = given.error(truth)
-    if given.is_whole and error > _ANOTHER_MOTION and all(each.left * FITTED_DROP > error for each in found):
-        for place, name in enumerate(NAMES):
-            system = _negated(given.system, place, tuple(map(tuple, given.frame.axes.tolist())))
-            other = replace(given, system=system)
+        hypotheses += constant_column(run, truth)
+        hypotheses += [_any_order(run, truth), *_axes_of_space(run, truth)] if len(run.frame.columns) == 6 else []
+    if run.system is HEAVY_TOP and run.is_whole:
+        hypotheses += _signs(run)
+    yield from hypotheses
+    error = run.error(truth)
+    if (
+        run.is_whole
+        and error > _ANOTHER_MOTION
+        and all(hypothesis.left * FITTED_DROP > error for hypothesis in hypotheses)
+    ):
+        for index, name in enumerate(NAMES):
+            system = _negated(run.system, index, tuple(map(tuple, run.frame.axes.tolist())))
+            other = replace(run, system=system)
             if _begins_so(other, error / LIKELY_DROP):
-                left = given.error(other.supposed(given.times))
+                left = run.error(other.supposed(run.times))
                 yield Hypothesis("component_sign", {"column": name}, left, FITTED_DROP)
 
 
@@ -495,41 +504,41 @@ def _begins_so(given: Examined, allowed: float) -> bool:
 
 
 @lru_cache(maxsize=18)
-def _negated(system: System, place: int, axes: tuple[tuple[float, ...], ...]) -> System:
+def _negated(system: System, index: int, axes: tuple[tuple[float, ...], ...]) -> System:
     """The equations with the derivative of one component, in the axes of the file, negated."""
-    along, block = axes[place % 3], slice(place - place % 3, place - place % 3 + 3)
+    along, block = axes[index % 3], slice(index - index % 3, index - index % 3 + 3)
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        found = list(system.field(p, y))
-        twice = 2.0 * dot(along, found[block])
-        found[block] = [
-            value - part * twice if part else value for value, part in zip(found[block], along, strict=True)
+        rates = list(system.field(p, y))
+        twice = 2.0 * dot(along, rates[block])
+        rates[block] = [
+            value - part * twice if part else value for value, part in zip(rates[block], along, strict=True)
         ]
-        return tuple(found)
+        return tuple(rates)
 
-    name = f"{system.name}_{NAMES[place]}_negated" + "_".join(map(float.hex, along))
+    name = f"{system.name}_{NAMES[index]}_negated" + "_".join(map(float.hex, along))
     return replace(system, name=name, field=field)
 
 
-def _signs(given: Examined) -> Iterator[Hypothesis]:
+def _signs(run: Examined) -> Iterator[Hypothesis]:
     """A sign in the equations turned over.
 
     With −Ω in the place of Ω, M' = Ω × M + P γ × r is M' = M × Ω − P γ × r, and γ' = γ × Ω is γ' = Ω × γ.
     """
-    top, start = given.top, given.start
+    top, start = run.top, run.start
     lifted, reversed_start = replace(top, weight=-top.weight), State([-w for w in start.omega], start.gamma)
-    other = replace(given, system=_TURNED_BACK)
-    yield Hypothesis("kinematic_sign", {}, given.error(other.supposed(given.times)), FITTED_DROP)
+    other = replace(run, system=_TURNED_BACK)
+    yield Hypothesis("kinematic_sign", {}, run.error(other.supposed(run.times)), FITTED_DROP)
     for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
-        found = replace(given, system=system).supposed(given.times, lifted, reversed_start)
-        error = given.error(None if found is None else found[:, :6] * _OMEGA_BACK)
+        states = replace(run, system=system).supposed(run.times, lifted, reversed_start)
+        error = run.error(None if states is None else states[:, :6] * _OMEGA_BACK)
         yield Hypothesis(kind, {}, error, FITTED_DROP)
 
 
-def _axes_of_space(given: Examined, truth: Array) -> Iterator[Hypothesis]:
+def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
     """Ω, or Ω and γ, in axes fixed in space, one of which is vertical: |Ω| and the vertical part Ω·γ tell."""
-    omega, gamma, truth = given.states[:, :3], given.states[:, 3:6], truth[:, :6]
-    size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate)
+    omega, gamma, truth = run.states[:, :3], run.states[:, 3:6], truth[:, :6]
+    size = max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate)
     length = numpy.abs(numpy.linalg.norm(omega, axis=1) - numpy.linalg.norm(truth[:, :3], axis=1)).max() / size
     vertical = (truth[:, :3] * truth[:, 3:]).sum(axis=1)
     for axis in range(3):
@@ -541,18 +550,18 @@ def _axes_of_space(given: Examined, truth: Array) -> Iterator[Hypothesis]:
             yield Hypothesis("axes_of_space", numbers, float(left), FITTED_DROP)
 
 
-def _any_order(given: Examined, truth: Array) -> Hypothesis:
+def _any_order(run: Examined, truth: Array) -> Hypothesis:
     """Each column as that component, or its negative, that it is nearest to."""
     truth = truth[:, :6]
-    sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * given.rate), numpy.abs(truth[:, 3:]).max()], 3)
+    sizes = numpy.repeat([max(numpy.abs(truth[:, :3]).max(), 1e-3 * run.rate), numpy.abs(truth[:, 3:]).max()], 3)
     both = numpy.hstack([truth, -truth]) / numpy.tile(sizes, 2)
     off = numpy.array(
-        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in given.states[:, :6].T]
+        [numpy.abs(column[:, None] / numpy.tile(sizes, 2) - both).max(axis=0) for column in run.states[:, :6].T]
     )
     nearest = off.argmin(axis=1)
     if sorted(nearest % 6) != list(range(6)):
         return Hypothesis("column_order", {}, float("inf"))
-    names = ", ".join(("−" if place >= 6 else "") + NAMES[place % 6] for place in nearest)
+    names = ", ".join(("−" if index >= 6 else "") + NAMES[index % 6] for index in nearest)
     return Hypothesis("column_order", {"columns": names}, float(off.min(axis=1).max()), FITTED_DROP)
 
 
@@ -579,20 +588,20 @@ _FEWEST_ROWS = 3
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
 
-def clock(given: Examined, fitted: bool) -> Hypothesis | None:
+def clock(run: Examined, fitted: bool) -> Hypothesis | None:
     """The simplest of the mistakes of the times that are about as good as the best.
 
     times_shifted by s: the state said to be at t is that of t + s.  time_unit with the factor f: it is that of f·t.
     """
-    found = list(_of_rows(given))
+    hypotheses = list(_of_rows(run))
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
-        if abs(float(factor * given.times[-1])) * given.rate <= FARTHEST:
-            error = given.error(given.supposed([factor * time for time in given.times]))
-            found.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
-    if fitted and len(given.rows) >= 3:
-        found += _fitted(given)
-    best = min(each.left for each in found)
-    return next((each for each in found if each.left <= ALIKE * max(best, FLOOR)), None)
+        if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
+            error = run.error(run.supposed([factor * time for time in run.times]))
+            hypotheses.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
+    if fitted and len(run.rows) >= 3:
+        hypotheses += _fitted(run)
+    best = min(hypothesis.left for hypothesis in hypotheses)
+    return next((hypothesis for hypothesis in hypotheses if hypothesis.left <= ALIKE * max(best, FLOOR)), None)
 
 
 def _unit_numbers(factor: float) -> dict[str, str]:
@@ -600,46 +609,46 @@ def _unit_numbers(factor: float) -> dict[str, str]:
     return {"factor": f"{factor:.6g}"} | ({} if steps is None else {"steps": str(steps)})
 
 
-def _of_rows(given: Examined) -> Iterator[Hypothesis]:
+def _of_rows(run: Examined) -> Iterator[Hypothesis]:
     """Rows that are those of other times."""
-    every = given.all_times
-    tried = [("time_reversed", given, [-time for time in given.times])]
+    every = run.all_times
+    tried = [("time_reversed", run, [-time for time in run.times])]
     if len(every) > 1:
-        tried.append(("start_row_missing", given, [every[row - 1] if row else Fraction(0) for row in given.rows]))
-        tried.append(("rows_reversed", given, [every[-1 - row] for row in given.rows]))
-        tried.append(("rows_off_by_one", *_neighbours(given, 1, 2 * every[-1] - every[-2])))
-        tried.append(("rows_late", *_neighbours(given, -1, 2 * every[0] - every[1])))
+        tried.append(("start_row_missing", run, [every[row - 1] if row else Fraction(0) for row in run.rows]))
+        tried.append(("rows_reversed", run, [every[-1 - row] for row in run.rows]))
+        tried.append(("rows_off_by_one", *_neighbours(run, 1, 2 * every[-1] - every[-2])))
+        tried.append(("rows_late", *_neighbours(run, -1, 2 * every[0] - every[1])))
     yield from (Hypothesis(kind, {}, at.error(at.supposed(times))) for kind, at, times in tried)
 
 
-def _neighbours(given: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
+def _neighbours(run: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
     """The states of the samples ``off`` rows on; a row at an end has no such sample, and is left out where enough are
     left that are about as wrong as all: else it is that at ``beyond``.
     """
-    inside = range(len(given.all_times))
-    rows = [row for row in given.rows if row + off in inside]
-    at = given
-    if _FEWEST_ROWS <= len(rows) < len(given.rows):
-        fewer = given.at(rows)
-        wrong, wrong_of_all = (each.error(each.supposed(each.times)) for each in (fewer, given))
-        at = fewer if ALIKE * wrong >= wrong_of_all else given
-    times = [given.all_times[row + off] if row + off in inside else beyond for row in at.rows]
+    inside = range(len(run.all_times))
+    rows = [row for row in run.rows if row + off in inside]
+    at = run
+    if _FEWEST_ROWS <= len(rows) < len(run.rows):
+        fewer = run.at(rows)
+        wrong, wrong_of_all = (samples.error(samples.supposed(samples.times)) for samples in (fewer, run))
+        at = fewer if ALIKE * wrong >= wrong_of_all else run
+    times = [run.all_times[row + off] if row + off in inside else beyond for row in at.rows]
     return at, times
 
 
-def _fitted(given: Examined) -> Iterator[Hypothesis]:
+def _fitted(run: Examined) -> Iterator[Hypothesis]:
     """Shifts and units that bring the first states onto the motion, refined over all samples."""
-    times = numpy.array([float(time) for time in given.times])
+    times = numpy.array([float(time) for time in run.times])
     if abs(times[-1] - times[0]) < _SPAN * abs(times[0]):
         return
-    reach = min(1.5 * abs(times[-1]) + 6 / given.rate, FARTHEST / given.rate)
+    reach = min(1.5 * abs(times[-1]) + 6 / run.rate, FARTHEST / run.rate)
     grid = numpy.linspace(-reach, reach, _GRID)
-    orbit = given.supposed([Fraction(value) for value in grid])
+    orbit = run.supposed([Fraction(value) for value in grid])
     if orbit is None:
         return
     sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * (orbit.shape[1] - 3))
     # a method's own lag explains the samples of an oscillation as well as any clock
-    slower = list(_refined(given, "time_unit", 1.0, times, sizes))
+    slower = list(_refined(run, "time_unit", 1.0, times, sizes))
     lag = min((error for factor, error in slower if abs(factor - 1) < _NEAR_ONE), default=float("inf"))
     for factor, error in slower:
         if abs(factor - 1) >= _NEAR_ONE or _is_short(factor):
@@ -648,16 +657,16 @@ def _fitted(given: Examined) -> Iterator[Hypothesis]:
         # a shift is the same for every sample, and of a periodic motion the smallest; a unit shows best at the earliest
         # sample away from 0
         tried = [(-1.0, 0.0)] if kind == "times_shifted" else []
-        for place in _near(orbit / sizes, given.states[0] / sizes):
-            number = grid[place] - times[0] if kind == "times_shifted" else grid[place] / times[0] if times[0] else 1.0
+        for row in _near(orbit / sizes, run.states[0] / sizes):
+            number = grid[row] - times[0] if kind == "times_shifted" else grid[row] / times[0] if times[0] else 1.0
             supposed = numpy.interp(_moved(kind, number, times), grid, numpy.arange(_GRID))
-            off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - given.states) / sizes
+            off = numpy.abs(orbit[numpy.rint(supposed).astype(int)] - run.states) / sizes
             tried.append((float(numpy.median(numpy.fmax.reduce(off, axis=1))), number))
         for _, first in sorted(tried)[: _TRIED // 3]:
-            for number, error in _refined(given, kind, first, times, sizes):
+            for number, error in _refined(run, kind, first, times, sizes):
                 near_one = kind == "time_unit" and abs(number - 1) < _NEAR_ONE
                 if _is_short(number) if near_one else ALIKE * error < lag:
-                    shift = {"shift": in_units(number, given.units.time)}
+                    shift = {"shift": in_units(number, run.units.time)}
                     numbers = _unit_numbers(number) if kind == "time_unit" else shift
                     yield Hypothesis(kind, numbers, error, FITTED_DROP)
 
@@ -672,10 +681,10 @@ def _is_short(factor: float) -> bool:
     """Whether the factor, or one over it, is of three digits or off 1 by a step, as no integrator's lag is."""
     if _steps_of_interval(factor) is not None:
         return True
-    near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
+    near = [Fraction(decimal_text(Fraction(value), _SHORT)) for value in (factor, 1 / factor)]
     return any(
-        one != 1 and abs(one / Fraction(each) - 1) < _EXACTLY
-        for one, each in zip(near, (factor, 1 / factor), strict=True)
+        one != 1 and abs(one / Fraction(value) - 1) < _EXACTLY
+        for one, value in zip(near, (factor, 1 / factor), strict=True)
     )
 
 
@@ -684,30 +693,30 @@ def _near(orbit: Array, state: Array) -> list[int]:
     far = numpy.fmax.reduce(numpy.abs(orbit - state), axis=1)
     lower = (far <= numpy.roll(far, 1)) & (far <= numpy.roll(far, -1)) & (far < _WITHIN)
     places = numpy.flatnonzero(lower)
-    return [int(place) for place in places[numpy.argsort(far[places])][:_TRIED]]
+    return [int(row) for row in places[numpy.argsort(far[places])][:_TRIED]]
 
 
 def _moved(kind: str, number: float, times: Array) -> Array:
     return times + number if kind == "times_shifted" else times * number
 
 
-def _refined(given: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, float]]:
+def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, float]]:
     """The number by Gauss-Newton, with its error; the rate of the motion is a difference quotient of the motion."""
-    small, count, before = 1e-6 / given.rate, len(times), numpy.inf
+    small, count, before = 1e-6 / run.rate, len(times), numpy.inf
     for _ in range(_REFINED):
         at = _moved(kind, number, times)
-        both = given.supposed([*map(Fraction, at), *map(Fraction, at + small)])
+        both = run.supposed([*map(Fraction, at), *map(Fraction, at + small)])
         if both is None:
             return
         here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
-        off = (given.states - here) / sizes
+        off = (run.states - here) / sizes
         if not _FALLS * (size := float(numpy.nansum(off * off))) < before:
             break  # at the least of it
         slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
-        square = float((slope * slope)[~numpy.isnan(given.states)].sum())
+        square = float((slope * slope)[~numpy.isnan(run.states)].sum())
         if not square:
             return
         number += float(numpy.nansum(slope * off)) / square
-        if not abs(_moved(kind, number, times)).max() * given.rate <= FARTHEST:
+        if not abs(_moved(kind, number, times)).max() * run.rate <= FARTHEST:
             return
-    yield number, given.error(given.supposed([Fraction(value) for value in _moved(kind, number, times)]))
+    yield number, run.error(run.supposed([Fraction(value) for value in _moved(kind, number, times)]))
