@@ -11,6 +11,6 @@ lock() {
         --no-emit-find-links --no-annotate "$@" pyproject.toml constraints/build.in -o "constraints/$name.txt"
     sed -i '1i # Made by constraints/update.sh' "constraints/$name.txt"
 }
-lock test --extra all --extra test --extra peers --extra cluster "$@"
+lock test --extra all --extra test --extra peers --extra cluster --extra logs "$@"
 lock run --extra all -c constraints/test.txt
 lock docs --extra all --extra docs -c constraints/test.txt "$@"

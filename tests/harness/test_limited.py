@@ -17,7 +17,7 @@ import pytest
 import heavytop as ht
 from heavytop.errors import InputError, NotAsked, OutOfTime
 from heavytop.features.kinds import KINDS
-from heavytop.guard import how_it_ended
+from heavytop.guard import how_it_ended, stopwatch
 from heavytop.harness.limited import RowLimits
 from heavytop.harness.plan import read
 from heavytop.records import Row
@@ -317,3 +317,22 @@ def test_what_was_not_asked_is_no_number_and_the_same_as_what_ran_out_of_time(tm
     assert verdict(good, late) == 1
     assert verdict(good, unasked) == 3
     assert verdict(unasked, good) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system counts no waiting")
+def test_what_the_program_of_a_row_waits_for_a_processor_is_not_charged() -> None:
+    busy = "import os\nos.sched_setaffinity(0, [min(os.sched_getaffinity(0))])\nwhile True: pass"
+    asking = f"import subprocess, sys\nsubprocess.Popen([sys.executable, '-c', {busy!r}]).wait()"
+    rivals = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(2)]
+    process = subprocess.Popen([sys.executable, "-c", asking], start_new_session=True)
+    try:
+        sleep(0.5)
+        alone, both = stopwatch(process.pid), stopwatch(process.pid, with_children=True)
+        sleep(1)
+        assert both() < 0.8 * alone()
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        for each in (*rivals, process):
+            each.kill()
+            each.wait()

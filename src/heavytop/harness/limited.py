@@ -113,8 +113,8 @@ class _Worker:
 
     It serves one third-party integrator at most, which may change whatever is around it.
 
-    rows: of its tasks, with their indices; the first is under way.  seconds: for how long, without what its process
-    waited for a processor.  precision: of its last task.
+    rows: of its tasks, with their indices; the first is under way.  seconds: for how long, without what its process and
+    the program that this asks waited for a processor.  precision: of its last task.
     """
 
     def __init__(self, kinds: Kinds) -> None:
@@ -149,7 +149,7 @@ class _Worker:
             self.end()
         self._guest = guest
         if not self.rows:
-            self.limit, self.seconds = limit, stopwatch(self._pid)
+            self.limit, self.seconds = limit, stopwatch(self._pid, with_children=True)
         if self._process is None:
             self._process = GuardedProcess(begin_worker, tuple(self._kinds.values()))
             self._hello = self._process.submit(os.getpid)
@@ -168,7 +168,7 @@ class _Worker:
         """Its first task, unless it was ended with it, is done, and the next under way."""
         if self.rows:
             self.rows.popleft()
-        self.seconds = stopwatch(self._pid)
+        self.seconds = stopwatch(self._pid, with_children=True)
 
     @property
     def ending(self) -> str:
@@ -185,7 +185,7 @@ class _Worker:
             with suppress(BrokenProcessPool):  # a process that is gone is noticed with its row
                 self._pid = self._hello.result()
                 self._process.guard(self._pid)
-            self._hello, self.seconds = None, stopwatch(self._pid)
+            self._hello, self.seconds = None, stopwatch(self._pid, with_children=True)
 
     def end(self) -> None:
         """Kills the process and whatever it started."""
