@@ -15,6 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import heavytop
+import layout_picture
 from heavytop import features
 from heavytop.features.kinds import KINDS
 from heavytop.version import commit
@@ -187,3 +188,9 @@ def test_a_feature_can_be_deleted_unless_a_shared_room_imports_it(
     line = [sys.executable, "-m", "validation.deletion", *arguments, "--few"]
     done = subprocess.run(line, cwd=SOURCE.parents[1], capture_output=True, text=True)
     assert (done.returncode, printed in done.stdout) == (code, True), done.stdout
+
+
+def test_the_picture_of_the_rooms_is_that_of_the_imports() -> None:
+    assert layout_picture.PICTURE.read_text("utf-8") == layout_picture.svg(), "python tools/layout_picture.py"
+    order = layout_picture.ROOMS.index
+    assert all(order(there) <= order(here) for here, there in layout_picture.counts())
