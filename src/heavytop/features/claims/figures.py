@@ -124,11 +124,11 @@ def _comparison(compared: Compared) -> Any:
         for label, curves, colour, style, width in drawn:
             column = curves.angles[:, index] if index < 3 else curves.states[:, index - 3]
             axes.plot(curves.times, column, style, color=colour, lw=width, label=label)
-        for branch, parting in compared.parted.items():
-            if parting:
+        for branch, divergence in compared.parted.items():
+            if divergence:
                 colour, dashes = _LINES[branch]
-                label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(parting.time):.4f}"
-                axes.axvline(float(parting.time), color=colour, lw=1.2, ls=dashes, label=label)
+                label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(divergence.time):.4f}"
+                axes.axvline(float(divergence.time), color=colour, lw=1.2, ls=dashes, label=label)
         axes.set_title(name, loc="left")
     for axes in grid[1]:
         axes.set_xlabel("t")
