@@ -362,3 +362,16 @@ def test_times_and_numbers_that_no_double_holds_are_left_alone() -> None:
     assert (told.kind, set(told.numbers)) == ("top", {"P a", "P b", "P c"})
     assert diagnose(top, start, HEAVY_TOP, [], [], DOUBLE, None) == []
     assert found(top, start, times[:1], y[:1]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("again_at", "kind"), [(1, "start_row_missing"), (6, "reset")])
+def test_a_motion_that_starts_again_is_told_from_rows_that_are_late(again_at: int, kind: str) -> None:
+    top, start, _ = problem(3)
+    fast, times = State([8 * value for value in start.omega], start.gamma), [Fraction(k, 2) for k in range(13)]
+    states = np.vstack([np.array([float(value) for value in fast.flat]), runge_kutta(top, fast, times[1:], 1e-3)])
+    again = np.vstack([states[:again_at], states[: len(states) - again_at]])
+    relative = np.abs(again - states).max() / np.abs(states).max()
+    exact = [[Fraction(value) for value in row] for row in again]
+    (diagnosis,) = diagnose(top, fast, HEAVY_TOP, times, exact, DOUBLE, float(relative))
+    assert diagnosis.kind == kind

@@ -203,6 +203,7 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
     """From some sample on, states are those of the motion that starts again there, as a program restarts what it lost.
 
     They jump, to a state near the start, and go on from it: a motion that comes back to its start does not jump.
+    Where the first sample after t = 0 is the start, all rows are late.
     """
     if examined is None or not examined.is_whole or len(examined.all_times) < _FEWEST_ROWS:
         return None
@@ -216,7 +217,8 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
         return None
     sizes = numpy.repeat([every.rate, 1.0], [3, orbit.shape[1] - 3])
     near = numpy.array([numpy.abs((orbit - state) / sizes).max(axis=1).min() for state in every.states])
-    back = numpy.flatnonzero((near[1:-2] <= _BACK) & (own[1:-2] > _JUMPS)) + 1
+    first = 2 if times[0] == 0 else 1
+    back = numpy.flatnonzero((near[first:-2] <= _BACK) & (own[first:-2] > _JUMPS)) + first
     for row in map(int, back):
         rows = range(row, min(row + _FOLLOWED, len(times)))
         nearest = int(numpy.abs((orbit - every.states[row]) / sizes).max(axis=1).argmin())
