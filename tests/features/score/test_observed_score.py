@@ -164,7 +164,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
             {"header": "t,qw,qx,qy", "rows": "1,0,0,1"},
             "columns of the quaternion are not complete: component z is missing",
         ),
-        ({"header": "t,a,b,c,d"}, "The first line is not t,omega1"),
+        ({"header": "t,a,b,c,d"}, "The header is not t,omega1"),
         ({"header": "t,euler1,euler2,euler3", "rows": "1,0,0,3"}, "nothing says of which sequence"),
         ({"rows": "1,0.5,0,0,abc"}, "Line 7, column qz: 'abc' is not a finite number"),
         ({"rows": "1,1,0,0,0\n2,0.5,,0,0"}, "Line 8, column qx is empty"),

@@ -179,7 +179,7 @@ def test_w_x_y_z_beside_each_other_are_a_quaternion(names: str, places: dict[str
             "# angles: degrees\n" + table("t,phi_rad,theta_rad,psi_rad,g1,g2,g3"),
             "header says radians and angles = degrees",
         ),
-        (table("t,a,b,c,d,e,f"), "The first line is not t,omega1.*: omega1, omega2"),
+        (table("t,a,b,c,d,e,f"), "The header is not t,omega1.*: omega1, omega2"),
         (table(None, order=range(3)), "without a header Row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 are of one time and differ"),

@@ -410,8 +410,14 @@ def in_space(document: Mapping[str, Any]) -> bool:
 def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
     """A list of so many members; raises InputError for anything else."""
     if not isinstance(value, list) or (count is not None and len(value) != count):
-        has = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
-        raise InputError(f"{what} {has}.", f"Give {count} numbers." if count else "Give a list.")
+        has = (
+            f"has {len(value)} numbers: {quoted(' '.join(map(str, value)))}"
+            if isinstance(value, list)
+            else "is not a list"
+        )
+        raise InputError(
+            f"{what} {has}.", f"Give {count} numbers, each with a decimal point." if count else "Give a list."
+        )
     return value
 
 

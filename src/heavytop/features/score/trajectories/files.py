@@ -157,7 +157,7 @@ class TextTable:
             )
         if width != len(COLUMNS):
             raise InputError(
-                f"The first line is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, "
+                f"The header is not {','.join(COLUMNS)}: without a header Row 1 has {width} columns, "
                 f"not {len(COLUMNS)}.",
                 "Give a header that names the columns.",
             )
@@ -175,7 +175,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
 
 def _no_header(missing: list[str]) -> InputError:
     said = f": {', '.join(missing)} not found" if missing else ""
-    return InputError(f"The first line is not {','.join(COLUMNS)}{said}.", REMEDY)
+    return InputError(f"The header is not {','.join(COLUMNS)}{said}.", REMEDY)
 
 
 def _separator(line: str) -> str | None:
