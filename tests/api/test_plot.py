@@ -141,7 +141,7 @@ def test_a_film_is_saved_as_gif(run, tmp_path) -> None:
     with Image.open(file) as film:
         assert film.n_frames == 3
     ht.plot.animate(run, frames=2)
-    with pytest.raises(InputError, match=r"no '.png' file"):
+    with pytest.raises(InputError, match=r"must be .gif or .mp4; got '.png'"):
         ht.plot.animate(run, tmp_path / "top.png")
     with pytest.raises(InputError, match="cannot be written"):
         ht.plot.animate(run, tmp_path / "none" / "top.gif", frames=1)

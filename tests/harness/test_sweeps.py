@@ -125,7 +125,7 @@ def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_pa
     tasks = plan_of(tmp_path, RANDOM + MEASURE.replace('"euler", "sweep:g", ', ""))
     assert tasks[0].times is tasks[2].times
     found = dict(rows(tasks[:2], 1, None))
-    assert [found[i].identity[1:] for i in range(2)] == [("r[0]", "heyoka")] * 2
+    assert [found[i].identity[1:] for i in range(2)] == [("r[0]", "heyoka", ())] * 2
     assert [(found[i].measure, found[i].precision) for i in range(2)] == [("drift", "double"), ("drift", "quad")]
     assert all(row.outcome == "success" for row in found.values())
 

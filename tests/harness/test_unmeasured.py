@@ -109,7 +109,7 @@ def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_on
     schedule += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
     (task,) = tasks_of(tmp_path, 'name = "work"\n' + schedule)
     row = unmeasured(task, OutOfReach("Nothing is known there."))
-    assert row.identity[1:] == ("euler/T=5", "heyoka tolerance=eps")
+    assert row.identity[1:] == ("euler/T=5", "heyoka tolerance=eps", ())
     assert (row.measure, row.system, row.precision) == ("work_precision", "heavy_top", "double")
     assert not all_good([row])
     assert all_good([replace(row, outcome="step_limit")])

@@ -157,7 +157,7 @@ def test_a_matrix_is_exact_or_refused() -> None:
     ("make", "message"),
     [
         (lambda: Attitude.quaternion("0.7", 0, 0, "0.7"), r"not of length 1: \|q\|\^2 - 1 = -0.02"),
-        (lambda: Attitude.quaternion(0, 0, 0, 0, normalize=True), "is 0"),
+        (lambda: Attitude.quaternion(0, 0, 0, 0, normalize=True), "must not be zero"),
         (lambda: Attitude.matrix([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), "reflection"),
         (lambda: Attitude.matrix([[1, 0, 0], [0, 2, 0], [0, 0, 1]], normalize=True), "not orthogonal"),
         (lambda: Attitude.matrix([1, 2]), "2 entries"),

@@ -364,7 +364,7 @@ def test_a_run_that_ends_early_says_so() -> None:
         ({"function": lambda omega, gamma: 1 / 0}, "raised ZeroDivisionError"),
         ({"function": lambda omega, gamma: float("nan")}, "gave nan"),
         ({"function": lambda omega, gamma: "x"}, "raised TypeError"),
-        ({"function": lambda omega, gamma: abs(omega[0]), "digits": 10}, "nothing is proven"),
+        ({"function": lambda omega, gamma: abs(omega[0]), "digits": 10}, "must be rational"),
         ({"integrator": "scipy"}, "hands over no polynomial"),
         ({"digits": 0}, "0 digits"),
         ({"digits": 10, "precision": ht.QUAD}, "know no precision"),
