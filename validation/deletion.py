@@ -109,7 +109,7 @@ def delete(copy: Path, name: str, feature: Feature) -> None:
         plan.write_text(without_kinds(plan.read_text("utf-8"), kinds), "utf-8")
     for report in (ROOT / "results").iterdir():
         (copy / "results").mkdir(exist_ok=True)
-        if kinds and (report / store.FILE).exists():
+        if kinds and any((report / name).exists() for name in (store.FILE, f"{store.FILE}.gz")):
             whole = store.read(report, KINDS)
             (copy / "results" / report.name).mkdir()
             left = [row for row in whole.rows if row.key.kind not in kinds]
