@@ -35,4 +35,5 @@ def test_the_outputs_of_nasas_brick_have_so_many_digits(simulator: str) -> None:
 
 def test_the_page_has_a_row_for_each() -> None:
     page = public_verdicts.page(FILE)
-    assert all(f"`{each['command']}`" in page for each in FILE["figures"] + FILE["logs"])
+    assert all(f"| {each['name']} |" in page for each in FILE["figures"])
+    assert all(f"| {each['name']}.csv |" in page for each in FILE["logs"])

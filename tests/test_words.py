@@ -19,7 +19,7 @@ TEXTS = [
         path
         for folder in ("src", "docs", "examples")
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".md", ".toml", ".html", ".j2")
+        if path.suffix in (".py", ".md", ".toml", ".html", ".j2") and "_build" not in path.parts
     ),
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "results/README.md")),
 ]

@@ -70,16 +70,15 @@ def document() -> dict[str, Any]:
 def page(found: dict[str, Any]) -> str:
     """The tables of the page of the site."""
     figures = [
-        f"| {each['what']} | {each['read']} | {each['digits_right']} | `{each['command']}` |"
+        f"| {each['what']} | {each['read'].replace('/', '/<wbr>')} | {each['digits_right']} | {each['name']} |"
         for each in found["figures"]
     ]
     logs = [
-        f"| {each['name']} | {each['rows']} | {each['digits_right']} | {', '.join(each['explained_by'])} "
-        f"| `{each['command']}` |"
+        f"| {each['name']}.csv | {each['rows']} | {each['digits_right']} | {', '.join(each['explained_by'])} |"
         for each in found["logs"]
     ]
-    first = ["| published number | source | digits right | command |", "|---|---|---|---|"]
-    second = ["", "| log | rows | digits right | explained by | command |", "|---|---|---|---|---|"]
+    first = ["| published number | source | digits right | `heavytop audit` |", "|---|---|---|---|"]
+    second = ["", "| log in `results/public/logs` | rows | digits right | explained by |", "|---|---|---|---|"]
     return "\n".join([*first, *figures, *second, *logs]) + "\n"
 
 

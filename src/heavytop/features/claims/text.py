@@ -14,6 +14,7 @@ from heavytop.features.claims.api import ClaimLibrary
 from heavytop.features.claims.audit.judge import ABOUT, VERDICTS, Audit, StatementVerdict
 from heavytop.features.claims.audit.values import SIZES
 from heavytop.features.claims.library.entry import Entry
+from heavytop.report.document.document import clip
 
 _WIDTH = 80
 _HEADS = {"holds": "Proven", "refuted": "Refuted", "undecided": "Undecided"}
@@ -58,6 +59,8 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
 # The audit of published numbers as a table, for people.
 
 
+_WIDEST_TIME = 16
+"""Characters of a time; the lines below the table have all of it."""
 _VALUE_STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
@@ -72,7 +75,7 @@ def values_text(rows: Sequence[StatementVerdict]) -> list[RenderableType]:
     for row in rows:
         figures = row.figures or {}
         right = f"{figures['digits_right']} of {figures['digits_printed']}" if "digits_right" in figures else "?"
-        cells = [label(row), row.domain, "", figures.get("printed", ""), right]
+        cells = [label(row), clip(row.domain, _WIDEST_TIME), "", figures.get("printed", ""), right]
         cells += [figures.get("tolerance", "half a unit"), row.residual.removeprefix("off by ")]
         line: list[RenderableType] = [Text(cell) for cell in cells]
         line[2] = Text(VERDICTS[row.holds], style=_VALUE_STYLES[row.holds])
