@@ -49,6 +49,9 @@ RESULTS = Path(__file__).parents[2] / "results"
 VIEWS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
 
 
+_LOADED = "return document.readyState === 'complete'"
+
+
 class Browser:
     """A window with what it logged and what it asked the network for."""
 
@@ -70,10 +73,13 @@ class Browser:
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": features})
 
     def open(self, page: Path, width: int, scheme: str, media: str = "screen") -> None:
+        from selenium.webdriver.support.ui import WebDriverWait
+
         self.look(width, scheme, media)
         for log in ("browser", "performance"):
             self.driver.get_log(log)
         self.driver.get(page.as_uri())
+        WebDriverWait(self.driver, 60).until(lambda driver: driver.execute_script(_LOADED))
 
     def ask(self, script: str) -> Any:
         return self.driver.execute_script(script)
