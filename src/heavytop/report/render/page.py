@@ -306,7 +306,10 @@ def digits_headline(rows: Sequence[Row]) -> Headline | None:
     lost = [
         clip(each.case, 40)
         for each in finished
-        if each.reference.until and (each.key.subject, each.precision) == (row.key.subject, row.precision)
+        if each.case not in cases
+        and (each.key.subject, each.precision) == (row.key.subject, row.precision)
+        and each.reference.until
+        and abs(exact(each.reference.until)) <= last
     ]
     said += f", worst of {len(cases)})" if len(cases) > 1 and not lost else ")"
     said += f", none on {', '.join(lost[:_LOST])}" if lost else ""
