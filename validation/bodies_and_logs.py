@@ -527,7 +527,12 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
     yield "quaternion xyzw", "csv", table(g, "t,qx,qy,qz,qw", xyzw), ""
     lines = table(g, "t,qw,qx,qy,qz", q).splitlines()
     yield "a row twice", "csv", "\n".join([*lines[:12], lines[11], *lines[12:]]), ""
-    yield "two rows at one time", "csv", "\n".join([*lines[:12], lines[11][:-9], *lines[12:]]), "of one time and differ"
+    yield (
+        "two rows at one time",
+        "csv",
+        "\n".join([*lines[:12], lines[11][:-9] + "000000000", *lines[12:]]),
+        "of one time and differ",
+    )
     yield "a reset", "csv", "\n".join([*lines, *lines[-20:]]), ""
     yield "free, omega alone", "csv", table(f, "t,omega1,omega2,omega3", f.omega), ""
     falling = np.c_[f.times, 2 - f.times, -4.905 * f.times**2]

@@ -357,7 +357,7 @@ class Body:
 
     def warnings(self) -> list[str]:
         """Data that no rigid body has, though the equations do not mind."""
-        return self.top.warnings() or _warnings_about_centre(self)
+        return _warnings_about_centre(self) or self.top.warnings()
 
 
 @dataclass(frozen=True, slots=True)
