@@ -164,6 +164,20 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     texts = {key: numpy.array(", ".join(map(str, value))) for key, value in lists.items()}
     numpy.savez(path, t=TIMES, quaternions=quaternions(), **comments, **texts)  # type: ignore[arg-type]
     assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    whole = {"mass": 2, "gravity": 9.81, "about": "centre of mass", **lists, "inertia": numpy.diag(lists["inertia"])}
+    numpy.savez(path, time=TIMES, R=run().matrices(), **whole)  # type: ignore[arg-type]
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+
+
+def test_a_parquet_table_may_hold_instants_lists_and_the_body(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    said = dict(line[2:].split(": ") for line in HEAD.splitlines())
+    stamps = pyarrow.array(map(int, NANO), pyarrow.timestamp("ns"))
+    table = pyarrow.table({"header_stamp": stamps, "orientation": quaternions().tolist()})
+    parquet.write_table(table.replace_schema_metadata(said), path := tmp_path / "log.parquet")
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
 
 
 def plain(lines: Sequence[str]) -> str:

@@ -296,60 +296,90 @@ def _epoch(text: str) -> Fraction:
 
 
 def of_arrays(content: bytes, suffix: str) -> str:
-    """A .npy of seven columns, a .npz of arrays of one length by their names, or a Parquet table, as CSV.
+    """A .npy of seven columns or of named ones, a .npz of arrays by their names, or a Parquet table, as CSV.
 
-    Numbers are written so that they are read back the same.  Raises InputError for other shapes.
+    Numbers are written so that they are read back the same.  Arrays that have not a row for each time, and what a
+    Parquet table says of itself, stand for comments.  Raises InputError for other shapes.
     """
-    import numpy
-
-    if suffix == ".parquet":
-        require_extra("parquet")
-        import pyarrow.parquet
-
-        table = pyarrow.parquet.read_table(BytesIO(content))
-        columns = {name: numpy.asarray(table[name]) for name in table.column_names}
-    else:
-        try:
-            loaded = numpy.load(BytesIO(content), allow_pickle=False)
-        except ValueError as error:
-            raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
-        columns = {"": loaded} if suffix == ".npy" else {name: loaded[name] for name in loaded.files}
+    columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
+    lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
+    count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
     names: list[str] = []
     parts: list[Any] = []
     comments = []
     for name, array in columns.items():
-        if array.ndim == 0 or array.dtype.kind in "US":
-            comments.append(f"# {name}: {', '.join(map(str, numpy.ravel(array)))}")
-        elif array.ndim <= 2 and array.dtype.kind in "fiu":
-            block = array.reshape(len(array), -1)
-            names += _names_of(name, block.shape[1])
-            parts.append(block)
-        elif array.ndim == 3 and array.dtype.kind == "f":
+        if array.ndim == 0 or array.dtype.kind in "US" or (len(array) != count and array.size <= 9):
+            comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
+        elif array.ndim <= 3 and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
             names += _names_of(name, parts[-1].shape[1])
     if not parts or len({len(part) for part in parts}) != 1:
-        lengths = ", ".join(str(len(part)) for part in parts) or "none"
-        raise InputError(f"The arrays have {lengths} rows.", "Give arrays of one length, one row for each time.")
+        counts = ", ".join(str(len(part)) for part in parts) or "none"
+        raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
     rows = [",".join(repr(value) for part in parts for value in part[i].tolist()) for i in range(len(parts[0]))]
     return "\n".join([*comments, ",".join(names), *rows])
 
 
+def _of_numpy(content: bytes) -> dict[str, Any]:
+    import numpy
+
+    try:
+        loaded = numpy.load(BytesIO(content), allow_pickle=False)
+        names = loaded.files if hasattr(loaded, "files") else loaded.dtype.names
+        return {name: loaded[name] for name in names} if names else {"": loaded}
+    except ValueError as error:
+        raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
+
+
+def _of_parquet(content: bytes) -> dict[str, Any]:
+    """Its columns, also of lists and of instants, and its metadata."""
+    import numpy
+
+    require_extra("parquet")
+    import pyarrow
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(BytesIO(content))
+    columns = {
+        key.decode(): numpy.array(value.decode())
+        for key, value in (table.schema.metadata or {}).items()
+        if key not in (b"pandas", b"ARROW:schema")
+    }
+    for name in table.column_names:
+        kind = table[name].type
+        if pyarrow.types.is_timestamp(kind):
+            columns[f"timestamp [{kind.unit}]"] = numpy.asarray(table[name].cast(pyarrow.int64()))
+        else:
+            nested = hasattr(kind, "value_type")
+            columns[name] = numpy.array(table[name].to_pylist()) if nested else numpy.asarray(table[name])
+    return columns
+
+
+_TIMES = ("t", "time", "times", *_EPOCHS)
 _WIDE = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"R{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
+    "omega": ("omega1", "omega2", "omega3"),
     "state": ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
     "": ("t", "omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
 }
+_ARRAYS = {
+    **dict.fromkeys(("quaternions", "quat", "quats", "q", "orientation", "orientations"), "quaternion"),
+    **dict.fromkeys(("matrices", "r", "rotation", "rotations", "dcm"), "matrix"),
+    **dict.fromkeys(("w", "omegas", "gyro", "angular_velocity", "angvel"), "omega"),
+    "states": "state",
+}
+"""Names of arrays, in lower case, for those of :data:`_WIDE`."""
 
 
 def _names_of(name: str, width: int) -> list[str]:
     """The names of the columns of one array."""
-    base = {"quaternions": "quaternion", "quat": "quaternion", "matrices": "matrix", "states": "state"}.get(name, name)
+    base = _ARRAYS.get(name.lower(), name)
     if len(_WIDE.get(base, ())) == width:
         return list(_WIDE[base])
     if width == 1:
         return [{"times": "t", "time": "t"}.get(name, name)]
-    plain = {"positions": "p", "position": "p", "omegas": "omega", "gammas": "gamma"}.get(name, name)
+    plain = {"positions": "p", "position": "p", "pos": "p", "gammas": "gamma"}.get(name, name)
     if not name:
         raise InputError(f"The array has {width} columns.", "Give t, omega1 to omega3, gamma1 to gamma3: seven.")
     return [f"{plain}{'xyz'[i] if plain == 'p' else i + 1}" for i in range(width)]
