@@ -304,6 +304,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     data that are not those of the case.
     """
     shown_path = str(path)[:LONGEST_NAME]
+    path = bags.storage(path) if path.is_dir() else path
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
