@@ -10,11 +10,11 @@ from importlib import resources
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.exact.bodies import resolve
 from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.exact.resolved import resolve
 from heavytop.top.bodies import PIVOT, Body, motion_of
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical

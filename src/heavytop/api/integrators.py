@@ -197,7 +197,7 @@ def _texts(part: str) -> dict[str, str]:
 def listing() -> dict[str, Any]:
     """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them."""
     from heavytop.cases import CASES, named_bodies
-    from heavytop.harness.plan import BUILT_IN
+    from heavytop.harness import BUILT_IN
     from heavytop.integrate import registry
     from heavytop.precision import FORMATS, available
     from heavytop.top.equations import SYSTEMS
