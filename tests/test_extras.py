@@ -88,18 +88,17 @@ def hide(monkeypatch: pytest.MonkeyPatch, *modules: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_command_loads_heyoka_without_sympy() -> None:
+@pytest.mark.parametrize(("command", "modules"), [(("propagate", *MOTION), "heyoka"), (("list",), "")])
+def test_a_command_loads_no_more_than_it_needs(command: tuple[str, ...], modules: str) -> None:
     script = """
 import contextlib, sys
 from heavytop.__main__ import main
 with contextlib.suppress(SystemExit):
     main()
-loaded = {"heyoka", "sympy", "llvmlite.binding"} & sys.modules.keys()
-import sympy
-assert sympy.Integer(1) == 1
+loaded = {"heyoka", "sympy", "mpmath", "llvmlite.binding", "pydantic", "loky"} & sys.modules.keys()
+import mpmath, sympy
+assert (sympy.Integer(1), mpmath.mpf(1)) == (1, 1)
 sys.exit(" ".join(loaded))
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script, "propagate", *MOTION], capture_output=True, text=True, check=False
-    )
-    assert done.stderr.strip() == "heyoka"
+    done = subprocess.run([sys.executable, "-c", script, *command], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == modules

@@ -19,12 +19,12 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, input_roundin
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kind import Kind
 from heavytop.measure.attitude_error import AttitudeScorer
-from heavytop.measure.integrator import HEYOKA, Ended, complete, growing
+from heavytop.measure.integrator import Ended, complete, growing
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
 from heavytop.measure.truth import EnsembleReference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
+from heavytop.records import HEYOKA, NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Chart, computed_by, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import laws_headline

@@ -13,10 +13,9 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import (
     DASHED,
     Block,

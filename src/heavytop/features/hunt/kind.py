@@ -15,10 +15,9 @@ from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, failed
 from heavytop.integrate.registry import described
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, exact_text, parse, time_text
-from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import HEYOKA, Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import Block, Card, In, Note
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 

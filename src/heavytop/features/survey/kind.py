@@ -22,9 +22,8 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
 from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse
-from heavytop.records import Against, Beside, Metric, Row, Spread
+from heavytop.records import HEYOKA, Against, Beside, Metric, Row, Spread
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, short
 from heavytop.report.document.motions import LossLimits, WorseMotions
 

@@ -16,13 +16,12 @@ from msgspec.structs import replace as replace_struct
 from heavytop.display import plural
 from heavytop.extras import has_extra, install
 from heavytop.files import replace
-from heavytop.harness.plan import BUILT_IN
+from heavytop.harness import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import HEYOKA, MULTIWORD, NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import Change, folded, line, statistics
 from heavytop.report.document.document import (

@@ -13,10 +13,9 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.text import Text
 
 from heavytop.display import plural, printable
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import UNMEASURED, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
