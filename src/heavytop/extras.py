@@ -18,6 +18,7 @@ EXTRAS = {
     "plots": ("matplotlib",),
     "peers": ("scipy", "CyRK", "numba", "sksundae", "diffrax"),
     "cluster": ("dask", "distributed"),
+    "logs": ("rosbags",),
 }
 """The modules of each extra of ``pyproject.toml`` that the program itself imports."""
 

@@ -423,7 +423,7 @@ class Renamed:
     def method(self) -> str:
         """The solution's own, and the names its axes have here."""
         there = inverse(self.axes)
-        return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
+        return f"{self.solution.method}, axes renamed {there[0] + 1}, {there[1] + 1}, {there[2] + 1}"
 
     @property
     def system(self) -> System:

@@ -308,7 +308,7 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
 def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Row:
     """The row of a task whose integrator failed: ``cause``, and in which case at which setting."""
     setting = task.key.subject.setting
-    return unmeasured(task, kind(" ".join(part for part in (cause, "in", task.title, setting) if part)))
+    return unmeasured(task, kind(" ".join(part for part in (f"{cause}, in", task.title, setting) if part)))
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:

@@ -173,6 +173,10 @@ def _line(row: Row) -> str:
     if row.outcome != Outcome.SUCCESS.value:
         return f"{row.case} {row.integrator} {row.precision}: {row.outcome}"
     metrics = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
-    said = ", ".join(f"{name} {float(metric):.2g}" for name, metric in metrics.items() if metric is not None)
+    said = ", ".join(
+        f"{name.replace('q99', '99 % below')} {float(metric):.2g}"
+        for name, metric in metrics.items()
+        if metric is not None
+    )
     worst = f"; the worst is {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
     return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {said}{worst}"

@@ -273,7 +273,7 @@ def _lately(series: Series | None) -> str:
         return ""
     end = max(known)
     begin = min(known, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
+    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):z.1f}"
 
 
 def _either(growths: Iterable[str], width: int) -> str:
