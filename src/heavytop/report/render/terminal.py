@@ -108,6 +108,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     stream = iter(rows)
     first = list(islice(stream, MOST_ROWS + 1))
     failures: list[str] = []
+    answers: list[Block] = []
     number = bad = 0
 
     def seen(rows: Iterable[Row]) -> Iterable[Row]:
@@ -123,7 +124,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if len(first) <= MOST_ROWS:
         held = list(seen(first))
         blocks = document(replace(report, rows=held), kinds, In.SHORT)
-        answers: list[Block] = [*headlines(blocks, kinds)]
+        answers += headlines(blocks, kinds)
         others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
@@ -134,6 +135,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
+    if answers and not bad:  # what was measured and how good it is comes first, unless something failed
+        parts.insert(1, [lines.pop()])
     return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
 
 
