@@ -182,7 +182,9 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
     for text, rate in statement.flow.kept if statement.flow is not None else ():
-        left = next(_witnesses(replace(statement, residual=rate), setting, prover), None)
+        # where it is 0 at a witness, its own rate may not be
+        rates = (rate, statement.flow.rate(rate)) if statement.flow is not None else ()
+        left = next((w for r in rates for w in _witnesses(replace(statement, residual=r), setting, prover)), None)
         if left is not None:
             residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
             return _row(statement, False, residual, conditions, left)
