@@ -148,7 +148,6 @@ def test_the_papers_rate_of_psi_is_refuted_for_the_top_by_conditions_that_do_not
         ({"start": None}, "start"),
         ({"component": {"reduced": None}}, "reduced"),
         ({"component": {"quantity": "C"}}, "constant"),
-        ({"component": {"phi": "t"}}, "phi"),
     ],
 )
 def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], message: str) -> None:

@@ -494,6 +494,9 @@ def of_file(asked: System | None, written: str | None, usual: System) -> System:
     return asked or own or usual
 
 
+_NO_FORMULAS = ("name", "kind", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
+
+
 @dataclass(frozen=True)
 class FileClaim:
     """A claim of a file."""
@@ -524,6 +527,16 @@ class FileClaim:
         """Parameters of whose sign no assumption says anything."""
         words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
         return [name for name in self.content.parameters if name not in words]
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Parameters that stand in no formula, nor in a definition that does."""
+        content = structs.asdict(self.content)
+        tables = {name: part for name, part in content.items() if name not in _NO_FORMULAS}
+        words = set(re.findall(r"\w+", str(msgspec.to_builtins(tables))))
+        for name, text in reversed(self.content.definitions.items()):
+            words |= set(re.findall(r"\w+", text)) if name in words else set()
+        return tuple(name for name in self.content.parameters if name not in words)
 
     def assuming(self, bound: str) -> Self:
         """The claim with one assumption more; raises InputError where a sample breaks it."""
