@@ -125,7 +125,7 @@ def require(precision: Precision) -> Precision:
     reason = None if precision.family == "double" else available()[precision.family]
     if reason:
         raise InputError(
-            f"Precision {precision.name} is not available: {reason}.", "`heavytop list` shows what is there."
+            f"Precision {precision.name} is not available: {reason}.", "`heavytop list --json` shows what is there."
         )
     return precision
 

@@ -29,6 +29,7 @@ failed: a third-party integrator raised an error, or gave back what is no trajec
 cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row.
 not_asked: it had run out of time in two other rows of that run."""
 
+HEYOKA, MULTIWORD = "heyoka", "multiword"
 FINEST = "eps"
 """In the place of a tolerance: the finest that an integrator offers."""
 EXACT = "exact"

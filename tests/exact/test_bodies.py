@@ -12,8 +12,9 @@ from flint import arb
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact.bodies import BodyMotion, resolve
+from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.exact.resolved import resolve
 from heavytop.top.attitude import Attitude, multiplied, transposed
 from heavytop.top.bodies import IDENTITY, principal_axes
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP

@@ -169,7 +169,7 @@ def run(
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: one of `harness.plan.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
+        plan: one of `harness.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.

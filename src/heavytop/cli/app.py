@@ -70,7 +70,7 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON document on standar
 
 def plans(begun: str) -> list[str]:
     """Plans whose names begin so, for completion."""
-    from heavytop.harness.plan import BUILT_IN
+    from heavytop.harness import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(begun)]
 

@@ -11,7 +11,7 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.errors import InputError
-from heavytop.exact.bodies import resolve
+from heavytop.exact.resolved import resolve
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, Vector, exact, number
 from heavytop.top.attitude import perpendicular, rotated, transposed

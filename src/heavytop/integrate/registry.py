@@ -15,9 +15,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, Protocol
 
@@ -316,7 +316,7 @@ def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None
 
 def load(source: str | Callable[..., Any]) -> Any:
     """The object at ``module:name``, imported; a function itself."""
-    return EntryPoint("", source, "").load() if isinstance(source, str) else source
+    return resolve_name(source) if isinstance(source, str) else source
 
 
 loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
@@ -476,6 +476,8 @@ def known() -> dict[str, Integrator]:
 @lru_cache(maxsize=4)
 def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
     """Integrators of the packages on ``sys.path``, looked through once."""
+    from importlib.metadata import entry_points  # and with it, email
+
     entries = entry_points(group=GROUP)
     return {entry.name: foreign(entry.name, entry.value) for entry in entries if entry.name not in FORMER}
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import arb
 
@@ -24,10 +24,12 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_balls
-from heavytop.measure.truth import Truth
 from heavytop.precision import dot, log10
 from heavytop.records import Against, Metric, Quantity, Series, by_name
 from heavytop.top.equations import Integral, Parameters
+
+if TYPE_CHECKING:
+    from heavytop.measure.truth import Truth
 
 # Drift of first integrals along a computed motion, in one pass and constant memory.
 
@@ -433,6 +435,8 @@ def sample_errors(
     def state_at(time: Fraction, bits: int) -> list[arb]:
         with working_precision(bits):
             return to_balls(true[time])
+
+    from heavytop.measure.truth import Truth
 
     error = SolutionError(problem, Truth(Against("computed"), state_at), times)
     # as many bits as tell a state of the format from one that is right to as many digits again

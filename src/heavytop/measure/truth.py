@@ -20,8 +20,7 @@ from msgspec.structs import replace as replace_struct
 
 from heavytop.errors import HeavyTopError, InputError, NotInClass, OutOfReach
 from heavytop.exact.cases.gyrostat import Gyrostat
-from heavytop.exact.catalogue import matches
-from heavytop.exact.closed_form import state_and_attitude
+from heavytop.exact.catalogue import matches, state_and_attitude
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution

@@ -51,6 +51,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
+from heavytop.exact.resolved import Uncertainty
 from heavytop.extras import has_extra
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.fixed_point import fixed_point_run
@@ -374,17 +375,6 @@ def _ladder(bits: float) -> int:
     whole = max(64, ceil(bits))
     unit = 1 << max(4, whole.bit_length() - 4)
     return -(-whole // unit) * unit
-
-
-@dataclass(frozen=True, slots=True)
-class Uncertainty:
-    """How far the true motion is from the rational data that stand for it.
-
-    start: of each component of (Ω, γ, ξ) at t = 0.  rate: of each component of Ω', at any time of the true motion.
-    """
-
-    start: tuple[Fraction, ...]
-    rate: Fraction
 
 
 _PILOT_BITS = 128

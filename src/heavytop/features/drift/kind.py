@@ -14,12 +14,11 @@ from heavytop.harness.plan import positive, uniform
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, run_with_attitude
 from heavytop.integrate.trajectory import Problem, ResumePoint, Trajectory
 from heavytop.kind import Kind, with_explanation
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
+from heavytop.records import HEYOKA, NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
 from heavytop.report.document.document import Block, Chart
 from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
 from heavytop.report.render.plots import digits, growth

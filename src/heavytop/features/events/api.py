@@ -10,9 +10,9 @@ from typing import Any, overload
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.errors import InputError, OutOfReach, prefixed, quoted
-from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
+from heavytop.exact.resolved import Resolved, resolve
 from heavytop.features.events.functions import (
     PROVEN,
     EventFunction,

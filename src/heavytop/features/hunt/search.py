@@ -41,11 +41,10 @@ from heavytop.harness.case_text import forms
 from heavytop.harness.plan import Top, document_of
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import Precision, decimal_text, shown, time_text
-from heavytop.records import OUT_OF_TIME
+from heavytop.records import HEYOKA, MULTIWORD, OUT_OF_TIME
 from heavytop.top.amplification import rate
 from heavytop.top.equations import GYROSTAT, system_of
 from heavytop.top.heavy_top import HeavyTop, State, data_texts

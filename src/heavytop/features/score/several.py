@@ -111,7 +111,7 @@ def text(files: Sequence[ScoredFile]) -> str:
     lines = [f"{'file':{width}}  digits right  explained by"]
     lines += [f"{clip(file.path, width):{width}}  {file.digits:>12}  {file.explained}".rstrip() for file in files]
     for order in orders(files):
-        said = f"order {order.order:.1f} over {len(order.paths)} steps"
+        said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")
     return "\n".join(lines)
 

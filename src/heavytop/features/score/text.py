@@ -484,8 +484,8 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
         "over-time",
         "Digits right over time",
         [
-            "Digits right: −log10 of the error along the flow (phase), across it, of the attitude in radians, of the "
-            f"position. Dashed: all {most:.0f} digits of {row.precision}."
+            f"−log10 of the error: {', '.join(held)}; the verdict counts the worst component of Ω and γ. "
+            f"Dashed: all {most:.0f} digits of {row.precision}."
         ],
         columns=["t", *held],
     )
@@ -507,6 +507,8 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
 
     at = [dict(zip(series.times, series.values, strict=True)) for series in held.values()]
     times = dict.fromkeys(time for values in at for time in values)
+    if row.samples > len(times):
+        section.notes.append(f"{len(times)} of {row.samples} samples, evenly in log |t|; the errors are those of all.")
     section.rows = [[short(time), *(cell(values.get(time, "")) for values in at)] for time in times]
     section.pictures.append(finish(axes, section.title, spoken(alternative), section.id))
     return section

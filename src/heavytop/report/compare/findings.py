@@ -410,7 +410,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                     steps = " to ".join(f"{10 ** steps_range.steps[0]:.0f}" for steps_range in (coarse, fine))
                     first = next(iter(rows))
                     where = f"{_case(first)} from {steps} steps ({clip(first.program, 40)}, {precision})"
-                    text = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
+                    text = f"Order observed {max(before, 0):z.1f} → {max(after, 0):z.1f} on {where}."
                     yield name, after - before, Sentence(text, frozenset(rows))
 
 

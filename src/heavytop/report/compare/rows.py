@@ -13,11 +13,11 @@ import msgspec
 
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.growth import BENT, CLASSES, Interval
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact
 from heavytop.records import (
+    HEYOKA,
     NOISE,
     NOT_MEASURED,
     UNRESOLVED_SECONDS,

@@ -13,9 +13,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError
-from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import decimal_text, exact, log10
-from heavytop.records import Identity, Metric, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, Identity, Metric, Quantity, Report, Row, Series
 from heavytop.report.document.svg import COLOURS, MARKERS, Picture
 from heavytop.top.equations import HEAVY_TOP
 

@@ -253,7 +253,12 @@ def comparison_markdown(result: Differences, page: Path | None = None) -> str:
     rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
     end = []
     if result.environment:
-        end += ["<details><summary>Environments differ</summary>", "", "| | baseline | candidate |", "|---|---|---|"]
+        end += [
+            "<details><summary>Inputs or environments differ</summary>",
+            "",
+            "| | baseline | candidate |",
+            "|---|---|---|",
+        ]
         end += ["| " + " | ".join(map(escaped_cell, difference)) + " |" for difference in result.environment[:_MOST]]
         end += ["", "</details>", ""]
     if page is not None:

@@ -16,13 +16,12 @@ from msgspec.structs import replace as replace_struct
 from heavytop.display import plural
 from heavytop.extras import has_extra, install
 from heavytop.files import replace
-from heavytop.harness.plan import BUILT_IN
+from heavytop.harness import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import HEYOKA, MULTIWORD, NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import Change, folded, line, statistics
 from heavytop.report.document.document import (
@@ -197,14 +196,16 @@ _MAIN = {RELATIVE.text: "relative error", ERRORS[0].text: "error"}
 
 
 def metric_cells(row: Row) -> list[list[str]]:
-    """Name, value, and rounding noise in decades of the first metrics."""
+    """Name, value, and rounding noise in decades where one is known, of the first metrics."""
+    metrics = list(islice(row.metrics.items(), MOST_METRICS))
+    columns = 3 if any(metric.band for _, metric in metrics) else 2
     return [
         [
             clip(name.replace("_", " "), 80),
             clip(metric.value, 40) + (f" (below {short(metric.bound)})" if metric.bound else ""),
             f"{metric.band:.2f}" if metric.band else "",
-        ]
-        for name, metric in islice(row.metrics.items(), MOST_METRICS)
+        ][:columns]
+        for name, metric in metrics
     ]
 
 
@@ -404,12 +405,13 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``0.0 from 700`` where the format has lost all significant digits by then."""
+    """``9.2 to 1e5``; ``lost at 700`` where the format has lost all significant digits by then."""
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}{_digits_of_attitude(row)}"
+    digits = f"lost at {time}" if row.reference.until else f"{digits_text(kept)} to {time}"
+    return digits + _digits_of_attitude(row)
 
 
 def _digits_of_attitude(row: Row) -> str:
@@ -438,7 +440,7 @@ def _motion(row: Row) -> list[Cell]:
         row.horizon,
         str(row.steps),
         row.outcome,
-        digits + (f" from {row.reference.until}" if row.reference.until else ""),
+        f"lost at {row.reference.until}" if row.reference.until else digits,
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
         "  ".join(f"{integral_text(name)} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
     ]

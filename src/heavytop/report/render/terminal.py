@@ -13,10 +13,9 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.text import Text
 
 from heavytop.display import plural, printable
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import UNMEASURED, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
@@ -274,7 +273,7 @@ def _lately(series: Series | None) -> str:
         return ""
     end = max(known)
     begin = min(known, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
+    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):z.1f}"
 
 
 def _either(growths: Iterable[str], width: int) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -20,7 +20,9 @@ from heavytop.measure.scorer import DRIFT
 from heavytop.records import FAILED, NOT_ASKED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
 from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
 from heavytop.report.document.kind import Kinds, kind_of
-from heavytop.report.store.store import AnyReport
+
+if TYPE_CHECKING:
+    from heavytop.report.store.store import AnyReport
 
 
 def largest_over(rows: Iterable[Row]) -> str:

@@ -178,8 +178,9 @@ def judge(
 
 
 def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> StatementVerdict:
-    witness = next(_witnesses(statement, setting, prover), None)
     proven, conditions = prover.prove(statement)
+    certain = proven and all(condition.discharged for condition in conditions)
+    witness = next(_witnesses(statement, setting, prover, _BITS[:1] if certain else _BITS), None)
     if witness is not None:
         proof = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if proof is None else _closed_form(statement, setting, proof)
@@ -191,7 +192,7 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Statem
         if left is not None:
             residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
             return _row(statement, False, residual, conditions, left)
-    if proven and all(condition.discharged for condition in conditions):
+    if certain:
         return _row(statement, True, "0", conditions)
     residual = "0 where the conditions are met" if proven else _bound(statement, prover)
     return _row(statement, None, residual, conditions)
@@ -211,11 +212,13 @@ def _row(
     )
 
 
-def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
+def _witnesses(
+    statement: Statement, setting: Setting, prover: Prover, precisions: Sequence[int] = _BITS
+) -> Iterator[dict[str, Any]]:
     """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
     always = () if statement.flow is None else statement.flow.always
     places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
-    for bits in _BITS:
+    for bits in precisions:
         for values in places:
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):

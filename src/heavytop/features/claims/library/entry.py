@@ -45,7 +45,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def text(self) -> str:
         """The citation in one line."""
         doi = f"doi:{self.doi}" if self.doi else ""
-        parts = (f"{', '.join(self.authors)} ({self.year})", self.title, self.journal, self.equations, doi)
+        authors = ", ".join(self.authors)
+        who = authors if authors == "unattributed" else f"{authors} ({self.year})"  # the year is the original's
+        parts = (who, self.title, self.journal, self.equations, doi)
         return ", ".join(part for part in parts if part)
 
 

@@ -634,9 +634,10 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
     for name in ("omega", "omega_space"):
         if first.get(name):
             return vector(list(first[name] or ()), name), name == "omega_space"
+    plural = " (omegas are the columns of JSON)" if "omegas" in document else ""
     raise InputError(
         "The key omega is missing, and no row t = 0 gives it.",
-        "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
+        f"Give omega (in body axes) or omega_space at t = 0{plural}, or the row t = 0, or --case NAME.",
     )
 
 

@@ -115,7 +115,7 @@ class TextTable:
         else:
             places = meaning.of_state()
             if missing := [name for name in COLUMNS if name not in places]:
-                raise _no_header(missing)
+                raise _no_header(missing, names)
             self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
             others = [name for index, name in enumerate(names) if index not in places.values()]
         self.notes += unread(others, names)
@@ -173,8 +173,9 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     return [f"columns that are not read: {', '.join(name[:20] for name in more[:6])}"] if more else []
 
 
-def _no_header(missing: list[str]) -> InputError:
-    said = f": {', '.join(missing)} not found" if missing else ""
+def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
+    among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
+    said = f": {', '.join(missing)} not found{among}" if missing else ""
     return InputError(f"The header is not {','.join(COLUMNS)}{said}.", REMEDY)
 
 
