@@ -407,7 +407,7 @@ def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> Al
 
     place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.  Both are read by
     :func:`heavytop.precision.exact`.
-    Raises InputError where there is no such top, and for a place out of range.
+    Raises InputError without such a top, and for a place out of range.
     """
     with prefixed("place"):
         where = exact(place)

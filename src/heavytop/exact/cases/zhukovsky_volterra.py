@@ -69,7 +69,7 @@ _UNITS: tuple[Vector, ...] = tuple(tuple(Fraction(int(i == j)) for j in range(3)
 class ZhukovskyVolterra(ClosedForm):
     """The motion of a gyrostat without weight, γ of any length and direction.
 
-    Raises NotInClass where n is not 0, LevelNotDone where M(t) is no elliptic function but a limit of some.
+    Raises NotInClass where n is not 0, LevelNotDone where M(t) is not an elliptic function but a limit of some.
     """
 
     method = "closed form: Zhukovsky-Volterra, Weierstrass functions"

@@ -318,7 +318,7 @@ class ScaledMotion:
         return None if self.grid(precision) is None else self.certified(precision)
 
     def grid(self, precision: int) -> Grid | None:
-        """That of so many bits; None where there is none."""
+        """That of so many bits; None where absent."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:

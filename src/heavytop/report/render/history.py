@@ -164,7 +164,7 @@ def _made(report: AnyReport) -> tuple[str, str]:
 
 
 def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
-    """What stands on the axis for each report: heavytop's version, else the name of its folder, else its number, the
+    """Label of each report on the axis: heavytop's version, else the name of its folder, else its number, the
     first by which all differ.
     """
     versions = [_made(report)[0] for report in reports]

@@ -222,7 +222,7 @@ def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
-    """What makes an output definite: sequence, point, pivot."""
+    """Parameters of an output: sequence, point, pivot."""
     result = []
     for output in outputs:
         if output.name == "euler":

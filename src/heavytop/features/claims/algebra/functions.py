@@ -42,7 +42,7 @@ class Expressions(Protocol):
 def same_as(name: str, u: Quotient, field: Expressions, known: Known) -> Quotient | None:
     """asin, acos or atan of ``u`` through a function that the field has already, or through the angle in it.
 
-    known: the generator of a function of an argument, None where there is none yet.
+    known: the generator of a function of an argument, None before the first.
     """
     if name not in ("asin", "acos", "atan"):
         return None
@@ -436,7 +436,7 @@ class Transcendental:
             number *= abs(Fraction(int(constant.p), int(constant.q))) ** (1 - 2 * side)
             for factor, power in factors:
                 known = t.signs.of(factor)
-                if known.value:  # where it is 0, the logarithm of the whole is none
+                if known.value:  # where it is 0, the whole has no logarithm
                     sign *= known.value ** int(power)
                     weight = t.number(int(power) * (1 - 2 * side))
                     total = t.sum((total, t.product((weight, self._logarithm_of_factor(factor * known.value)))))

@@ -520,7 +520,7 @@ class Prover:
         return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
 
     def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
-        """The divisors that stand against the proof; None where there is no proof."""
+        """The divisors that stand against the proof; None without a proof."""
         if region is None:
             return None
         flow = statement.flow
@@ -562,7 +562,7 @@ class Prover:
             self._met[needed] = all(need.is_met(point) for need in needed[0])
         if not self._met[needed]:
             return False
-        # a derivative of |u| is none where u is 0
+        # |u| has no derivative where u is 0
         if any(
             Need(ConditionKind.NONZERO, kink.args[0]).is_met(point) is not True
             for kink in parts_of([statement.residual])

@@ -279,7 +279,7 @@ class Context:
         return tuple(system for system in SYSTEMS if system is not GYROSTAT or turns_about_two)
 
     def parameters(self, system: System) -> Parameters:
-        """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
+        """Parameters of the field; raises InputError where the file lacks the rotor of the system."""
         if (system is HEAVY_GYROSTAT) is not (self.carried is not None):
             raise _other_rotor(system)
         if self.carried is not None:
@@ -293,7 +293,7 @@ class Context:
 
 
 def _other_rotor(system: System) -> InputError:
-    """The error where one of the two has a rotor of three components, and the other has not."""
+    """The error where one of the two has a rotor of three components, and the other lacks it."""
     if system is HEAVY_GYROSTAT:
         cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
         return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")

@@ -227,4 +227,4 @@ def determinant(motion: ClaimedMotion, p: Parameters) -> Statement:
 
 
 SYSTEMS = (HEAVY_TOP, GYROSTAT)
-"""Those of the paper, and of tops without k."""
+"""Systems of the paper, and of tops without k."""

@@ -441,7 +441,7 @@ class UserIntegral(FileClaim):
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
-        """Expressions to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
+        """Expressions to be constant: F; or, of a relation other than a polynomial, its parts: |L| has no rate at 0."""
         if self.kind != "relation" or value.is_polynomial(*STATE):
             return (value,)
         return conditions_for_zero(value) or (value,)
