@@ -227,6 +227,8 @@ PIVOT, CENTRE = "pivot", "centre of mass"
 _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
 """A plate or a rod in rounded numbers is one."""
+_PRINTED_DATA = Fraction(1, 10**6)
+"""Of the tensor: a plate or a rod in seven digits is not warned of."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 
@@ -420,7 +422,7 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
 
 def _warnings_about_centre(body: Body) -> list[str]:
     """Whether the tensor about the centre of mass can be that of a body; where not, with the slip that mends it."""
-    slack = _ROUNDED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
+    slack = _PRINTED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
     if has_second_moments(body.central, slack):
         return []
     moments = ", ".join(six_digits(value) for value in _principal_moments(body.central))
