@@ -267,6 +267,7 @@ class Dokshevich(_Moving, ClosedForm):
     """
 
     method = "closed form: Dokshevich, inversion of an elliptic integral"
+    source = "A. I. Dokshevich, Doklady 167 (1966) 1251; formulas derived in the program"
     body = (
         IN_PLANE_13,
         OFF_AXES_13,

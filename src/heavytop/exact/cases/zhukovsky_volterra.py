@@ -73,6 +73,7 @@ class ZhukovskyVolterra(ClosedForm):
     """
 
     method = "closed form: Zhukovsky-Volterra, Weierstrass functions"
+    source = "N. E. Zhukovsky (1885); V. Volterra, Acta Math. 22 (1899) 201; formulas derived in the program"
     system = HEAVY_GYROSTAT
     body = (NO_TORQUE,)
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, inf, log10
 from threading import Lock
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from flint import arb, arb_series
 from gmpy2 import mpq
@@ -413,6 +413,7 @@ class Validated:
     xi: Vector | None = None
     effort: float = EFFORT
     method: str = "validated: Taylor enclosure"
+    source: ClassVar[str] = "theorem of a step: exact/enclosure/step.py of the program"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], EnclosureRun] = field(

@@ -122,7 +122,7 @@ _MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
 _OF_ANGLE = ("am", "ellipticF", "ellipticE", "ellipticPi")
 """Odd functions that increase."""
 _POSITIVE = {"thetan": True, "wsigma3": True, "modulus": False}
-"""Whether it is never 0."""
+"""Whether it is never 0; where not, it is 0 with its argument alone."""
 Circle = tuple[Quotient, Quotient]
 
 
@@ -490,7 +490,7 @@ class Transcendental:
             elif name in _OF_ANGLE:
                 sign = self._tower.sign(arguments[FREE[name].moving - 1])
             elif name in _POSITIVE:
-                sign = Sign(1, _POSITIVE[name])
+                sign = Sign(1, _POSITIVE[name] or self._tower.sign(arguments[0]).strict)
             index = self._new(name, meaning, arguments, sign)
             if name == "modulus":
                 self._tower.signs.declare(1 - self._tower.gens[index], Sign(1, True))

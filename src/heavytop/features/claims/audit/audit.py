@@ -156,7 +156,7 @@ def audit_claim(
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
-    return Audit(*said, deciding)
+    return Audit(*said, deciding, claim.unused if isinstance(claim, Assuming) else ())
 
 
 def _rows(
