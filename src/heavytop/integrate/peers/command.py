@@ -567,10 +567,12 @@ class Session:
             now = monotonic()
             awake = not waiting and reply.due < _MANY and now < awake_until
             waited = waited_for_processor()
-            events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
-            looked = looked if events else waited
-            if awake and not events:
-                continue
+            events = self._poll.poll(0)
+            if not events:
+                looked = waited
+                if awake:
+                    continue
+                events = self._poll.poll(1000 * min(left, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             if events and not waiting and reply.due >= _MANY:
