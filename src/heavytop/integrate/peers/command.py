@@ -47,7 +47,6 @@ NOT_COUNTED = {"steps": "not counted"}
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
-_GREETING = 20.0
 _MANY = 4
 """States still due, from which on they are read several at a time: each waking of the reader slows the program."""
 _NAP, _NAP_SHARE, _NAP_LEFT = 1e-3, 1 / 4, 1 / 3
@@ -718,7 +717,7 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them; raises PeerFailed where it does not within 20 s."""
-    program = Session(msgspec.structs.replace(command, timeout=str(min(command.seconds, _GREETING))))
+    """Name and version as the program says them; raises PeerFailed where it does not within its timeout."""
+    program = Session(command)
     program.close(_FAREWELL)
     return program.greeting
