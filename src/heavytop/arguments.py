@@ -42,7 +42,7 @@ Numbers: TypeAlias = Iterable[Any]
 SLACK_BITS = 8
 """|γ|² and |ξ|² may be off 1, and ξ·γ off 0, by so many bits of the rounding of what was given as floats."""
 _MOST = 10**18
-"""A count beyond it is no limit."""
+"""A count beyond it is not a limit."""
 _TYPES = "Give heavytop.HeavyTop(inertia, weight, centre) and heavytop.State(omega, gamma)."
 _Kind = TypeVar("_Kind", HeavyTop, State)
 

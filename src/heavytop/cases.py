@@ -220,7 +220,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 def described_bodies() -> dict[str, tuple[str, Body]]:
-    """What each named body is, and the body: without its start, which takes longer."""
+    """Description and body of each name: without its start, which takes longer."""
     tables: dict[str, dict[str, Any]] = {name: _FREE | table for name, table in _tables().items()}
     return {
         name: (table["summary"], Body(**{key: table[key] for key in _BODY if key in table}))
@@ -254,7 +254,7 @@ def case(name: str, more: dict[str, Case] | None = None) -> Case:
 
 
 def require_possible(case: Case) -> Case:
-    """The case; raises InputError for data that are too large, a gamma that is no unit vector, and a start that the
+    """The case; raises InputError for data that are too large, a gamma off length 1, and a start that the
     system does not admit.
     """
     require_physical(case.top, case.start)

@@ -24,7 +24,7 @@ kill -KILL 0"""
 _ROUNDS = 20
 """How often what a process may just have started is looked for."""
 _LEAST_SHARE = 0.1
-"""Of wall time, which a clock shows at least."""
+"""Part of wall time, which a clock shows at least."""
 
 
 def processors() -> int:

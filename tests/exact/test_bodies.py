@@ -287,7 +287,7 @@ def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, ab
         assert found == []
         return
     (text,) = found
-    assert f"about the centre of mass, of principal moments {diagonal}, is no rigid body's" in text
+    assert f"about the centre of mass, of principal moments {diagonal}, is not a rigid body's" in text
     assert ("The tensor is about the centre of mass, and was read as about the pivot." in text) == (about == "pivot")
 
 

@@ -192,7 +192,7 @@ FAILURES = {
     "inf": "a state that is not finite",
     "diverged": "a state that is not finite after 0 of 2 times",
     "liar": "2 of 2 states, and the outcome step_limit",
-    "worded": "the outcome 'success', which is none",
+    "worded": "the outcome 'success' instead of a member of Outcome",
     "beyond": "as reached",
     "overtaken": "states, and said that it reached t = ",
     "behind": "states, and said that it reached t = ",

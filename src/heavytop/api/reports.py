@@ -253,7 +253,7 @@ def compare(
         cannot be compared, else "better" or "same".
 
     Raises:
-        InputError: for what is no report or policy, and where there is nothing to compare.
+        InputError: for an invalid report or policy, and where there is nothing to compare.
     """
     return compared(baseline, candidate, policy, floor, loss)
 
@@ -305,7 +305,7 @@ def history(
         A :class:`History`.
 
     Raises:
-        InputError: for fewer than two reports, and for what is no report or policy.
+        InputError: for fewer than two reports, and for an invalid report or policy.
     """
     return read_history(reports, metric, case, policy, lambda: None)
 

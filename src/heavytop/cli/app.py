@@ -126,7 +126,7 @@ def print_json(document: Any) -> None:
 
     try:
         text = msgspec.json.format(msgspec.json.encode(document), indent=1).decode()
-    except UnicodeEncodeError:  # the name of a file that is no text
+    except UnicodeEncodeError:  # the name of a file other than text
         text = json.dumps(msgspec.to_builtins(document), indent=1)
     print(printable(text))
 

@@ -58,6 +58,11 @@ class BodyMotion:
         return self.solution.method
 
     @property
+    def source(self) -> str:
+        """Where its formulas are published."""
+        return self.solution.source
+
+    @property
     def resolved(self) -> Resolved:
         """The motion in principal axes; irrational data to 256 bits."""
         return self._known(_DATA_BITS)[0]

@@ -159,7 +159,7 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 
 
 def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolution | LevelNotDone]:
-    """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
+    """:func:`matches`, and the reason, where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
     for entry in _CLASSES[system.name]:

@@ -227,7 +227,7 @@ class Evaluated(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(Evaluated):
-    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method`` and its conditions.
+    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
     made: what :func:`heavytop.exact.closed_form.cached_per_precision` keeps.
@@ -236,6 +236,7 @@ class ClosedForm(Evaluated):
     top: HeavyTop
     start: State
     method: ClassVar[str]
+    source: ClassVar[str]
     body: ClassVar[Conditions] = ()
     starts: ClassVar[Conditions] = ()
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -419,6 +420,11 @@ class Renamed:
         """The solution's own, and the names its axes have here."""
         there = inverse(self.axes)
         return f"{self.solution.method}, axes renamed {there[0] + 1}, {there[1] + 1}, {there[2] + 1}"
+
+    @property
+    def source(self) -> str:
+        """That of the solution."""
+        return self.solution.source
 
     @property
     def system(self) -> System:

@@ -48,7 +48,7 @@ class Uncertainty:
 class Resolved:
     """A motion in principal axes, in exact rationals.
 
-    top, start: in principal axes.  xi: ξ at t = 0 in these; None where γ is no unit vector and no attitude was given.
+    top, start: in principal axes.  xi: ξ at t = 0 in these; None where γ is off length 1 and no attitude was given.
     axes: the rows of A, v_given = A v_principal.  uncertainty: what the data lack; None where they are exact.
     """
 

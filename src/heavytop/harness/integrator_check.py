@@ -151,7 +151,7 @@ class _Violated(Exception):
 
 
 class _Note(Exception):
-    """A remark that is no violation."""
+    """A remark that is not a violation."""
 
 
 class _Contract:

@@ -82,7 +82,7 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     system: str | None = None
 
     def case(self) -> Case:
-        """The case; raises InputError for what is no body or start, or cannot be measured."""
+        """The case; raises InputError for an invalid body or start, and one that cannot be measured."""
         body, start = motion_of(msgspec.structs.asdict(self))
         about, system = "from the plan", system_of(self.system, body)
         if isinstance(body, HeavyTop) and start.attitude is None:
@@ -188,7 +188,7 @@ def former(name: str) -> set[str]:
 
 
 def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
-    """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
+    """The integrators that a plan in that folder defines, by name; raises InputError for an invalid one, and for two of
     one name.
     """
     sources: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]

@@ -73,7 +73,7 @@ class IntegratorSource(Protocol):
         ...
 
     def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where there is none."""
+        """The peer; raises InputError where absent."""
         ...
 
 
@@ -151,7 +151,7 @@ class Integrator:
         return found  # type: ignore[no-any-return]
 
     def _of_package(self) -> Integrator:
-        """The entry of another package's; raises InputError where there is none."""
+        """The entry of another package's; raises InputError where absent."""
         if self.name not in known():
             _of_packages.cache_clear()  # it may have been installed since
         if self.name not in known():
@@ -160,7 +160,7 @@ class Integrator:
 
     @property
     def remedy(self) -> str:
-        """What to do where it cannot be imported."""
+        """Remedy where it cannot be imported."""
         return "" if self.own else f"It comes from {self.function}: repair or remove that package."
 
     def capabilities(self) -> dict[str, Any]:

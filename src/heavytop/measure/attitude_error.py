@@ -166,7 +166,7 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
     """
     off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
     square = sum((part * part for part in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
-    if square > _ONE:  # of what is no rotation
+    if square > _ONE:  # off a rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
 

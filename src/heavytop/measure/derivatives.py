@@ -26,7 +26,7 @@ WHICH = ("start", "data", "all")
 STARTS = tuple(f"{name}(0)" for name in NAMES)
 """Names of the columns of the derivatives with respect to the start."""
 PARAMETERS = DATA
-"""Those of the derivatives with respect to the data."""
+"""Names of the columns of the derivatives with respect to the data."""
 _SPARE_BITS = 12
 
 Balls = list[list[arb]]

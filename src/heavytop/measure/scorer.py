@@ -207,13 +207,13 @@ SOLUTION_ERROR, INTEGRATION_ERROR = "solution_error", "integration_error"
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
 """Distance in one number: the largest over the samples, and that at the end."""
 OBSERVED_ORDER = Quantity("observed_order")
-"""Of a method, by its errors of single steps."""
+"""Order of a method, by its errors of single steps."""
 ORDER_OF_RUNS = Quantity("observed_order", "runs")
-"""Of a method, by the errors of whole runs at h, h/2, h/4."""
+"""Order of a method, by the errors of whole runs at h, h/2, h/4."""
 COMPONENTS = ("omega", "gamma", "along", "across")
 
 Errors = tuple[list[Sums], bool]
-"""What :meth:`SolutionError.following` finds."""
+"""Result of :meth:`SolutionError.following`."""
 
 
 class SolutionError(Statistics):
@@ -275,7 +275,7 @@ class SolutionError(Statistics):
             return self.errors(to_balls(state[:6]), truth)
 
     def known(self, time: Fraction) -> list[arb] | None:
-        """The true state; None where there is none."""
+        """The true state; None where absent."""
         return self.truth.state(time, self.bits) if self.truth.covers(time) else None
 
     def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
@@ -326,7 +326,7 @@ def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
 class DriftAndError:
     """Measures of the samples of a motion: drift, where the state is whole, and error, where there is a reference.
 
-    truth: the true motion, or why there is none.
+    truth: the true motion, or why it is missing.
     """
 
     truth: Truth | str
@@ -359,7 +359,7 @@ class DriftAndError:
 class Scorer(DriftAndError):
     """Takes in the states of one motion, one after the other, and holds what they are worth.
 
-    problem: what the integrator was given.  truth: the true motion, or why there is none.
+    problem: what the integrator was given.  truth: the true motion, or why it is missing.
     keep: the times whose values go into the series.
     threshold, until, name: as in :class:`heavytop.measure.scorer.SolutionError`.
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.

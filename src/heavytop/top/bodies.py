@@ -428,7 +428,7 @@ def _warnings_about_centre(body: Body) -> list[str]:
     moments = ", ".join(six_digits(value) for value in _principal_moments(body.central))
     six, at_pivot = six_of(body.central if body.about == CENTRE else body.tensor), body.about != CENTRE
     slip = mending(MassProperties(six, body.mass, body.centre, at_pivot, slack))
-    sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's."
+    sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is not a rigid body's."
     return [f"{sentence} {slip}".rstrip()]
 
 
@@ -468,7 +468,7 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     values: by the keys of :data:`BODY` and :data:`START`; lists of texts, or one text for a number.  With mass and
     gravity it is a body in any axes, with weight a top in principal axes.
     normalize: move γ, or a quaternion or matrix, to a rotation in exact rationals near it.
-    Raises InputError for what is missing, contradicts another, or is no body or start.
+    Raises InputError for what is missing, contradicts another, or describes an invalid body or start.
     """
     data = {key: value for key, value in values.items() if value is not None and value != []}
     if "file" in data:

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, inf, log10
 from threading import Lock
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from flint import arb, arb_series
 from gmpy2 import mpq
@@ -318,7 +318,7 @@ class ScaledMotion:
         return None if self.grid(precision) is None else self.certified(precision)
 
     def grid(self, precision: int) -> Grid | None:
-        """That of so many bits; None where there is none."""
+        """That of so many bits; None where absent."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
@@ -413,6 +413,7 @@ class Validated:
     xi: Vector | None = None
     effort: float = EFFORT
     method: str = "validated: Taylor enclosure"
+    source: ClassVar[str] = "theorem of a step: exact/enclosure/step.py of the program"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], EnclosureRun] = field(

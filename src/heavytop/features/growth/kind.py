@@ -131,7 +131,7 @@ class Growth(Kind):
     place = 50
 
     def carries_band(self, metric: Metric) -> bool:
-        """Every error; how many starts failed is none."""
+        """Every error; the number of failed starts is not one."""
         return super().carries_band(metric) and metric.quantity != FAILED
 
     def least_band(self, starts: int) -> float:

@@ -116,7 +116,7 @@ def digits_end(
         A ``DigitsEnd``: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
 
     Raises:
-        InputError: for what is no motion or time, and for the gyrostat of the paper.
+        InputError: for an invalid motion or time, and for the gyrostat of the paper.
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)

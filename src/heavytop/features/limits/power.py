@@ -30,7 +30,7 @@ from heavytop.top.inertia_slips import minus, plus, six_of, steiner
 Motion = tuple[HeavyTop | Body, State, System]
 _MOST = 100_000
 _SUBSTEP = 1 / 16
-"""Of a radian, for the classical Runge-Kutta method."""
+"""Part of a radian, for the classical Runge-Kutta method."""
 _G = Fraction("9.8") / Fraction("9.81")
 
 
@@ -125,7 +125,7 @@ def power(
         A ``Power``: ``faults`` with ``name``, ``detected_from`` and ``tolerance``; ``error``, ``passes``.
 
     Raises:
-        InputError: for what is no motion, an unknown fault, more than 100,000 samples, and for other numbers.
+        InputError: for an invalid motion, an unknown fault, more than 100,000 samples, and for other numbers.
     """
     body, state = arguments.motion(top, start)
     motion = body, state, arguments.system(system, body)

@@ -170,7 +170,7 @@ def _size(row: Row) -> float:
 
 
 def _number(row: Row, name: str) -> str:
-    """The metric in short; "" where there is none."""
+    """The metric in short; "" where absent."""
     metric = row.metrics.get(name)
     return "" if metric is None or metric.value == "missing" else short(metric.value)
 

@@ -430,7 +430,7 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
 def passed(row: Row, needed: Fraction | None) -> bool | None:
     """Whether so many digits are right; False where fewer are, also of a run that ended early.
 
-    None, which is no pass, where it ended early, and where it is not known how many are right, or only that so many are
+    None, not a pass, where it ended early, and where it is not known how many are right, or only that so many are
     which the reference resolves.  needed: None for no demand.
     """
     good = None if not complete(row) else True

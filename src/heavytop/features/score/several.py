@@ -27,7 +27,7 @@ _WIDTH = 44
 
 @dataclass(frozen=True, slots=True)
 class ScoredFile:
-    """A file with its score, or why there is none.
+    """A file with its score, or why it is missing.
 
     method: what files have in common that differ in their step alone; step: 0 where the file does not say it.
     """

@@ -263,7 +263,7 @@ def _alone(
 
 
 def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
-    """(motions, samples, 6) of native states, exact in two doubles; NaN where there is none."""
+    """(motions, samples, 6) of native states, exact in two doubles; NaN where absent."""
     high, low = (numpy.full((len(states), samples, 6), math.nan) for _ in range(2))
     for index, run in enumerate(states):
         if not len(run):

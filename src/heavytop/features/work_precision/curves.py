@@ -128,7 +128,7 @@ class Lead:
 
     @property
     def short(self) -> str:
-        """The ratios in a line, who is faster first; "" where there is none."""
+        """The ratios in a line, who is faster first; "" where absent."""
         if self.ratio is None:
             return ""
         if self.ratio < 1:

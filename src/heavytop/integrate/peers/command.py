@@ -61,7 +61,7 @@ _FAREWELL = 0.3
 _MOST_OVERHEAD = 1e-3
 """Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
 _LEAST_SHARE = 0.1
-"""Of the seconds of a request, which remain at least: less than its noise is not measured."""
+"""Part of the seconds of a request, which remain at least: less than its noise is not measured."""
 _RESOLUTION = 1e-4
 """Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -130,7 +130,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return CommandIntegrator(self)
 
     def argv(self) -> list[str]:
-        """The program as an absolute path and its arguments; raises PeerFailed where there is none to run."""
+        """The program as an absolute path and its arguments; raises PeerFailed if it is missing."""
         program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
         path = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
         if not os.path.isfile(path):

@@ -87,7 +87,7 @@ MOST_PLOTS = 12
 TIME = "|t| (time units of the data)"
 DASHED = (0, (6.0, 3.0))
 _DASHES = ("", "6 3", "2 2", "8 2 2 2")
-"""Of SVG, in line widths; the first is a whole line."""
+"""Dashes of SVG, in line widths; the first is a whole line."""
 
 Sources = Sequence[tuple[str, Report]]
 
@@ -229,7 +229,7 @@ class Value:
     noise: bool = False
 
     def __str__(self) -> str:
-        """``2.3e-13 ± 0.12``; "-" where there is none."""
+        """``2.3e-13 ± 0.12``; "-" where absent."""
         if self.metric is None:
             return "-"
         band = self.metric.band if self.noise else None

@@ -93,5 +93,5 @@ def metric_name(finding: Finding) -> str:
 
 
 def values(finding: Finding) -> tuple[str, str]:
-    """The two values with few digits; a dash where there is none."""
+    """The two values with few digits; a dash where absent."""
     return short(finding.baseline or "-"), short(finding.candidate or "-")

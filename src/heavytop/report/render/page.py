@@ -183,7 +183,7 @@ def _badness(row: Row) -> tuple[bool, bool, float]:
 
 
 def main_metric(row: Row) -> str:
-    """What a line about a row says first: an error if it has one that is a number, else what its kind is about."""
+    """Beginning of a line about a row: an error if it has one that is a number, else what its kind is about."""
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
     errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
     name = next(iter(errors or row.metrics), None)
@@ -283,7 +283,7 @@ _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved
 def digits_headline(rows: Sequence[Row]) -> Headline | None:
     """The fewest digits right at the longest horizon: of a third-party integrator beside heyoka's, else of heyoka
     beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has lost all
-    significant digits, counts where there is no other.
+    significant digits, counts as the last choice.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
@@ -330,7 +330,7 @@ def _place(row: Row) -> tuple[str, int, str]:
 
 
 def named(rows: Sequence[Row]) -> Callable[[Row], str]:
-    """What a row is called among these: its case, and its integrator, where they have several and it is not heyoka."""
+    """Name of a row among these: its case, and its integrator, where they have several and it is not heyoka."""
     several = len({row.key.subject.name for row in rows}) > 1
     return lambda row: row.key.case + (f",{name}" if several and (name := computed_by(row)) else "")
 

@@ -33,7 +33,7 @@ _FEWEST = 2
 
 
 _STYLES = {"soft": "dim", "big": "bold"}
-"""Of lines."""
+"""Styles of lines."""
 
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
@@ -96,7 +96,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
 
 
 def _lines(parts: Iterable[RenderableType]) -> list[str]:
-    """What a terminal of 80 columns shows, without colours."""
+    """Text that a terminal of 80 columns shows, without colours."""
     console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
     console.print(Group(*parts), highlight=False, markup=False)
     assert isinstance(console.file, StringIO)
@@ -198,7 +198,7 @@ _MEANS = {
 }
 """Laws of the error along the flow."""
 _WIDTHS = {"integrals": 16, "along": 12, "across": 12}
-"""What is summed up, and the characters there are for it."""
+"""Subject of a summary, and the characters there are for it."""
 _COLUMNS = "", "integrals", "error along", "across"
 _FAR = 2.0
 """Decades."""
@@ -262,7 +262,7 @@ def _meaning(row: Row) -> str:
 
 
 def _larger(row: Row, ours: Row) -> str:
-    """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
+    """A remark that no law makes: an error that is far larger than heyoka's of the same motion; "" where it is not."""
     error, known = (row.metric(SOLUTION_ERROR, "along", "final") for row in (row, ours))
     if error is None or known is None or size(error) - size(known) < _FAR:
         return ""

@@ -40,7 +40,7 @@ NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 
 def failed(row: Row, kinds: Kinds) -> bool:
     """Whether a measurement did not succeed; that a run aborts may be what its rows are there to show.
 
-    What an integrator declares that it cannot do is no failure.
+    What an integrator declares that it cannot do is not a failure.
     """
     if row.outcome == UNSUPPORTED:
         return False
@@ -48,7 +48,7 @@ def failed(row: Row, kinds: Kinds) -> bool:
 
 
 def unsupported(rows: Iterable[Row]) -> str:
-    """What integrators declare that they cannot do, in one line; empty where there is no such row."""
+    """Requests that integrators declare unsupported, in one line; empty without such a row."""
     lacking = [row for row in rows if row.outcome == UNSUPPORTED]
     why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
     return f"Not supported, and not measured: {plural(len(lacking), 'row')}; {'; '.join(why)}." if lacking else ""
@@ -71,7 +71,7 @@ def head(report: AnyReport, rows: int) -> Text:
 
 
 WORD_STYLES = {"refuted": "bold red", "holds": "bold green"}
-"""Of verdicts; others are yellow."""
+"""Colours of verdicts; others are yellow."""
 
 
 def title(text: str) -> Text:

@@ -111,7 +111,7 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
     elif function in ("coth", "csch"):
         needs = {Need(ConditionKind.NONZERO, sympy.sinh(u))}
     elif function in ("wp", "wpprime", "wzeta"):
-        text = f"{u} is no period of wp(u, {arguments[1]}, {arguments[2]})"
+        text = f"{u} is not a period of wp(u, {arguments[1]}, {arguments[2]})"
         needs = {Need(ConditionKind.NONZERO, wpinverse(*arguments), text)}
     elif function in ("wp3", "wp3prime", "wzeta3", "wsigma3"):
         _, g2, g3 = arguments
@@ -140,7 +140,7 @@ _OF_PARAMETER: dict[str, tuple[ConditionKind | None, ConditionKind]] = {
     **dict.fromkeys(("ellipticF", "ellipticK", "ellipticPi"), (None, _P)),
     "ellipticE": (None, _N),
 }
-"""What the last argument, a parameter m or a nome q, is compared with 0, and 1 with it."""
+"""Sign conditions on the last argument, a parameter m or a nome q, compared with 0, and 1 with it."""
 
 
 def _is_plain(need: Need) -> bool:
@@ -452,7 +452,7 @@ def _occurs_inside(field: Field, index: int, p: fmpq_mpoly) -> bool:
 
 
 _ORDERS = 4
-"""Derivatives that are looked at where a formula is no polynomial."""
+"""Derivatives that are looked at where a formula is not a polynomial."""
 _MOST_OPERATIONS = 60
 """Of a formula that is looked at."""
 _MAY_JUMP = (sympy.Abs, sympy.sign, sympy.DiracDelta, sympy.atan2)

@@ -520,7 +520,7 @@ class Prover:
         return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
 
     def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
-        """The divisors that stand against the proof; None where there is no proof."""
+        """The divisors that stand against the proof; None without a proof."""
         if region is None:
             return None
         flow = statement.flow
@@ -544,6 +544,8 @@ class Prover:
 
     def _why_no_place(self, statement: Statement) -> str:
         setting = self._setting
+        if not setting.samples:
+            return "no exact state is known: give samples at which the start is rational and moves, or states"
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at no sample is each principal moment at most the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)
@@ -560,7 +562,7 @@ class Prover:
             self._met[needed] = all(need.is_met(point) for need in needed[0])
         if not self._met[needed]:
             return False
-        # a derivative of |u| is none where u is 0
+        # |u| has no derivative where u is 0
         if any(
             Need(ConditionKind.NONZERO, kink.args[0]).is_met(point) is not True
             for kink in parts_of([statement.residual])

@@ -117,7 +117,7 @@ def library() -> dict[str, Entry]:
 
 
 def file_of(name: str) -> Path | None:
-    """The file of the entry with that id or alias; None where there is none."""
+    """The file of the entry with that id or alias; None where absent."""
     named = (entry.id for entry in library().values() if name in (entry.id, *entry.aliases))
     return next((FOLDER / f"{name}.toml" for name in named), None)
 

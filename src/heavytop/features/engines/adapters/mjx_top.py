@@ -21,11 +21,13 @@ MODEL = """
 
 
 def text(values):
+    """Numbers of an attribute of MJCF, each exactly."""
     return " ".join(repr(float(value)) for value in values)
 
 
 @jax.jit
 def steps(model, data, count):
+    """The data after so many steps."""
     return jax.lax.fori_loop(0, count, lambda _, data: mjx.step(model, data), data)
 
 

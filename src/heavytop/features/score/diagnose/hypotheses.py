@@ -192,7 +192,7 @@ _MARGIN = 30.0
 _BIAS = 0.02
 """A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
 _SPARSE = 0.05
-"""Of the distance between short decimals, within which a number is none by accident."""
+"""Of the distance between short decimals, within which agreement is not accidental."""
 _AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
@@ -656,7 +656,7 @@ _REFINED = 6
 _FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
-"""The samples must spread over so much of their time: an integrator's own lag grows with time and is no shift."""
+"""The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
 _NEAR_ONE = 0.05
 """A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
 _SHORT = 3

@@ -91,7 +91,7 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
-    """The motion at ``times``; None for what is no body, or cannot be computed."""
+    """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
         return None

@@ -49,7 +49,7 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
-"""What stands behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+"""Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
 _ALL_COLUMNS = "Give every row all of its columns."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
@@ -148,7 +148,7 @@ class TextTable:
         """The columns of a table that does not name them, by its first row."""
         width = len(first)
         if width == len(logs.TUM) and logs.is_unit(first[-4:]):
-            self.notes.append(f"there is no header; the columns are taken as {' '.join(logs.TUM)}")
+            self.notes.append(f"without a header the columns are taken as {' '.join(logs.TUM)}")
             return logs.TUM
         if width == len(logs.KITTI):
             raise InputError(
@@ -161,7 +161,7 @@ class TextTable:
                 f"not {len(COLUMNS)}.",
                 "Give a header that names the columns.",
             )
-        self.notes.append(f"there is no header; the columns are taken as {' '.join(COLUMNS)}")
+        self.notes.append(f"without a header the columns are taken as {' '.join(COLUMNS)}")
         return COLUMNS
 
 
@@ -189,7 +189,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
         separator = _separator(line)
     line = _REMARK.sub("", line).rstrip()
     cells = line.split(separator)
-    # a separator behind the last column is no column
+    # a separator behind the last column is not a column
     if separator and len(cells) > 1 and not cells[-1].strip():
         cells = cells[:-1]
     return [cell.strip().strip("\"'").strip() for cell in cells]
@@ -208,7 +208,7 @@ def _is_header(names: list[str]) -> bool:
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
-    """The cells of every row; raises InputError that names the line of one that has not as many as the header."""
+    """The cells of every row; raises InputError that names the line of one with another number than the header."""
     rows = []
     for number, line in zip(lines, body, strict=True):
         cells = _cells(line, separator)
@@ -282,7 +282,7 @@ _NOT_READ |= {
     "pivot",
     *map(key_of, SHAPES),
 }
-"""What else `heavytop propagate --json` writes."""
+"""Further keys of `heavytop propagate --json`."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 _ROW_SLACK = Fraction(1, 100)
@@ -416,7 +416,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
 
 
 def _times(document: dict[str, Any]) -> list[Fraction]:
-    """The times, exact and in order; raises InputError where there is none but 0."""
+    """The times, exact and in order; raises InputError where all are 0."""
     if "lines" in document:
         texts = observed_columns.times(document)
     else:
@@ -428,7 +428,7 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
 
 
 def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
-    """What a file says of itself: name, integrator, outcome, steps, flags, and whether its format was guessed."""
+    """Metadata of a file: name, integrator, outcome, steps, flags, and whether its format was guessed."""
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
