@@ -1,4 +1,4 @@
-"""The integrator multiword behind heyoka's call, and what both keep: proven accuracy, the same bits however it is cut, outcomes."""
+"""multiword behind heyoka's call, and what both keep: proven accuracy, the same bits however cut, outcomes."""
 
 import json
 import math
