@@ -28,7 +28,7 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.guard import Guard, how_it_ended, stopwatch
+from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
@@ -543,14 +543,16 @@ class Session:
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        self._exchange(text, reply, "done", most)
-        reply.wall = seconds()
+        reply.wall = seconds(self._exchange(text, reply, "done", most))
         return reply
 
-    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> None:
-        """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then."""
+    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> float:
+        """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then.
+
+        Returns for how many seconds this thread had no processor since it last found nothing to read.
+        """
         began, seconds = monotonic(), min(seconds, self.command.seconds)
-        deadline, awake_until = began + seconds, began + _AWAKE
+        deadline, awake_until, looked = began + seconds, began + _AWAKE, waited_for_processor()
         waiting = self._write(memoryview(text))
         if waiting:
             self._poll.register(self._in, select.POLLOUT)
@@ -558,16 +560,19 @@ class Session:
             if waiting and not (waiting := self._write(waiting)):
                 self._poll.unregister(self._in)
             if self._lines(reply):
-                return
+                return waited_for_processor() - looked
             left = deadline - monotonic()
             if left <= 0:
                 raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
             now = monotonic()
             awake = not waiting and reply.due < _MANY and now < awake_until
-            events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
-            if awake and not events:
-                os.sched_yield()
-                continue
+            waited = waited_for_processor()
+            events = self._poll.poll(0)
+            if not events:
+                looked = waited
+                if awake:
+                    continue
+                events = self._poll.poll(1000 * min(left, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             if events and not waiting and reply.due >= _MANY:

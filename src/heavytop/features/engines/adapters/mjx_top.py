@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib.metadata import version
 
 METHOD, BITS = sys.argv[1].split("-")
 os.environ["JAX_ENABLE_X64"] = str(BITS == "64")
@@ -50,4 +51,4 @@ class Engine:
         return self.data.qpos, self.data.qvel
 
 
-serve(f"MJX:{sys.argv[1]} {mujoco.__version__}", Engine)
+serve(f"MJX:{sys.argv[1]} {version('mujoco-mjx')}", Engine)
