@@ -356,11 +356,6 @@ class Turned:
         return rotation
 
 
-def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits: int) -> list[arb]:
-    """ξ of :class:`Turned` at ``time``: three balls of ``bits`` bits."""
-    return Turned(solution, own)(time, bits)[6:]
-
-
 # Renaming of the principal axes, once for all cases.
 #
 # With Q a permutation of the axes and d = det Q = ±1, Q (u × v) = d Qu × Qv.  So if (Ω, γ) solves the equations of
@@ -462,7 +457,7 @@ class Renamed:
 
         Raises NotInClass where the solution has no attitude.
         """
-        return turned_to_start(self, self.own_attitude, time, bits)
+        return Turned(self, self.own_attitude)(time, bits)[6:]
 
     def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
         """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""
