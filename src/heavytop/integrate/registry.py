@@ -408,7 +408,8 @@ def commands_in(path: Path) -> list[Command]:
         text = path.read_text("utf-8")
         document = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {error}.", "Give a readable TOML file.") from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path} cannot be read: {why}.", "Give a readable TOML file.") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")

@@ -145,8 +145,8 @@ class Homoclinic(Kind):
             both((row, _cells(row)) for row in rows),
             [
                 "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first "
-                "integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost. α: the "
-                "angular velocity of the rotation that the motion tends to; of none, the largest |Ωi| at the start.",
+                "integral, of all samples; escape: when Ω is first off by 1e-3 α. α: the "
+                "angular velocity of the rotation that the motion tends to; else the largest |Ωi| at the start.",
                 NOISE_BAND,
             ],
         )

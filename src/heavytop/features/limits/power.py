@@ -134,7 +134,8 @@ def power(
     end, most = exact(until), exact(tolerance)
     apart = end / 100 if step is None else exact(step)
     if not (0 < apart <= end and most > 0):
-        raise InputError("until, step and tolerance must be positive, and step at most until.", "Give such as 10, 0.1.")
+        asked = f"until = {until}, step = {apart}, tolerance = {tolerance}"
+        raise InputError(f"{asked}: these must be positive, and step at most until.", "Give such as 10, 0.1, 1e-6.")
     count = int(end // apart)
     if count > _MOST:
         raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")

@@ -241,7 +241,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     """
     if not changes.rows:
         counted = same - sum(row.outcome in UNMEASURED for row in failed)
-        numbers = f"{plural(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        numbers = f"{plural(counted, 'metric is', 'metrics are')} within what is allowed"
         return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]

@@ -415,9 +415,7 @@ def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
             if isinstance(value, list)
             else "is not a list"
         )
-        raise InputError(
-            f"{what} {has}.", f"Give {count} numbers, each with a decimal point." if count else "Give a list."
-        )
+        raise InputError(f"{what} {has}.", f"Give {count} numbers, such as 2.5 (not 2,5)." if count else "Give a list.")
     return value
 
 
