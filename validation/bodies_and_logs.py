@@ -4,7 +4,8 @@
 random boxes, in URDF, MJCF, SDF, USD and TOML; it prints each slip that `heavytop body` does not name, and each right
 file that it refuses or reads as another tensor.  ``python validation/bodies_and_logs.py logs [seed]`` writes 40 logs of
 random motions, integrated here by Runge-Kutta in double: each must be read to ten digits, or be refused with the line
-that would help.  Exit code 1 where one is not.
+that would help.  ``packages`` compares 72 MJCF and USD files with what MuJoCo and usd-core read, where installed.
+Exit code 1 where one is not.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from heavytop.errors import InputError
 from heavytop.features.body.document import assess
 from heavytop.features.score.api import read_trajectory, scored
+from heavytop.top import body_files
 from heavytop.top.body_files import read_body
 
 Array = np.ndarray
@@ -259,6 +261,54 @@ def bodies(seed: int) -> int:
     return wrong
 
 
+def frames(given: Box) -> dict[str, str]:
+    """The rotation of the axes of a box as each kind of frame of MJCF."""
+    (x, y, z), q = given.axes.T, given.quaternion
+    half = np.arctan2(np.linalg.norm(q[1:]), q[0])
+    roll, pitch, yaw = np.degrees(rpy(given.axes))
+    return {
+        f'quat="{text(3 * q)}"': "xyz",
+        f'axisangle="{text([*(5 * q[1:]), np.degrees(2 * half)])}"': "xyz",
+        f'xyaxes="{text([*(2 * x), *(3 * y + x)])}"': "xyz",
+        f'euler="{text([roll, pitch, yaw])}"': "XYZ",
+        f'euler="{text([yaw, pitch, roll])}"': "zyx",
+        f'zaxis="{text(z)}"': "xyz",
+    }
+
+
+def packages(seed: int) -> int:
+    """Prints each right MJCF and USD file, and each frame, that MuJoCo or usd-core reads as another tensor."""
+    draw, wrong, count = random.Random(seed), 0, 0
+    written: list[tuple[str, str]] = []
+    for _ in range(8):
+        given = box(draw)
+        written += [("xml", mjcf(given)), ("xml", mjcf(given, geometry=True, turned=True)), ("usda", usd(given))]
+        inertial = f'pos="{text(given.centre)}" mass="{text(given.mass)}" diaginertia="{text(given.moments)}"'
+        written += [
+            (
+                "xml",
+                f'<mujoco><compiler eulerseq="{sequence}"/><default><joint type="ball"/></default><worldbody>'
+                f'<body name="arm"><joint pos="1 2 3"/><inertial {inertial} {frame}/></body></worldbody></mujoco>',
+            )
+            for frame, sequence in frames(given).items()
+        ]
+    with tempfile.TemporaryDirectory() as folder:
+        for suffix, content in written:
+            (path := Path(folder) / f"arm.{suffix}").write_text(content)
+            own = read_body(path)
+            other = (
+                body_files.by_mujoco(path, "arm", 0) if suffix == "xml" else next(body_files.composed_usd(path))[1]()
+            )
+            count += 1
+            pairs = zip((own.mass, *own.centre, *own.six), (other.mass, *other.centre, *other.six), strict=True)
+            error = max(abs(float(a - b)) for a, b in pairs) / max(map(float, own.six))
+            if error > (1e-5 if suffix == "usda" else 1e-12) or own.joint != other.joint:
+                wrong += 1
+                print(f"{error:.1e}, {own.joint}, {other.joint}: {content}")
+    print(f"packages: {wrong} of {count} files read as another body")
+    return wrong
+
+
 # Logs.
 
 
@@ -477,7 +527,12 @@ def logs_of(g: Motion, f: Motion) -> Iterator[tuple[str, str, str | bytes, str]]
     yield "quaternion xyzw", "csv", table(g, "t,qx,qy,qz,qw", xyzw), ""
     lines = table(g, "t,qw,qx,qy,qz", q).splitlines()
     yield "a row twice", "csv", "\n".join([*lines[:12], lines[11], *lines[12:]]), ""
-    yield "two rows at one time", "csv", "\n".join([*lines[:12], lines[11][:-9], *lines[12:]]), "of one time and differ"
+    yield (
+        "two rows at one time",
+        "csv",
+        "\n".join([*lines[:12], lines[11][:-9] + "000000000", *lines[12:]]),
+        "of one time and differ",
+    )
     yield "a reset", "csv", "\n".join([*lines, *lines[-20:]]), ""
     yield "free, omega alone", "csv", table(f, "t,omega1,omega2,omega3", f.omega), ""
     falling = np.c_[f.times, 2 - f.times, -4.905 * f.times**2]
@@ -512,5 +567,5 @@ def logs(seed: int) -> int:
 
 if __name__ == "__main__":
     number = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    missed = {"bodies": bodies, "logs": logs}[sys.argv[1]](number)
+    missed = {"bodies": bodies, "logs": logs, "packages": packages}[sys.argv[1]](number)
     sys.exit(1 if missed else 0)

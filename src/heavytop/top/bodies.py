@@ -35,7 +35,9 @@ from heavytop.top.inertia_slips import (
     mending,
     minus,
     plus,
+    rows,
     six_of,
+    six_of_nine,
     steiner,
 )
 
@@ -357,7 +359,7 @@ class Body:
 
     def warnings(self) -> list[str]:
         """Data that no rigid body has, though the equations do not mind."""
-        return self.top.warnings() or _warnings_about_centre(self)
+        return _warnings_about_centre(self) or self.top.warnings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,20 +406,7 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
     if len(values) not in (3, 6, 9):
         raise InputError(f"inertia has {len(values)} numbers.", _SHAPES)
     n = [_number(value, "inertia") for value in values]
-    zero = Fraction(0)
-    if len(n) == 3:
-        return (n[0], zero, zero), (zero, n[1], zero), (zero, zero, n[2])
-    if len(n) == 6:
-        return (n[0], n[3], n[4]), (n[3], n[1], n[5]), (n[4], n[5], n[2])
-    rows = (n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8])
-    for i, j in ((0, 1), (0, 2), (1, 2)):
-        if rows[i][j] != rows[j][i]:
-            raise InputError(
-                f"The inertia tensor is not symmetric: I{i + 1}{j + 1} = {shown(rows[i][j])}, "
-                f"I{j + 1}{i + 1} = {shown(rows[j][i])}.",
-                "Give the same number in both places.",
-            )
-    return rows
+    return rows(six_of_nine(n) if len(n) == 9 else [*n, *[Fraction(0)] * (6 - len(n))])
 
 
 def _warnings_about_centre(body: Body) -> list[str]:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
+from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, prefixed, quoted
 from heavytop.files import read_whole
-from heavytop.precision import Vector, exact, round_to, vector
+from heavytop.precision import Vector, cross, exact, round_to, vector
 from heavytop.top import inertia_slips
 from heavytop.top.attitude import Attitude, multiplied, transposed
 from heavytop.top.inertia_slips import Six, Tensor, rows, six_of
@@ -28,6 +30,7 @@ _BITS = 64
 _UTF8_MARK = b"\xef\xbb\xbf"
 _LARGEST_FILE = 50_000_000
 _MOST_SLACK = Fraction(1, 200)
+_FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
 _IDENTITY: Tensor = rows((Fraction(1), Fraction(1), Fraction(1), *_ZERO))
 _SIX_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -70,33 +73,35 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
     Raises InputError for a file that cannot be read, that holds no mass properties or several without ``link``, and
     for numbers that are none.
     """
-    bodies = list(_bodies(path))
-    if link is not None:
-        bodies = [body for body in bodies if body.name == link] or _no_link(path, link, bodies)
-    if len(bodies) != 1:
-        names = ", ".join(body.name for body in bodies[:20])
-        if not bodies:
-            raise InputError(f"{path} holds no mass properties.", "A body needs its mass and its inertia tensor.")
-        raise InputError(f"{path} holds {len(bodies)} bodies: {names}.", "Choose one with --link NAME.")
-    if bodies[0].mass <= 0:
-        raise InputError(f"{bodies[0].name}: mass must be positive; got {bodies[0].mass}.", "Give its mass in kg.")
-    return bodies[0]
+    links = list(_links(path))
+    chosen = [(name, read) for name, read in links if link in (None, name)]
+    names = ", ".join(name for name, _ in links[:20]) or "none"
+    if link is not None and not chosen:
+        raise InputError(f"{path} has no link {quoted(link)} with an inertia.", f"It has {names}.")
+    if not chosen:
+        raise InputError(f"{path} holds no mass properties.", "A body needs its mass and its inertia tensor.")
+    if len(chosen) > 1:
+        remedy = "Choose one with --link NAME." if link is None else "Give each of them another name."
+        raise InputError(f"{path} holds {len(chosen)} bodies: {names}.", remedy)
+    body = chosen[0][1]()
+    if body.mass <= 0:
+        raise InputError(f"{body.name}: mass must be positive; got {body.mass}.", "Give its mass in kg.")
+    return body
 
 
-def _no_link(path: Path, link: str, bodies: Sequence[BodyInFile]) -> list[BodyInFile]:
-    names = ", ".join(body.name for body in bodies[:20]) or "none"
-    raise InputError(f"{path} has no link {quoted(link)} with an inertia.", f"It has {names}.")
+Link = tuple[str, Callable[[], BodyInFile]]
+"""The name of a link or body, and what reads it: a fault of one does not keep another from being read."""
 
 
-def _bodies(path: Path) -> Iterator[BodyInFile]:
+def _links(path: Path) -> Iterator[Link]:
     try:
         content = read_whole(path)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.", "Give a file that is there.") from None
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{path} has {len(content)} bytes.", f"A body is read from at most {_LARGEST_FILE}.")
-    if content.startswith(b"PXR-USDC"):
-        raise InputError(f"{path} is binary USD.", "Convert it to text: usdcat FILE -o FILE.usda.")
+    if content.startswith(_BINARY_USD) or (content.startswith(b"#usda") and _COMPOSED.search(content)):
+        return composed_usd(path)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")) or content.removeprefix(_UTF8_MARK).lstrip().startswith(b"<"):
         return _xml(path, content.strip())
     try:
@@ -110,7 +115,7 @@ def _bodies(path: Path) -> Iterator[BodyInFile]:
     raise InputError(f"{path} is in no format that is known.", _FORMATS)
 
 
-def _xml(path: Path, content: bytes) -> Iterator[BodyInFile]:
+def _xml(path: Path, content: bytes) -> Iterator[Link]:
     from xml.etree.ElementTree import ParseError
 
     from defusedxml.common import DefusedXmlException
@@ -124,15 +129,23 @@ def _xml(path: Path, content: bytes) -> Iterator[BodyInFile]:
         raise InputError(f"{path} {cause}.", "Write it out without them." if refused else _FORMATS) from None
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]  # a namespace changes no meaning
-    readers: dict[str, Callable[[Element], Iterator[BodyInFile]]] = {
-        "robot": _urdf,
-        "mujoco": _mjcf,
-        "mujocoinclude": _mjcf,
-        "sdf": _sdf,
-    }
-    if root.tag not in readers:
+    if root.tag in ("mujoco", "mujocoinclude"):
+        return _mjcf(path, root)
+    if root.tag not in ("robot", "sdf"):
         raise InputError(f"{path} is XML with the root <{root.tag}>.", _FORMATS)
-    return readers[root.tag](root)
+    return _of_links(root, _urdf if root.tag == "robot" else _sdf)
+
+
+def _of_links(root: Element, reader: Callable[[str, Element, Element], BodyInFile]) -> Iterator[Link]:
+    """The links with an inertial element, by their names; where several models have links, behind the model's."""
+    models = root.findall(".//model")
+    owners = {link: model.get("name", "") for model in models for link in model.findall("link")}
+    several = len(set(owners.values())) > 1
+    for link in root.iter("link"):
+        name, inertial = link.get("name", ""), link.find("inertial")
+        if inertial is not None:
+            name = f"{owners[link]}::{name}" if several and link in owners else name
+            yield name, partial(reader, name, link, inertial)
 
 
 class _Numbers:
@@ -211,22 +224,15 @@ def _in_axes(axes: Tensor, six: Six) -> Six:
     return a, b, c, d, e, f
 
 
-def _urdf(root: Element) -> Iterator[BodyInFile]:
-    for link in root.iter("link"):
-        inertial = link.find("inertial")
-        if inertial is None:
-            continue
-        name = link.get("name", "")
-        numbers = _Numbers(f"link {name}")
-        origin, tensor, mass = inertial.find("origin"), inertial.find("inertia"), inertial.find("mass")
-        pose = {} if origin is None else origin.attrib
-        six, slack = numbers.tensor(
-            [(tensor.attrib if tensor is not None else {}).get(k) for k in _SIX_URDF], _SIX_URDF
-        )
-        axes, value = _rpy(numbers, pose.get("rpy")), numbers.one(None if mass is None else mass.get("value"), "mass")
-        centre = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
-        shape = _shape_of(numbers, _shapes_of_urdf(numbers, link), value, centre)
-        yield BodyInFile(name, value, centre, _in_axes(axes, six), slack, False, None, *shape)
+def _urdf(name: str, link: Element, inertial: Element) -> BodyInFile:
+    numbers = _Numbers(f"link {name}")
+    origin, tensor, mass = inertial.find("origin"), inertial.find("inertia"), inertial.find("mass")
+    pose = {} if origin is None else origin.attrib
+    six, slack = numbers.tensor([(tensor.attrib if tensor is not None else {}).get(k) for k in _SIX_URDF], _SIX_URDF)
+    axes, value = _rpy(numbers, pose.get("rpy")), numbers.one(None if mass is None else mass.get("value"), "mass")
+    centre = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
+    shape = _shape_of(numbers, _shapes_of_urdf(numbers, link), value, centre)
+    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, False, None, *shape)
 
 
 Shape = tuple[Tensor, Vector, Vector]
@@ -292,34 +298,29 @@ def _shapes_of_urdf(numbers: _Numbers, link: Element) -> list[Shape]:
     return []
 
 
-def _sdf(root: Element) -> Iterator[BodyInFile]:
-    for link in root.iter("link"):
-        inertial = link.find("inertial")
-        if inertial is None:
-            continue
-        name = link.get("name", "")
-        numbers = _Numbers(f"link {name}")
-        if inertial.get("auto") == "true":
-            raise InputError(
-                f'{numbers.where}: inertial auto="true" has Gazebo compute mass and tensor from the shapes.',
-                "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
-            )
-        axes, centre = _pose(numbers, inertial.find("pose"))
-        tensor = inertial.find("inertia")
-        texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
-        six, slack = numbers.tensor(texts, _SIX_URDF)
-        mass = numbers.one(inertial.findtext("mass"), "mass")
-        shapes: list[Shape] = []
-        for part in link.findall("collision") or link.findall("visual"):
-            geometry = part.find("geometry")
-            moments = None if geometry is None else _primitive(numbers, geometry, lambda e, key: e.findtext(key))
-            if moments is None:
-                shapes = []
-                break
-            turn, middle = _pose(numbers, part.find("pose"))
-            shapes.append((turn, middle, moments))
-        shape = _shape_of(numbers, shapes, mass, centre)
-        yield BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, None, *shape)
+def _sdf(name: str, link: Element, inertial: Element) -> BodyInFile:
+    numbers = _Numbers(f"link {name}")
+    if inertial.get("auto") == "true":
+        raise InputError(
+            f'{numbers.where}: inertial auto="true" has Gazebo compute mass and tensor from the shapes.',
+            "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
+        )
+    axes, centre = _pose(numbers, inertial.find("pose"))
+    tensor = inertial.find("inertia")
+    texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
+    six, slack = numbers.tensor(texts, _SIX_URDF)
+    mass = numbers.one(inertial.findtext("mass"), "mass")
+    shapes: list[Shape] = []
+    for part in link.findall("collision") or link.findall("visual"):
+        geometry = part.find("geometry")
+        moments = None if geometry is None else _primitive(numbers, geometry, lambda e, key: e.findtext(key))
+        if moments is None:
+            shapes = []
+            break
+        turn, middle = _pose(numbers, part.find("pose"))
+        shapes.append((turn, middle, moments))
+    shape = _shape_of(numbers, shapes, mass, centre)
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, None, *shape)
 
 
 def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
@@ -333,37 +334,80 @@ def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
     position = (values[0], values[1], values[2])
     if quaternion:
         x, y, z, w = values[3:]
-        return _rotation(Attitude.quaternion(w, x, y, z, normalize=True)), position
+        return _turn(w, x, y, z), position
     text = " ".join(str(value) for value in values[3:])
     return _rpy(numbers, text, pose.get("degrees") == "true"), position
 
 
-def _mjcf(root: Element) -> Iterator[BodyInFile]:
+def _mjcf(path: Path, root: Element) -> Iterator[Link]:
+    """The bodies with an inertial element, exactly; those without, with geoms or of other files, by MuJoCo itself."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
     frames = _MjcfFrames(settings.get("angle") == "radian", settings.get("eulerseq", "xyz"))
-    classes = _joint_types(root)
-    parents = {child: parent for parent in root.iter() for child in parent}
-    if settings.get("inertiafromgeom") == "true" or (
-        root.find(".//inertial") is None and root.find(".//body/geom") is not None
-    ):
-        raise InputError(
-            "MuJoCo computes mass and tensor of these bodies from their geoms.",
-            "Write them out: mujoco.mj_saveLastXML(FILE, model), without inertiafromgeom.",
-        )
+    defaults = _Defaults.of(root)
+    computed = settings.get("inertiafromgeom") == "true" or "settotalmass" in settings
     for index, body in enumerate(root.iter("body")):
-        inertial = body.find("inertial")
-        if inertial is None:
-            continue
-        name = body.get("name") or f"body{index + 1}"
-        numbers = _Numbers(f"body {name}")
-        axes = frames.rotation(numbers, inertial)
-        six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
-        centre, mass = numbers.three(inertial.get("pos"), "pos"), numbers.one(inertial.get("mass"), "mass")
-        joints = (joint for joint in body.findall("joint") if _joint_type(joint, classes, parents) == "ball")
-        ball = next(joints, None)
-        joint = None if ball is None else numbers.three(ball.get("pos"), "pos", "0 0 0")
-        shape = _shape_of(numbers, _geoms(numbers, body, frames), mass, centre)
-        yield BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, joint, *shape)
+        name, inertial = body.get("name") or f"body{index + 1}", body.find("inertial")
+        if computed or (inertial is None and body.find("geom") is not None):
+            yield name, partial(by_mujoco, path, name, index)
+        elif inertial is not None:
+            yield name, partial(_mjcf_body, name, body, inertial, frames, defaults)
+    if root.find(".//include") is not None or root.find(".//attach") is not None:
+        yield from _included(path, {body.get("name") for body in root.iter("body")})
+
+
+def _mjcf_body(name: str, body: Element, inertial: Element, frames: _MjcfFrames, defaults: _Defaults) -> BodyInFile:
+    numbers = _Numbers(f"body {name}")
+    axes = frames.rotation(numbers, inertial.attrib)
+    six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
+    centre, mass = numbers.three(inertial.get("pos"), "pos"), numbers.one(inertial.get("mass"), "mass")
+    joints = [defaults.attributes(joint) for joint in body.findall("joint")]
+    ball = next((joint for joint in joints if joint.get("type", "hinge") == "ball"), None)
+    joint = None if ball is None else numbers.three(ball.get("pos"), "pos", "0 0 0")
+    geoms = [defaults.attributes(geom) for geom in body.findall("geom")]
+    shape = _shape_of(numbers, _geoms(numbers, geoms, frames), mass, centre)
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, joint, *shape)
+
+
+def _compiled(path: Path) -> Any:
+    """The model that MuJoCo makes of a file; raises InputError without it, and for what it refuses."""
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError(
+            "MuJoCo computes mass and tensor of these bodies, from their geoms or out of other files.",
+            "Install it with: pip install 'heavytop[engines]'; or write them out: mujoco.mj_saveLastXML(FILE, model), "
+            "without inertiafromgeom.",
+        ) from None
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise InputError(f"MuJoCo refuses {path}: {' '.join(str(error).split())}.", "Mend the file.") from None
+
+
+def by_mujoco(path: Path, name: str, index: int) -> BodyInFile:
+    """The body of this place in the file, as MuJoCo computes it in double."""
+    model = _compiled(path)
+    names = [model.body(i).name for i in range(model.nbody)]
+    return _of_model(model, name, names.index(name) if name in names else index + 1)
+
+
+def _of_model(model: Any, name: str, body: int) -> BodyInFile:
+    values = [Fraction(repr(float(value))) for value in model.body_inertia[body]]
+    six = _in_axes(_turn(*map(float, model.body_iquat[body])), (*values, *_ZERO))  # type: ignore[arg-type]
+    x, y, z = (Fraction(repr(float(value))) for value in model.body_ipos[body])
+    balls = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and model.jnt_type[j] == 1]
+    joint = vector([float(value) for value in model.jnt_pos[balls[0]]], "pos") if balls else None
+    mass = Fraction(repr(float(model.body_mass[body])))
+    return BodyInFile(name, mass, (x, y, z), six, _FROM_DOUBLE * max(values), False, joint)
+
+
+def _included(path: Path, known: set[str | None]) -> Iterator[Link]:
+    """The bodies that a file takes from others."""
+    model = _compiled(path)
+    for index in range(1, model.nbody):
+        name = model.body(index).name or f"body{index}"
+        if name not in known and model.body_mass[index] > 0:
+            yield name, partial(_of_model, model, name, index)
 
 
 def _mjcf_six(numbers: _Numbers, inertial: Element) -> Sequence[str | None]:
@@ -385,32 +429,40 @@ def _mjcf_six(numbers: _Numbers, inertial: Element) -> Sequence[str | None]:
     return parts
 
 
-_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+_ORIENTATIONS = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
+"""What gives the orientation of a frame in MJCF, and how many numbers that has."""
 
 
-def _joint_types(root: Element) -> dict[str, str]:
-    """The type of joint of each default class, which it has from the class around it unless it says another."""
-    types: dict[str, str] = {}
+@dataclass(frozen=True, slots=True)
+class _Defaults:
+    """Attributes of each default class by tag, from the classes around it too; and the element around each element."""
 
-    def collect(default: Element, inherited: str) -> None:
-        joint = default.find("joint")
-        own = inherited if joint is None else joint.get("type", inherited)
-        types[default.get("class", "main")] = own
-        for nested in default.findall("default"):
-            collect(nested, own)
+    classes: dict[str, dict[str, dict[str, str]]]
+    parents: dict[Element, Element]
 
-    for default in root.findall("default"):
-        collect(default, "hinge")
-    return types
+    @classmethod
+    def of(cls, root: Element) -> _Defaults:
+        """Those of a file."""
+        classes: dict[str, dict[str, dict[str, str]]] = {}
 
+        def collect(default: Element, inherited: dict[str, dict[str, str]]) -> None:
+            own = {part.tag: part.attrib for part in default if part.tag != "default"}
+            merged = {tag: inherited.get(tag, {}) | own.get(tag, {}) for tag in inherited.keys() | own.keys()}
+            classes[default.get("class", "main")] = merged
+            for nested in default.findall("default"):
+                collect(nested, merged)
 
-def _joint_type(joint: Element, types: dict[str, str], parents: dict[Element, Element]) -> str:
-    """The type that a joint says, or that of its class, or of the childclass of the nearest body around it."""
-    name, around = joint.get("class"), joint
-    while name is None and around in parents:
-        around = parents[around]
-        name = around.get("childclass")
-    return joint.get("type") or types.get(name or "main", "hinge")
+        for default in root.findall("default"):
+            collect(default, {})
+        return cls(classes, {child: parent for parent in root.iter() for child in parent})
+
+    def attributes(self, element: Element) -> dict[str, str]:
+        """Those of an element and of its class, or of the childclass of the nearest body around it."""
+        name, around = element.get("class"), element
+        while name is None and around in self.parents:
+            around = self.parents[around]
+            name = around.get("childclass")
+        return self.classes.get(name or "main", {}).get(element.tag, {}) | element.attrib
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,32 +472,56 @@ class _MjcfFrames:
     radians: bool
     sequence: str
 
-    def rotation(self, numbers: _Numbers, element: Element) -> Tensor:
-        """Rotation of a frame: a quaternion, axisangle, or euler angles."""
-        for key in ("xyaxes", "zaxis"):
-            if element.get(key) is not None:
-                raise InputError(f"{numbers.where}: {key} is not read.", "Give the frame by quat.")
-        if element.get("quat") is not None:
-            quaternion = numbers.read(element.get("quat"), "quat")
-            if len(quaternion) != 4:
-                raise InputError(f"{numbers.where}: quat has {len(quaternion)} numbers.", "Give w x y z.")
-            return _rotation(Attitude.quaternion(*quaternion, normalize=True))
+    def rotation(self, numbers: _Numbers, frame: Mapping[str, str]) -> Tensor:
+        """Rotation of a frame: a quaternion, axisangle, two axes, the third axis, or euler angles."""
+        key = next((key for key in _ORIENTATIONS if key in frame), "euler")
+        values = numbers.read(frame.get(key), key, "0 0 0")
+        if len(values) != _ORIENTATIONS[key]:
+            raise InputError(f"{numbers.where}: {key} has {len(values)} numbers.", f"Give {_ORIENTATIONS[key]}.")
         unit = "" if self.radians else "deg"
-        if element.get("axisangle") is not None:
-            *axis, angle = numbers.read(element.get("axisangle"), "axisangle")
-            return _rotation(Attitude.axis_angle(axis, f"{angle}{unit}"))
+        if key == "quat":
+            return _turn(*values)
+        if key == "axisangle":
+            return _rotation(Attitude.axis_angle(values[:3], f"{values[3]}{unit}"))
+        if key == "xyaxes":
+            return _of_axes(values[:3], values[3:])
+        if key == "zaxis":  # the least rotation of e_z to it
+            x, y, z = _unit(values)
+            return _turn(*((1 + z, -y, x, 0) if z > -1 else (0, 1, 0, 0)))
         turns = _IDENTITY
-        angles = numbers.three(element.get("euler"), "euler", "0 0 0")
-        for letter, angle in zip(self.sequence, angles, strict=True):
+        for letter, angle in zip(self.sequence, values, strict=True):
             around = [int(letter.lower() == name) for name in "xyz"]
             turn = _rotation(Attitude.axis_angle(around, f"{angle}{unit}"))
             turns = multiplied(turns, turn) if letter.islower() else multiplied(turn, turns)
         return turns
 
 
-def _geoms(numbers: _Numbers, body: Element, frames: _MjcfFrames) -> list[Shape]:
+def _turn(*quaternion: Any) -> Tensor:
+    return _rotation(Attitude.quaternion(*quaternion, normalize=True))
+
+
+def _unit(values: Sequence[Fraction]) -> Vector:
+    """The unit vector along a vector, to 2^-128; raises InputError for 0."""
+    x, y, z = values
+    square = x * x + y * y + z * z
+    if not square:
+        raise InputError("An axis must not be zero.", "Give the axis of the frame.")
+    shift = max(0, square.denominator.bit_length() - square.numerator.bit_length()) // 2 + 2 * _BITS
+    length = Fraction(isqrt((square.numerator << 2 * shift) // square.denominator), 1 << shift)
+    return x / length, y / length, z / length
+
+
+def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
+    """The frame of an axis x and of one that with it spans the plane of x and y."""
+    first = _unit(x)
+    third = _unit(cross(first, vector(y, "xyaxes")))
+    columns = (first, cross(third, first), third)
+    return _rotation(Attitude.matrix(transposed(columns), normalize=True))
+
+
+def _geoms(numbers: _Numbers, geoms: Sequence[Mapping[str, str]], frames: _MjcfFrames) -> list[Shape]:
     shapes: list[Shape] = []
-    for geom in body.findall("geom"):
+    for geom in geoms:
         size = numbers.read(geom.get("size"), "size", "")
         kind = geom.get("type", "sphere")
         if (kind, len(size)) == ("box", 3):
@@ -461,49 +537,86 @@ def _geoms(numbers: _Numbers, body: Element, frames: _MjcfFrames) -> list[Shape]
 
 
 _PRIM = re.compile(r'(?:def|over)\s+(?:\w+\s+)?"([^"]*)"')
-_USD = re.compile(r"physics:(mass|centerOfMass|diagonalInertia|principalAxes)\s*=\s*(\([^)]*\)|[^\s]+)")
+_USD_NAMES = ("mass", "centerOfMass", "diagonalInertia", "principalAxes")
+_USD = re.compile(rf"physics:({'|'.join(_USD_NAMES)})\s*=\s*(\([^)]*\)|[^\s]+)")
 
 
-def _usd(text: str) -> Iterator[BodyInFile]:
+def _usd(text: str) -> Iterator[Link]:
     """Prims of USD as text that have a mass and a diagonal inertia; by their names."""
     units = {
         key: exact(value) for key, value in re.findall(r"\b(metersPerUnit|kilogramsPerUnit)\s*=\s*([-+.\deE]+)", text)
     }
-    length, kilogram = units.get("metersPerUnit", Fraction(1, 100)), units.get("kilogramsPerUnit", Fraction(1))
     text = re.sub(r"(?m)#.*$", "", text)
     starts = [*_PRIM.finditer(text)]
     for index, prim in enumerate(starts):
         end = starts[index + 1].start() if index + 1 < len(starts) else len(text)
         values = {key: value.strip("()") for key, value in _USD.findall(text[prim.end() : end])}
-        if not {"mass", "diagonalInertia"} <= values.keys():
-            continue
-        numbers = _Numbers(f"prim {prim[1]}")
-        parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
-        if len(parts) != 6:
-            raise InputError(f"{numbers.where}: diagonalInertia has {len(parts) - 3} numbers.", "Give 3.")
-        if "inf" in values.get("centerOfMass", "") or not any(
-            numbers.read(values["diagonalInertia"], "diagonalInertia")
-        ):
-            raise InputError(
-                f"{numbers.where}: an infinite centre of mass or a tensor of zeros has USD compute it from the shapes.",
-                "Give physics:centerOfMass and physics:diagonalInertia in numbers.",
-            )
-        six, slack = numbers.tensor(parts, ("I1", "I2", "I3", "I12", "I13", "I23"))
-        axes = numbers.read(values.get("principalAxes"), "principalAxes", "1 0 0 0")
-        if len(axes) != 4:
-            raise InputError(
-                f"{numbers.where}: principalAxes has {len(axes)} numbers.", "Give a quaternion w, x, y, z."
-            )
-        # a quaternion of zeros says that USD computes the axes
-        turn = _rotation(Attitude.quaternion(*(axes if any(axes) else [1, 0, 0, 0]), normalize=True))
-        scale = kilogram * length**2
-        a, b, c, d, e, f = (value * scale for value in _in_axes(turn, six))
-        x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
-        mass = numbers.one(values["mass"], "mass") * kilogram
-        yield BodyInFile(prim[1], mass, (x, y, z), (a, b, c, d, e, f), slack * scale)
+        if {"mass", "diagonalInertia"} <= values.keys():
+            yield prim[1], partial(_prim, prim[1], values, units)
 
 
-def _toml(path: Path, text: str) -> Iterator[BodyInFile]:
+def _prim(name: str, values: Mapping[str, str], units: Mapping[str, Fraction]) -> BodyInFile:
+    length, kilogram = units.get("metersPerUnit", Fraction(1, 100)), units.get("kilogramsPerUnit", Fraction(1))
+    numbers = _Numbers(f"prim {name}")
+    parts = [*values["diagonalInertia"].replace(",", " ").split(), "0", "0", "0"]
+    if len(parts) != 6:
+        raise InputError(f"{numbers.where}: diagonalInertia has {len(parts) - 3} numbers.", "Give 3.")
+    if "inf" in values.get("centerOfMass", "") or not any(numbers.read(values["diagonalInertia"], "diagonalInertia")):
+        raise InputError(
+            f"{numbers.where}: an infinite centre of mass or a tensor of zeros has USD compute it from the shapes.",
+            "Give physics:centerOfMass and physics:diagonalInertia in numbers.",
+        )
+    six, slack = numbers.tensor(parts, ("I1", "I2", "I3", "I12", "I13", "I23"))
+    axes = numbers.read(values.get("principalAxes"), "principalAxes", "1 0 0 0")
+    if len(axes) != 4:
+        raise InputError(f"{numbers.where}: principalAxes has {len(axes)} numbers.", "Give a quaternion w, x, y, z.")
+    # a quaternion of zeros says that USD computes the axes
+    turn = _turn(*(axes if any(axes) else [1, 0, 0, 0]))
+    scale = kilogram * length**2
+    a, b, c, d, e, f = (value * scale for value in _in_axes(turn, six))
+    x, y, z = (value * length for value in numbers.three(values.get("centerOfMass"), "centerOfMass", "0 0 0"))
+    mass = numbers.one(values["mass"], "mass") * kilogram
+    return BodyInFile(name, mass, (x, y, z), (a, b, c, d, e, f), slack * scale)
+
+
+_BINARY_USD = (b"PXR-USDC", b"PK\x03\x04")
+_COMPOSED = re.compile(rb"\b(references|payload|subLayers|inherits|variantSet)\b")
+"""What takes a prim of USD together from several places."""
+
+
+def composed_usd(path: Path) -> Iterator[Link]:
+    """Prims of binary USD, or of several layers, by the package usd-core; their numbers as it prints them."""
+    try:
+        from pxr import Tf, Usd, UsdGeom, UsdPhysics
+    except ImportError:
+        raise InputError(
+            f"{path} is binary USD, or refers to other layers.",
+            "Install usd-core: pip install 'heavytop[engines]'; or flatten it: usdcat --flatten FILE -o FILE.usda.",
+        ) from None
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise InputError(f"USD refuses {path}: {' '.join(str(error).split())[:200]}.", "Mend the file.") from None
+    units = {
+        "metersPerUnit": exact(repr(UsdGeom.GetStageMetersPerUnit(stage))),
+        "kilogramsPerUnit": exact(repr(UsdPhysics.GetStageKilogramsPerUnit(stage))),
+    }
+    for prim in stage.Traverse():
+        attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES}
+        values = {name: _printed(part.Get()) for name, part in attributes.items() if part.HasAuthoredValue()}
+        if {"mass", "diagonalInertia"} <= values.keys():
+            yield prim.GetName(), partial(_prim, prim.GetName(), values, units)
+
+
+def _printed(value: Any) -> str:
+    """The shortest decimals of numbers in single precision."""
+    import numpy
+
+    parts = [value.real, *value.imaginary] if hasattr(value, "imaginary") else numpy.ravel(value)
+    return ", ".join(str(numpy.float32(part)) for part in parts)
+
+
+def _toml(path: Path, text: str) -> Iterator[Link]:
     """Tables with mass, centre, inertia and about, as a plan has them in [[top]]; at the top of the file as one."""
     try:
         document = tomllib.loads(text)
@@ -511,28 +624,31 @@ def _toml(path: Path, text: str) -> Iterator[BodyInFile]:
         raise InputError(f"{path} is not TOML: {error}.", _FORMATS) from None
     tables = document.get("top", [document])
     for index, table in enumerate(tables if isinstance(tables, list) else [tables]):
-        if not isinstance(table, dict) or not {"mass", "inertia"} <= table.keys():
-            continue
-        name = str(table.get("name", f"top{index + 1}"))
-        numbers = _Numbers(f"top {name}")
-        texts = _texts(table["inertia"])
-        if len(texts) == 9:
-            if any(exact(texts[i]) != exact(texts[j]) for i, j in ((1, 3), (2, 6), (5, 7))):
-                raise InputError(f"{numbers.where}: the inertia tensor is not symmetric.", "Give each product once.")
-            texts = [texts[i] for i in (0, 4, 8, 1, 2, 5)]
-        if len(texts) == 3:
-            texts += ["0"] * 3
-        if len(texts) != 6:
-            raise InputError(f"{numbers.where}: inertia has {len(texts)} numbers.", "Give 3, 6 or 9.")
-        six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
-        centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
-        mass = numbers.one(str(table["mass"]), "mass")
-        if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
-            raise InputError(
-                f"{numbers.where}: it is not said which point the inertia tensor is about.",
-                'Give about = "pivot" or about = "centre of mass".',
-            )
-        yield BodyInFile(name, mass, centre, six, slack, table.get("about") == "pivot", si=False)
+        if isinstance(table, dict) and {"mass", "inertia"} <= table.keys():
+            name = str(table.get("name", f"top{index + 1}"))
+            yield name, partial(_toml_table, name, table)
+
+
+def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
+    numbers = _Numbers(f"top {name}")
+    texts = _texts(table["inertia"])
+    if len(texts) == 9:
+        with prefixed(numbers.where):
+            inertia_slips.six_of_nine([exact(entry) for entry in texts])
+        texts = [texts[i] for i in (0, 4, 8, 1, 2, 5)]
+    if len(texts) == 3:
+        texts += ["0"] * 3
+    if len(texts) != 6:
+        raise InputError(f"{numbers.where}: inertia has {len(texts)} numbers.", "Give 3, 6 or 9.")
+    six, slack = numbers.tensor(texts, ("I11", "I22", "I33", "I12", "I13", "I23"))
+    centre = numbers.three(" ".join(_texts(table.get("centre", ["0", "0", "0"]))), "centre")
+    mass = numbers.one(str(table["mass"]), "mass")
+    if table.get("about") not in ("pivot", "centre of mass") and (any(centre) or "about" in table):
+        raise InputError(
+            f"{numbers.where}: it is not said which point the inertia tensor is about.",
+            'Give about = "pivot" or about = "centre of mass".',
+        )
+    return BodyInFile(name, mass, centre, six, slack, table.get("about") == "pivot", si=False)
 
 
 def _texts(values: Any) -> list[str]:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
 
-from heavytop.precision import Vector, cross, decimal_text, dot, round_to
+from heavytop.errors import InputError
+from heavytop.precision import Vector, cross, decimal_text, dot, round_to, shown
 from heavytop.top.attitude import multiplied, transposed
 
 Tensor = tuple[Vector, Vector, Vector]
@@ -32,6 +33,8 @@ _ROUND = 10
 _APART = Fraction(1, 20)
 """Relative distance of a tensor from that of the geometry in the file from which on it is another."""
 _SMALL = Fraction(1, 10**9)
+_ROUNDINGS = Fraction(1, 2**48)
+"""Of the largest entry, by which a tensor that was multiplied in double may miss symmetry."""
 _SHOWN_BITS = 56
 
 
@@ -82,6 +85,22 @@ def rows(six: Sequence[Fraction]) -> Tensor:
 def six_of(tensor: Tensor) -> Six:
     """The six numbers of a symmetric tensor."""
     return tensor[0][0], tensor[1][1], tensor[2][2], tensor[0][1], tensor[0][2], tensor[1][2]
+
+
+def six_of_nine(n: Sequence[Fraction]) -> Six:
+    """The six numbers of a tensor row by row, the upper ones where two differ by roundings of double.
+
+    Raises InputError where it is not symmetric.
+    """
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        upper, lower = n[3 * i + j], n[3 * j + i]
+        if abs(upper - lower) > _ROUNDINGS * max(map(abs, n)):
+            raise InputError(
+                f"The inertia tensor is not symmetric: I{i + 1}{j + 1} = {shown(upper)}, "
+                f"I{j + 1}{i + 1} = {shown(lower)}.",
+                "Give the same number in both places.",
+            )
+    return n[0], n[4], n[8], n[1], n[2], n[5]
 
 
 def steiner(mass: Fraction, centre: Vector) -> Tensor:
@@ -148,7 +167,7 @@ def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
 def _is_rod(central: Tensor, slack: Fraction) -> bool:
     """Whether a principal moment is 0 within rounding, or below it: all mass lies on a line, or is missing."""
     least = max(slack, _SMALL * max(abs(value) for value in six_of(central)))
-    return not _semidefinite(central, -least)
+    return not is_positive(central) or not _semidefinite(central, -least)
 
 
 def slips(body: MassProperties) -> list[Slip]:
@@ -212,14 +231,14 @@ def _mend(body: MassProperties, name: str, sentence: str, six: Sequence[Fraction
 def _row_major(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     """The first six of the nine numbers of a matrix in the six places; its last one is not there."""
     n = body.six
-    if n[1] != n[3]:
+    if abs(n[1] - n[3]) > _SMALL * max(map(abs, n)):
         return
     for first, second, products in ((n[0], n[4], (n[1], n[2], n[5])), (n[0], n[5], (n[3], n[4], n[2]))):
         if first <= 0 or second <= 0:
             continue
         sentence = "These are the first six numbers of the matrix row by row; I33 is not among them."
-        for part in (1, Fraction(1, 2), Fraction(9, 10)):  # of what the triangle inequality allows
-            mended = replace(body, six=(first, second, part * (first + second), *products))
+        for part in range(64, 0, -1):  # of what the triangle inequality allows
+            mended = replace(body, six=(first, second, Fraction(part, 64) * (first + second), *products))
             if realisable(mended.central, body.slack):
                 yield Slip("row_major", sentence, (first, second, None, *products)), mended
                 break

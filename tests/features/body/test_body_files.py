@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import sys
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -159,6 +160,21 @@ def test_no_body_of_random_points_is_refused_and_no_material_is_too_dense() -> N
         assert not realisable(minus(tensor, rows((largest, *[Fraction(0)] * 5))))
 
 
+def test_a_tensor_multiplied_in_double_is_read_by_its_upper_entries(tmp_path: Path) -> None:
+    """Rounded in the last bit below the diagonal; and its first six numbers, written row by row into six places."""
+    nine = [0.3, 0.05, -0.02, 0.05 + 2**-57, 0.28, 0.04, -0.02, 0.04, 0.19]
+    body = ht.Body(1, 9.81, (0, 0, 0), nine)
+    assert body.tensor[1][0] == body.tensor[0][1] == Fraction(0.05)
+    assert judged(tmp_path / "a.toml", f"mass = 1\ninertia = {nine}")[0] == 0
+    code, document = judged(tmp_path / "a.urdf", urdf([repr(nine[i]) for i in (0, 3, 5, 1, 2, 4)]))
+    assert (code, document["slips"][0]["name"]) == (1, "row_major")  # type: ignore[index]
+
+
+def test_no_mass_anywhere_is_no_body(tmp_path: Path) -> None:
+    code, document = judged(tmp_path / "a.urdf", urdf(["0.0"] * 6))
+    assert (code, document["slips"][0]["name"]) == (1, "rod")  # type: ignore[index]
+
+
 def test_a_plate_in_printed_digits_is_a_body(tmp_path: Path) -> None:
     code, _ = judged(tmp_path / "plate.urdf", urdf(["0.000833", "0.000833", "0.001667", "0", "0", "0"], mass="1"))
     assert code == 0
@@ -202,7 +218,10 @@ def Xform "arm" (prepend apiSchemas = ["PhysicsMassAPI"])
         ("a.usd", "PXR-USDC....", "binary USD"),
     ],
 )
-def test_what_cannot_be_read_is_refused(tmp_path: Path, name: str, text: str, says: str) -> None:
+def test_what_cannot_be_read_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str, says: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "pxr", None)
     (tmp_path / name).write_text(text)
     run = heavytop("body", tmp_path / name)
     assert run.returncode == 2
@@ -216,6 +235,14 @@ def test_several_links_want_a_name(tmp_path: Path) -> None:
     assert "holds 2 bodies: arm, hand" in heavytop("body", path).stderr
     assert heavytop("body", path, "--link", "hand").returncode == 0
     assert heavytop("body", path, "--link", "foot").returncode == 2
+    path.write_text(path.read_text().replace('"2.5"', '"${m}"', 1))
+    assert heavytop("body", path, "--link", "hand").returncode == 0, "a fault of another link is no fault of this one"
+    assert heavytop("body", path, "--link", "arm").returncode == 2
+    model = sdf(SIX)[19:-6]
+    other = model.replace('name="m"', 'name="n"')
+    (world := tmp_path / "world.sdf").write_text(f"<sdf><world>{model}{other}</world></sdf>")
+    assert "m::arm, n::arm" in heavytop("body", world).stderr
+    assert heavytop("body", world, "--link", "n::arm").returncode == 0
 
 
 def test_a_file_stands_where_a_body_may(tmp_path: Path) -> None:
@@ -308,12 +335,44 @@ REFUSED: dict[str, tuple[str, str, str]] = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_another_program_has_to_compute_is_refused_with_the_way_out(name: str, tmp_path: Path) -> None:
+def test_what_another_program_has_to_compute_is_refused_with_the_way_out(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
     suffix, text, remedy = REFUSED[name]
     (path := tmp_path / f"arm.{suffix}").write_text(text)
     run = heavytop("body", path)
     assert run.returncode == 2
     assert remedy in run.stderr
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        'euler="90 0 0"',
+        'axisangle="2 0 0 90"',
+        'xyaxes="3 0 0 5 0 2"',
+        'zaxis="0 -7 0"',
+        'quat="1 1 0 0"',
+    ],
+)
+def test_every_frame_of_mjcf_is_read(frame: str, tmp_path: Path) -> None:
+    """A quarter of a turn about x exchanges the second and the third moment."""
+    (path := tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body><geom type="mesh" mesh="m"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="2 3 4" {frame}/></body></worldbody></mujoco>'
+    )
+    assert [round(float(value), 15) for value in read_body(path).six] == [2, 4, 3, 0, 0, 0]
+
+
+def test_shapes_of_mjcf_are_those_of_their_default_class(tmp_path: Path) -> None:
+    """The tensor of a box turned the other way, whose size and type are those of a class within another."""
+    (path := tmp_path / "arm.xml").write_text(
+        '<mujoco><default><geom size=".05 .2 .4"/><default class="b"><geom type="box"/></default></default>'
+        '<worldbody><body><geom class="b" euler="0 0 40"/>'
+        '<inertial pos="0 0 0" mass="12" diaginertia="0.8 0.65 0.17" euler="0 0 -40"/></body></worldbody></mujoco>'
+    )
+    assert judged(path, path.read_text())[1]["slips"][0]["name"] == "conjugate_axes"  # type: ignore[index]
 
 
 def test_angles_of_mjcf_are_of_its_sequence_and_a_ball_joint_of_its_class(tmp_path: Path) -> None:

@@ -85,6 +85,8 @@ def test_faults_are_detected_when_brute_force_detects_them() -> None:
     assert by_name["no_gyroscopic_term"].detected_from == times[0]
     assert by_name["float32"].detected_from is None
     assert not found.detects_all
+    coarse = ht.power(BODY, SPINNING, 2, "1e-2", "1/20", ["late"], integrator="splitting:2", control="1/64")
+    assert 1e-6 < coarse.error < 1e-1, "the control of a method of fixed step is its step"
 
 
 def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() -> None:

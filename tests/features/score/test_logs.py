@@ -11,6 +11,7 @@ import numpy
 import pytest
 
 import heavytop as ht
+from heavytop.features.score.trajectories.columns import header
 from support.in_process import heavytop
 
 BODY = ht.Body("2", "9.81", ("0.3", "-0.2", "0.4"), ("1.2", "0.9", "0.6"), "centre of mass")
@@ -163,6 +164,20 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     texts = {key: numpy.array(", ".join(map(str, value))) for key, value in lists.items()}
     numpy.savez(path, t=TIMES, quaternions=quaternions(), **comments, **texts)  # type: ignore[arg-type]
     assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    whole = {"mass": 2, "gravity": 9.81, "about": "centre of mass", **lists, "inertia": numpy.diag(lists["inertia"])}
+    numpy.savez(path, time=TIMES, R=run().matrices(), **whole)  # type: ignore[arg-type]
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+
+
+def test_a_parquet_table_may_hold_instants_lists_and_the_body(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    said = dict(line[2:].split(": ") for line in HEAD.splitlines())
+    stamps = pyarrow.array(map(int, NANO), pyarrow.timestamp("ns"))
+    table = pyarrow.table({"header_stamp": stamps, "orientation": quaternions().tolist()})
+    parquet.write_table(table.replace_schema_metadata(said), path := tmp_path / "log.parquet")
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
 
 
 def plain(lines: Sequence[str]) -> str:
@@ -186,17 +201,59 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("header", "says"),
+    ("names", "quantities"),
+    [
+        ("t,q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []", "quaternion"),
+        ("t,body_qw,body_qx,body_qy,body_qz,body_wx,body_wy,body_wz", "quaternion framed"),
+        ("t,w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],b_w_RS_S_x", "framed"),
+        ("t,framequat_w,framequat_x,framequat_y,framequat_z,gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s)",
+         "quaternion framed"),
+        ("elapsed,rot_x,rot_y,rot_z,rot_w,root_ang_vel_b_x,root_ang_vel_b_y,root_ang_vel_b_z", "quaternion framed"),
+        ("TimeUS,Q1,Q2,Q3,Q4", "quaternion"),
+        ("t_sec,dcm_11,dcm_12,dcm_13,dcm_21,dcm_22,dcm_23,dcm_31,dcm_32,dcm_33", "matrix"),
+        ("seconds,C00,C01,C02,C10,C11,C12,C20,C21,C22", "matrix"),
+        ("t,desired_q_w,desired_q_x,desired_q_y,desired_q_z,q_w,q_x,q_y,q_z", "quaternion"),
+    ],
+)  # fmt: skip
+def test_names_of_other_programs_are_understood(names: str, quantities: str) -> None:
+    meaning = header(names.split(","))
+    assert set(meaning.places) == set(quantities.split())
+    assert meaning.time == 0
+
+
+def test_a_table_without_a_header_and_one_of_a_longer_comment(tmp_path: Path) -> None:
+    """Of EuRoC: nanoseconds since 1970, units in brackets, columns beside; and `ros2 topic echo --csv`."""
+    named = "#timestamp [ns],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v_RS_R_x [m s^-1]\n"
+    body = [f"{time},{line},0" for time, line in zip(NANO, rows(quaternions()).splitlines(), strict=True)]
+    (path := tmp_path / "log.csv").write_text(HEAD + named + "\n".join(body))
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    path.write_text(HEAD + "\n".join(f"{k},imu,0,0,0,0,1" for k in range(11)))
+    assert "'imu' of the first row is not a number" in heavytop("score", path).stderr
+
+
+def test_rows_of_one_time_are_one_where_they_agree_to_the_digits_printed(tmp_path: Path) -> None:
+    lines = rows(TIMES, quaternions()).splitlines()
+    short = ",".join([lines[4].partition(",")[0], *(f"{float(text):.8f}" for text in lines[4].split(",")[1:])])
+    (path := tmp_path / "log.csv").write_text(plain([*lines[:4], short, *lines[4:]]))
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    path.write_text(plain([*lines[:5], short[:-1] + "99", *lines[5:]]))
+    assert "of one time and differ" in heavytop("score", path).stderr
+
+
+@pytest.mark.parametrize(
+    ("names", "says"),
     [
         ("t,quatA,quatB,quatC,quatD", "looks like an attitude"),
+        ("t,a_w,a_x,a_y,a_z,b_w,b_x,b_y,b_z", "Quaternions are in several columns"),
         ("t,qpos[3],qpos[4],qpos[5],qpos[6]", "joint that is not said"),
         ("t,rx,ry,rz,n", "# attitude: rotation vector"),
         ("t,cmd_orientation_w,cmd_orientation_x,cmd_orientation_y,cmd_orientation_z", "not found"),
     ],
 )
-def test_half_a_file_is_never_scored(header: str, says: str, tmp_path: Path) -> None:
+def test_half_a_file_is_never_scored(names: str, says: str, tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text(HEAD + header + "\n" + rows(TIMES, quaternions()))
+    columns = [quaternions()] * (1 + (names.count(",") > 4))
+    path.write_text(HEAD + names + "\n" + rows(TIMES, *columns))
     refused = heavytop("score", path)
     assert refused.returncode == 2
     assert says in refused.stderr

@@ -29,7 +29,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _TIMES, _EACH = 64, 4
 """Times looked at, and every how many of them the state is rounded."""
-_SPARE_BITS = 64
+_SPARE_BITS = 32
 _ALL = 0.5
 """A relative error from which no digit is right."""
 
@@ -147,7 +147,10 @@ def _digits(error: float, most: float = math.inf) -> float:
 
 
 def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, float]]:
-    """By the place of the rounding and the place of the time: the largest relative error of a component."""
+    """By the place of the rounding and the place of the time: the largest relative error of a component.
+
+    Beyond the time at which one rounding has lost all digits no other is followed.
+    """
     form = real(2 * problem.precision.bits + _SPARE_BITS)
     run = propagator("multiword", {})
 
@@ -156,13 +159,16 @@ def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, 
         return [[exact(value) for value in state[:6]] for state in states.states]
 
     known = [list(problem.start.flat), *states(problem.start, times[1:])]
-    errors = {}
+    errors, end = {}, len(known)
     for i in range(0, len(known) - 1, _EACH):
-        after = states(_rounded(known[i], problem.precision), [time - times[i] for time in times[i + 1 : len(known)]])
+        if i + 1 >= end:
+            break
+        after = states(_rounded(known[i], problem.precision), [time - times[i] for time in times[i + 1 : end]])
         errors[i] = {
             i + 1 + k: max(float(_relative(a, b)) for a, b in zip(state, known[i + 1 + k], strict=True))
             for k, state in enumerate(after)
         }
+        end = min([end, *(k + 1 for k, error in errors[i].items() if error >= _ALL)])
     return errors
 
 
@@ -179,9 +185,8 @@ def _loss(problem: Problem, times: Sequence[Fraction], index: int, worst: tuple[
     """The loss of one rounding, proven where enclosures reach."""
     error, rounded = worst
     time, at = times[index], times[rounded]
-    bits = 2 * problem.precision.bits + _SPARE_BITS
     try:
-        apart = _apart(problem, at, time, bits)
+        apart = _apart(problem, at, time, _SPARE_BITS - math.floor(math.log2(least)))
     except OutOfReach:
         apart = 0.0
     return Loss(time, at, _digits(max(apart, error)), apart >= least * (1 - 2**-20))
@@ -189,9 +194,10 @@ def _loss(problem: Problem, times: Sequence[Fraction], index: int, worst: tuple[
 
 @whole_evaluation
 def _apart(problem: Problem, at: Fraction, time: Fraction, bits: int) -> float:
-    """A lower bound of the relative error at ``time`` of the motion that was rounded at ``at``; within double."""
+    """A lower bound, less 2^-bits, of the relative error at ``time`` of the motion that was rounded at ``at``."""
     known = find(problem.top, problem.start, problem.system)
-    state = [midpoint(ball) for ball in known.state(at, bits)] if at else list(problem.start.flat)
+    fine = 2 * problem.precision.bits + _SPARE_BITS  # of small components too
+    state = [midpoint(ball) for ball in known.state(at, fine)] if at else list(problem.start.flat)
     other = find(problem.top, _rounded(state, problem.precision), problem.system)
     with working_precision(bits):
         pairs = zip(known.state(time, bits), other.state(time - at, bits), strict=True)

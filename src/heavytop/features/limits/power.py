@@ -20,7 +20,7 @@ from heavytop.arguments import Number
 from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.frames import Setup
-from heavytop.integrate.registry import named, propagator
+from heavytop.integrate.registry import control_name, named, propagator
 from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact, exact_text, real
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, System
@@ -141,8 +141,9 @@ def power(
         raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")
     times = [apart * k for k in range(1, count + 1)]
     true, limit = _rows(motion, times), float(most)
-    options = {} if control is None else {"tolerance": exact(control)}
-    error = float(_off(_states(motion, times, DOUBLE, named(integrator), options), _states(motion, times, QUAD)).max())
+    method = named(integrator)
+    options = {} if control is None else {control_name(method) or "tolerance": exact(control)}
+    error = float(_off(_states(motion, times, DOUBLE, method, options), _states(motion, times, QUAD)).max())
     faults, left_out = [], {}
     for name in _names(planted):
         rows = FAULTS[name](motion, times)

@@ -17,6 +17,12 @@ _ABOUT = "/heavytop"
 """A topic of std_msgs/String whose lines stand for the comments above a table: `mass: 2`."""
 
 
+def storage(folder: Path) -> Path:
+    """The file of messages in the folder of a ROS 2 bag; the folder itself where there is not one."""
+    files = [path for path in folder.iterdir() if path.suffix in SUFFIXES]
+    return files[0] if len(files) == 1 else folder
+
+
 def of_bag(path: Path) -> str:
     """The topic of a bag as CSV, with dotted names of fields; times of the header, or of the bag where it has none.
 

@@ -19,6 +19,7 @@ from heavytop.features.score.trajectories.logs import (
     canonical,
     quaternions_of,
     quaternions_of_vectors,
+    with_quaternion,
 )
 from heavytop.features.score.trajectories.observed import RawStart
 from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
@@ -31,7 +32,7 @@ _PATTERNS = tuple(
     (quantity, re.compile(pattern))
     for quantity, pattern in (
         ("quaternion", r"(?:q|quat|quaternion)([wxyz0-4])"),
-        ("matrix", r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])"),
+        ("matrix", r"(?:r|m|a|c|dcm|rot|rotation|matrix)([0-3])([0-3])"),
         ("rodrigues", r"(?:sigma|mrp|σ)([xyz123])"),
         ("rotation_vector", r"(?:rotvec|rotationvector|rv)([xyz123])"),
         ("framed", r"w([xyz])"),
@@ -132,7 +133,7 @@ def header(names: Sequence[str], joint: str = "") -> Header:
 
     joint: of columns qpos and qvel, "free" or "ball".
     """
-    names = [canonical(name, joint) for name in names]
+    names = with_quaternion([canonical(name, joint) for name in names])
     indices: dict[str, dict[str, int]] = {}
     time, angles, others = None, set(), []
     units: dict[str, set[Unit]] = {}

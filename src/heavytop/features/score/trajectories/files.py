@@ -50,6 +50,8 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+_COMMA = re.compile(r",(?![^\[]*\])")
+"""A comma, but for one in brackets, as in R[0,1]."""
 _ALL_COLUMNS = "Give every row all of its columns."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
@@ -78,16 +80,17 @@ class TextTable:
         self.rows: list[list[str]] = []
         self.notes: list[str] = []
         self.header: observed_columns.Header | None = None
-        header: list[str] | None = None
+        comments: list[list[str]] = []
         body: list[str] = []
         self.lines: list[int] = []
         for number, line in enumerate(text.splitlines(), 1):
             stripped = line.strip()
             if stripped.startswith(_COMMENT):
                 comment = stripped.lstrip("#%!/ ")
-                if not body and not self._key(comment, known) and _is_header(_cells(comment, None)):
-                    header = _cells(comment, None)
-                    header[0] = "%time" if stripped.startswith("%time") else header[0]  # of rostopic, in nanoseconds
+                if not body and not self._key(comment, known):
+                    comments.append(_cells(comment, None))
+                    if stripped.startswith("%time"):  # of rostopic, in nanoseconds
+                        comments[-1][0] = "%time"
             elif stripped:
                 body.append(stripped)
                 self.lines.append(number)
@@ -95,6 +98,7 @@ class TextTable:
             raise _no_header([])
         separator = _separator(body[0])
         first = _cells(body[0], separator)
+        header = next((names for names in reversed(comments) if _is_header(names, len(first))), None)
         if not _is_number(first[0]):
             header, body, self.lines = first, body[1:], self.lines[1:]
         names = self._without_header(first) if header is None else header
@@ -147,6 +151,8 @@ class TextTable:
     def _without_header(self, first: Sequence[str]) -> Sequence[str]:
         """The columns of a table that does not name them, by its first row."""
         width = len(first)
+        if text := next((text for text in first if not _is_number(text)), None):
+            raise InputError(f"There is no header, and {quoted(text)} of the first row is not a number.", logs.NAMES)
         if width == len(logs.TUM) and logs.is_unit(first[-4:]):
             self.notes.append(f"without a header the columns are taken as {' '.join(logs.TUM)}")
             return logs.TUM
@@ -176,7 +182,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
     among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
     said = f": {', '.join(missing)} not found{among}" if missing else ""
-    return InputError(f"The header is not {','.join(COLUMNS)}{said}.", REMEDY)
+    return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
 
 
 def _separator(line: str) -> str | None:
@@ -188,7 +194,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
     if separator is None and any(mark in line for mark in ";,\t"):
         separator = _separator(line)
     line = _REMARK.sub("", line).rstrip()
-    cells = line.split(separator)
+    cells = _COMMA.split(line) if separator == "," and "[" in line else line.split(separator)
     # a separator behind the last column is not a column
     if separator and len(cells) > 1 and not cells[-1].strip():
         cells = cells[:-1]
@@ -199,11 +205,11 @@ def _is_number(text: str) -> bool:
     return bool(re.fullmatch(r"[+-]?(\.?\d.*|nan(\(.*\))?|inf(inity)?)", text, re.IGNORECASE))
 
 
-def _is_header(names: list[str]) -> bool:
-    """Whether the words of a comment name the columns."""
+def _is_header(names: list[str], width: int) -> bool:
+    """Whether the words of a comment name the columns, of rows of this width."""
     header = observed_columns.header(list(dict.fromkeys(names)))  # one that stands twice is refused where it is used
     return len(header.of_state()) == len(COLUMNS) or (
-        header.time is not None and not header.others and bool(header.places)
+        header.time is not None and bool(header.places) and (not header.others or len(names) == width > 2)
     )
 
 
@@ -299,6 +305,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     data that are not those of the case.
     """
     shown_path = str(path)[:LONGEST_NAME]
+    path = bags.storage(path) if path.is_dir() else path
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)

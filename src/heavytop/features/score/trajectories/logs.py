@@ -17,21 +17,26 @@ from heavytop.errors import InputError, quoted
 from heavytop.extras import require_extra
 from heavytop.precision import decimal_text, exact_text
 
+NAMES = "Call quaternions qw,qx,qy,qz, Ω omega1,omega2,omega3, matrices R11 to R33, times t."
 TUM = ("timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R33", "pz")
-_STAMP = re.compile(r"(?:.*[./_])?stamp[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
+_STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Columns of times that are counted from their first row."""
+_OF_BODY = r"(?:_(?:rs|s|b|ib|bn|body|local|imu))*"
+"""What may say, behind the name of an angular velocity, that it is of the body."""
 _ALIASES = tuple(
     (re.compile(rf"(?:.*[./_])?{pattern}", re.IGNORECASE), name)
     for pattern, name in (
         (r"(?:quat(?:ernion)?|orientation|rotation|attitude)[./_]([wxyz])", "q{}"),
         (r"(?:position|translation|pos)[./_]([xyz])|t([xyz])", "p{}"),
-        (r"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?)[./_]([xyz])", "w{}"),
-        (r"(?:sim_?time|time_?s|elapsed)", "t"),
+        (rf"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?){_OF_BODY}[./_]([xyz])", "w{}"),
+        (rf"w{_OF_BODY}[./_]?([xyz])", "w{}"),
+        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:_?s(?:ec(?:ond)?s?)?)?)", "t"),
         (r"(?:timestamp|stamp|__time)", "timestamp"),
-        (r"(?:timestamp|stamp)_(ns|us|ms)", "timestamp [{}]"),
-        (r"(?:time|t)_(ns|us|ms)", "t [{}]"),
+        (r"(?:receive|publish|log|record)_?time", "epoch"),
+        (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
+        (r"(?:time|t)_?(ns|us|ms)", "t [{}]"),
         (r"%time", "timestamp [ns]"),
     )
 )
@@ -41,8 +46,20 @@ _JOINTS = {"free": (3, 3), "ball": (0, 0)}
 """Where the quaternion stands in qpos of MuJoCo, and the angular velocity, of the body, in qvel."""
 _INDEX = re.compile(r"(qpos|qvel)[\[_(]?(\d+)[\])]?", re.IGNORECASE)
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-_LOOKS = re.compile(r"quat|orient|attitude|omega|angular_?vel|angvel|gyro|rodrigues", re.IGNORECASE)
-_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_|desired|target|cmd|ref)", re.IGNORECASE)
+_LOOKS = {
+    "an attitude": re.compile(r"quat|orient|attitude|(^|[^a-z])att[^a-z]|rodrigues|euler|dcm", re.IGNORECASE),
+    "an angular velocity": re.compile(r"omega|ang(ular)?_?vel|gyro|body_?rate", re.IGNORECASE),
+}
+_GIVES = {
+    "an attitude": ("quaternion", "matrix", "euler", "rodrigues", "rotation_vector", "gamma"),
+    "an angular velocity": ("omega", "omega_space", "framed"),
+}
+_OTHER = re.compile(r"(?:.*[._])?(?:cov|err|std|sigma_|desired|target|cmd|ref|bias)|b_[wa]_", re.IGNORECASE)
+_WITH_UNIT = re.compile(r"(.*?)\s*([\[(](?!\s*[wxyz]\s*[\])])\s*(?:[^\[\]()\d][^\[\]()]*)?[\])])?")
+"""The name of a column, and the unit behind it in brackets, which may be empty."""
+_OF_FOUR = re.compile(r"(.*[^\s])([wxyz])", re.IGNORECASE)
+_EPOCH_UNITS = ((10**17, "ns"), (10**14, "us"), (10**11, "ms"))
+"""Times since 1970 that are as large as this are not in seconds."""
 
 
 def canonical(name: str, joint: str = "") -> str:
@@ -50,7 +67,12 @@ def canonical(name: str, joint: str = "") -> str:
 
     joint: "free" or "ball", of the columns qpos and qvel of MuJoCo.
     """
-    text = name.strip()
+    base, unit = _WITH_UNIT.fullmatch(name.strip()).groups()  # type: ignore[union-attr]
+    plain = _alias(base, joint)
+    return name.strip() if plain == base and unit != "[]" else f"{plain} {(unit or '').strip('[]()') and unit}".strip()
+
+
+def _alias(text: str, joint: str) -> str:
     if match := _BASILISK.fullmatch(text):
         return f"{match[1].partition('_')[0]}{int(match[2]) + 1}"
     if _OTHER.match(text):
@@ -71,20 +93,17 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
 
     names: of all columns; others: of those that are not read.
     """
-    if any(quantity in quantities for quantity in ("quaternion", "matrix", "euler", "omega", "omega_space", "framed")):
-        return
-    if {"rx", "ry", "rz"} <= {name.strip().lower() for name in names}:
+    missing = [what for what, given in _GIVES.items() if not set(given) & set(quantities)]
+    if "an attitude" in missing and {"rx", "ry", "rz"} <= {name.strip().lower() for name in names}:
         raise InputError(
             "The columns rx, ry, rz may be a rotation vector, angles, or a position.",
             "Add the line `# attitude: rotation vector` above the columns, or call a position px, py, pz.",
         )
     for name in others:
-        if _LOOKS.search(name) and not _OTHER.match(name):
-            raise InputError(
-                f"The column {quoted(name)} looks like an attitude or an angular velocity, and is not understood.",
-                "Call quaternions qw,qx,qy,qz, Ω omega1,omega2,omega3 and matrices R11 to R33.",
-            )
-        if _INDEX.fullmatch(name):
+        looks = next((what for what in missing if _LOOKS[what].search(name)), None)
+        if looks and not _OTHER.match(name):
+            raise InputError(f"The column {quoted(name)} looks like {looks}, and is not understood.", NAMES)
+        if len(missing) == len(_GIVES) and _INDEX.fullmatch(name):
             raise InputError(
                 f"The column {quoted(name)} is of a joint that is not said.",
                 "Add the line `# joint: free` or `# joint: ball` above the columns.",
@@ -103,13 +122,16 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
             row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
         names[seconds], names[nano] = "timestamp", "nanosec"
     plain = [canonical(name) for name in names]
-    index = next((index for index, name in enumerate(plain) if name.partition(" ")[0] in _EPOCHS), None)
-    if index is None:
+    words = [name.partition(" ")[0] for name in plain]
+    index = next((words.index(word) for word in _EPOCHS if word in words), None)
+    if index is None or (words[index] == "epoch" and {"t", "time"} & set(words)):
         return names, cells, []
     names[index] = re.sub(r"^\w+", "t", plain[index])
     first = number(cells[0][index])
     if not first:
         return names, cells, []
+    if names[index] == "t":
+        names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
     for row in cells:
         if (value := number(row[index])) is not None:
             row[index] = exact_text(value - first)
@@ -138,18 +160,51 @@ def without_repeats(
     repeated = 0
     for index, time in enumerate(times):
         if kept and time == times[kept[-1]]:
-            if rows[index] != rows[kept[-1]]:
+            if not all(map(_agree, rows[index], rows[kept[-1]])):
                 raise InputError(
                     f"Lines {lines[kept[-1]]} and {lines[index]} are of one time and differ.",
                     "Give one row for each time: before an event, or behind it.",
                 )
             repeated += 1
+            kept[-1] = max(kept[-1], index, key=lambda row: sum(map(len, rows[row])))  # more digits
             continue
         if len(kept) > 1 and (time - times[kept[-1]]) * (times[kept[1]] - times[kept[0]]) < 0:
             note = f"the time goes back at line {lines[index]}: what came before is scored, {len(kept)} rows"
             return kept, [*_repeats(repeated), note]
         kept.append(index)
     return kept, _repeats(repeated)
+
+
+def _agree(one: str, other: str) -> bool:
+    """Whether two texts are one number to the digits printed of the shorter."""
+    a, b = number(one), number(other)
+    if one == other or a is None or b is None:
+        return one == other
+    return abs(a - b) < max(map(_last_unit, (one, other)))
+
+
+def _last_unit(text: str) -> Fraction:
+    digits, _, exponent = text.strip().lower().partition("e")
+    return Fraction(10) ** (int(exponent or 0) - len(digits.partition(".")[2]))
+
+
+def with_quaternion(names: Sequence[str]) -> list[str]:
+    """The names, with four columns of one prefix that end in w, x, y and z called a quaternion.
+
+    Raises InputError where there are two such prefixes.
+    """
+    prefixes: dict[str, dict[str, int]] = {}
+    for index, name in enumerate(names):
+        match = _OF_FOUR.fullmatch(name.partition(" ")[0])
+        if match and not _OTHER.match(name):
+            prefixes.setdefault(match[1].lower(), {})[match[2].lower()] = index
+    whole = {prefix: places for prefix, places in prefixes.items() if places.keys() == set("wxyz")}
+    if len(whole) > 1:
+        raise InputError(
+            f"Quaternions are in several columns: {', '.join(whole)}.", "Call those of the body qw,qx,qy,qz."
+        )
+    places = {index: f"q{axis}" for part in whole.values() for axis, index in part.items()}
+    return [places.get(index, name) for index, name in enumerate(names)]
 
 
 def _repeats(count: int) -> list[str]:
@@ -241,60 +296,90 @@ def _epoch(text: str) -> Fraction:
 
 
 def of_arrays(content: bytes, suffix: str) -> str:
-    """A .npy of seven columns, a .npz of arrays of one length by their names, or a Parquet table, as CSV.
+    """A .npy of seven columns or of named ones, a .npz of arrays by their names, or a Parquet table, as CSV.
 
-    Numbers are written so that they are read back the same.  Raises InputError for other shapes.
+    Numbers are written so that they are read back the same.  Arrays that have not a row for each time, and what a
+    Parquet table says of itself, stand for comments.  Raises InputError for other shapes.
     """
-    import numpy
-
-    if suffix == ".parquet":
-        require_extra("parquet")
-        import pyarrow.parquet
-
-        table = pyarrow.parquet.read_table(BytesIO(content))
-        columns = {name: numpy.asarray(table[name]) for name in table.column_names}
-    else:
-        try:
-            loaded = numpy.load(BytesIO(content), allow_pickle=False)
-        except ValueError as error:
-            raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
-        columns = {"": loaded} if suffix == ".npy" else {name: loaded[name] for name in loaded.files}
+    columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
+    lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
+    count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
     names: list[str] = []
     parts: list[Any] = []
     comments = []
     for name, array in columns.items():
-        if array.ndim == 0 or array.dtype.kind in "US":
-            comments.append(f"# {name}: {', '.join(map(str, numpy.ravel(array)))}")
-        elif array.ndim <= 2 and array.dtype.kind in "fiu":
-            block = array.reshape(len(array), -1)
-            names += _names_of(name, block.shape[1])
-            parts.append(block)
-        elif array.ndim == 3 and array.dtype.kind == "f":
+        if array.ndim == 0 or array.dtype.kind in "US" or (len(array) != count and array.size <= 9):
+            comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
+        elif array.ndim <= 3 and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
             names += _names_of(name, parts[-1].shape[1])
     if not parts or len({len(part) for part in parts}) != 1:
-        lengths = ", ".join(str(len(part)) for part in parts) or "none"
-        raise InputError(f"The arrays have {lengths} rows.", "Give arrays of one length, one row for each time.")
+        counts = ", ".join(str(len(part)) for part in parts) or "none"
+        raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
     rows = [",".join(repr(value) for part in parts for value in part[i].tolist()) for i in range(len(parts[0]))]
     return "\n".join([*comments, ",".join(names), *rows])
 
 
+def _of_numpy(content: bytes) -> dict[str, Any]:
+    import numpy
+
+    try:
+        loaded = numpy.load(BytesIO(content), allow_pickle=False)
+        names = loaded.files if hasattr(loaded, "files") else loaded.dtype.names
+        return {name: loaded[name] for name in names} if names else {"": loaded}
+    except ValueError as error:
+        raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
+
+
+def _of_parquet(content: bytes) -> dict[str, Any]:
+    """Its columns, also of lists and of instants, and its metadata."""
+    import numpy
+
+    require_extra("parquet")
+    import pyarrow
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(BytesIO(content))
+    columns = {
+        key.decode(): numpy.array(value.decode())
+        for key, value in (table.schema.metadata or {}).items()
+        if key not in (b"pandas", b"ARROW:schema")
+    }
+    for name in table.column_names:
+        kind = table[name].type
+        if pyarrow.types.is_timestamp(kind):
+            columns[f"timestamp [{kind.unit}]"] = numpy.asarray(table[name].cast(pyarrow.int64()))
+        else:
+            nested = hasattr(kind, "value_type")
+            columns[name] = numpy.array(table[name].to_pylist()) if nested else numpy.asarray(table[name])
+    return columns
+
+
+_TIMES = ("t", "time", "times", *_EPOCHS)
 _WIDE = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"R{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
+    "omega": ("omega1", "omega2", "omega3"),
     "state": ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
     "": ("t", "omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"),
 }
+_ARRAYS = {
+    **dict.fromkeys(("quaternions", "quat", "quats", "q", "orientation", "orientations"), "quaternion"),
+    **dict.fromkeys(("matrices", "r", "rotation", "rotations", "dcm"), "matrix"),
+    **dict.fromkeys(("w", "omegas", "gyro", "angular_velocity", "angvel"), "omega"),
+    "states": "state",
+}
+"""Names of arrays, in lower case, for those of :data:`_WIDE`."""
 
 
 def _names_of(name: str, width: int) -> list[str]:
     """The names of the columns of one array."""
-    base = {"quaternions": "quaternion", "quat": "quaternion", "matrices": "matrix", "states": "state"}.get(name, name)
+    base = _ARRAYS.get(name.lower(), name)
     if len(_WIDE.get(base, ())) == width:
         return list(_WIDE[base])
     if width == 1:
         return [{"times": "t", "time": "t"}.get(name, name)]
-    plain = {"positions": "p", "position": "p", "omegas": "omega", "gammas": "gamma"}.get(name, name)
+    plain = {"positions": "p", "position": "p", "pos": "p", "gammas": "gamma"}.get(name, name)
     if not name:
         raise InputError(f"The array has {width} columns.", "Give t, omega1 to omega3, gamma1 to gamma3: seven.")
     return [f"{plain}{'xyz'[i] if plain == 'p' else i + 1}" for i in range(width)]
