@@ -90,7 +90,7 @@ def internals(site: Path) -> list[str]:
     page = (site / "api.html").read_text("utf-8")
     text = unescape(re.sub(r"<[^>]+>", "", page[page.index("<article") : page.index("</article>")]))
     names = set(re.findall(r"heavytop\.[a-z_]+\.\w+(?:\.\w+)*|(?<![\w.])_[A-Za-z]\w*", text))
-    return [f"api.html: {name} is no part of the interface" for name in sorted(names) if not name.startswith(PUBLIC)]
+    return [f"api.html: {name} is not part of the interface" for name in sorted(names) if not name.startswith(PUBLIC)]
 
 
 def misspelt() -> list[str]:

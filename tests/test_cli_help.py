@@ -9,7 +9,7 @@ import typer
 
 from heavytop.cli import app
 from heavytop.cli.app import SHELLS
-from heavytop.harness.plan import BUILT_IN
+from heavytop.harness import BUILT_IN
 from support import in_process
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]

@@ -150,6 +150,23 @@ def test_latex_is_a_whole_table_of_siunitx_and_booktabs(tmp_path: Path) -> None:
         assert done.returncode == 0
 
 
+@pytest.mark.parametrize(("gamma", "source"), [("3/5,0,4/5", "Lagrange"), ("0,0,1", "Staude")])
+def test_bibtex_cites_program_command_and_source_and_no_path(tmp_path: Path, gamma: str, source: str) -> None:
+    changes = {"centre": "0,0,1", "omega": "0,0,1", "gamma": gamma, "csv": str(tmp_path / "numbers_{.csv")}
+    text = heavytop("reference", "--bibtex", **changes)
+    head, *lines, end = text.splitlines()
+    assert re.fullmatch(r"@misc\{heavytop-[0-9a-f]{12},", head)
+    assert end == "}"
+    fields = dict(re.fullmatch(r"  (\w+) = \{(.*)\},", line).groups() for line in lines)
+    assert list(fields) == ["author", "title", "version", "howpublished", "note"]
+    assert all(value.count("{") == value.count("}") for value in fields.values())
+    assert text.isascii()
+    assert "heavytop reference --inertia 2,2,1" in fields["howpublished"]
+    assert source in fields["note"]
+    assert str(tmp_path) not in text
+    assert "numbers" not in text
+
+
 def test_latex_needs_no_file() -> None:
     assert with_file_of_latex(["reference", "--latex", "--digits", "9"]) == [
         "reference", "--latex", "-", "--digits", "9",

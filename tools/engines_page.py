@@ -62,7 +62,7 @@ class Curve:
 
     def order(self) -> str:
         """The order that runs show; a dash where no digit is right."""
-        return "-" if self.line.order is None or not digits(self.rows[-1]) else f"{self.line.order:.1f}"
+        return "-" if self.line.order is None or not digits(self.rows[-1]) else f"{self.line.order:z.1f}"
 
     def seconds(self, wanted: float) -> str:
         """Seconds to so many digits, in those of heyoka."""
@@ -77,7 +77,7 @@ class Curve:
         sizes = [(float(t), abs(float(value))) for t, value in zip(series.times, series.values, strict=True)]
         end = sizes[-1][0]
         last, before = (max(size for t, size in sizes if t <= part * end) for part in (1.0, 0.1))
-        return f"{last:.0e}, t^{math.log10(last / before):.1f}" if before else f"{last:.0e}"
+        return f"{last:.0e}, t^{math.log10(last / before):z.1f}" if before else f"{last:.0e}"
 
     def joint(self) -> str:
         """How far the pivot moved at most over the points."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from functools import wraps
+from functools import reduce, wraps
 from importlib import import_module
 from time import process_time
 from typing import Any
@@ -20,26 +20,17 @@ from heavytop.harness.plan import read
 PARTS = {
     "compiling": (
         "integrate.heyoka.engines:compiled",
-        "integrate.heyoka.motions:compiled",
-        "integrate.ensemble:compiled",
-        "integrate.multiword.motions:compiled",
-        "integrate.multiword.lanes:compiled_lanes",
+        "integrate.multiword.engines:compiled",
+        "integrate.multiword.engines:compiled_lanes",
     ),
     "integrating": (
         "integrate.registry:Integrator.propagate",
         "integrate.registry:Integrator.propagate_many",
         "integrate.heyoka.motions:propagate",
     ),
-    "truth": (
-        "measure.truth:certified",
-        "kinds.homoclinic:certified",
-        "kinds.claim_model:true_motion",
-        "kinds.drift:truth",
-        "kinds.work_precision:truth",
-        "kinds.growth:reference",
-    ),
+    "truth": ("measure.truth:truth", "measure.truth:uncertified", "measure.truth:reference", "measure.truth:certified"),
     "scoring": ("measure.scorer:Scorer.__call__",),
-    "noise": ("measure.rounding_noise:Reruns._of", "measure.rounding_noise:uncertified"),
+    "noise": ("measure.rounding_noise:Reruns._of",),
 }
 WHOLE = ("noise",)
 """Parts of which everything inside counts as that part."""
@@ -73,15 +64,18 @@ class Clock:
 
 
 def watch(clock: Clock) -> None:
+    """Put the clock around each function, wherever a module has it."""
     for part, places in PARTS.items():
         for place in places:
             module, _, name = place.partition(":")
-            owner: Any = import_module(f"heavytop.{module}")
             *classes, attribute = name.split(".")
-            for each in classes:
-                owner = getattr(owner, each, None)
-            if hasattr(owner, attribute):
-                setattr(owner, attribute, clock.around(getattr(owner, attribute), part))
+            owner = reduce(getattr, classes, import_module(f"heavytop.{module}"))
+            original = getattr(owner, attribute)
+            timed = clock.around(original, part)
+            owners = [owner] if classes else [m for n, m in sys.modules.items() if n.startswith("heavytop")]
+            for one in owners:
+                if getattr(one, attribute, None) is original:
+                    setattr(one, attribute, timed)
 
 
 def main() -> None:

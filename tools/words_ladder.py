@@ -1,6 +1,8 @@
 """What a unit of time costs against the bits that are carried: words and heyoka, taking turns, log-log, as a picture.
 
-Run: python tools/words_ladder.py [--bits 53,64,113,...] [--rounds 5] [--out docs/words-cost.svg]
+Run: python tools/words_ladder.py [--bits 53,64,...] [--rounds 5] [--processor x86-64-v3] [--out docs/words-cost.svg]
+
+--processor: what the machine code of words is made for: x86-64-v3 masks AVX-512.
 
 Prints the table too.  53, 64, 106 and 113 bits are double, extended, double-double, which heyoka has not, and quad.
 """
@@ -17,6 +19,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from heavytop.integrate.trajectory import Problem
+from heavytop.multiword.codegen.machine_code import Processor
 from heavytop.precision import FORMATS, Precision, real
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -74,7 +77,10 @@ def main() -> None:
     parser.add_argument("--bits", default=",".join(map(str, BITS)))
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--out", type=Path, default=Path("docs/words-cost.svg"))
+    parser.add_argument("--processor", type=Processor)
     given = parser.parse_args()
+    if given.processor is not None:
+        Processor.here = classmethod(lambda cls: given.processor)
     rows = []
     print("| bits | words, µs | heyoka, µs | times faster |\n|---|---|---|---|")
     for bits in map(int, given.bits.split(",")):

@@ -110,6 +110,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--only", nargs="*", default=[])
     parser.add_argument("--workers", default="1")
+    parser.add_argument("--row-timeout", default="600", help="MJX compiles for minutes")
     asked = parser.parse_args()
     found = {}
     for each in asked.only or sorted(path.stem for path in (ADAPTERS / "adapters").glob("*.toml")):
@@ -119,6 +120,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         path = plan(Path(folder), found)
         sys.argv = ["heavytop", "run", "--plan", str(path), "--out", str(asked.out), "--workers", asked.workers]
+        sys.argv += ["--row-timeout", asked.row_timeout]
         return int(command_line() or 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
@@ -42,7 +43,7 @@ Numbers: TypeAlias = Iterable[Any]
 SLACK_BITS = 8
 """|γ|² and |ξ|² may be off 1, and ξ·γ off 0, by so many bits of the rounding of what was given as floats."""
 _MOST = 10**18
-"""A count beyond it is no limit."""
+"""A count beyond it is not a limit."""
 _TYPES = "Give heavytop.HeavyTop(inertia, weight, centre) and heavytop.State(omega, gamma)."
 _Kind = TypeVar("_Kind", HeavyTop, State)
 
@@ -71,10 +72,18 @@ def _checked(top: object, start: object, precision: Precision, of_any_size: bool
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
     for text in body.warnings():
-        warnings.warn(text, ImpossibleBody, stacklevel=4)
+        warnings.warn(text, ImpossibleBody, stacklevel=_level_of_the_caller())
     if not of_any_size:
         require_physical(body.top if isinstance(body, Body) else body, state)
     return body, state.require_unit_gamma(slack_of(precision))
+
+
+def _level_of_the_caller() -> int:
+    """The ``stacklevel`` at which a warning names the line of the user that called this program."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def slack_of(precision: Precision) -> Fraction:

@@ -10,11 +10,11 @@ from importlib import resources
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.exact.bodies import resolve
 from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.exact.resolved import resolve
 from heavytop.top.bodies import PIVOT, Body, motion_of
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -211,9 +211,25 @@ _UPRIGHT = {"quaternion": (1, 0, 0, 0)}
 """Data of a named body, and the attitude of its start, where bodies.toml has none."""
 
 
+_BODY = ("mass", "gravity", "centre", "inertia", "about", "rotor")
+
+
+@cache
+def _tables() -> dict[str, dict[str, Any]]:
+    return tomllib.loads(resources.files("heavytop").joinpath("bodies.toml").read_text("utf-8"))
+
+
+def described_bodies() -> dict[str, tuple[str, Body]]:
+    """Description and body of each name: without its start, which takes longer."""
+    tables: dict[str, dict[str, Any]] = {name: _FREE | table for name, table in _tables().items()}
+    return {
+        name: (table["summary"], Body(**{key: table[key] for key in _BODY if key in table}))
+        for name, table in tables.items()
+    }
+
+
 def _named(name: str, table: dict[str, Any]) -> Case:
-    summary, source, units = (table.pop(key) for key in ("summary", "source", "units"))
-    horizon = table.pop("horizon", 0)
+    summary, source, units, horizon = (table.get(key, 0) for key in ("summary", "source", "units", "horizon"))
     body, start = motion_of(_FREE | ({} if {"matrix", "axis_angle"} & set(table) else _UPRIGHT) | table)
     assert isinstance(body, Body)
     resolved = resolve(body, start)
@@ -224,8 +240,7 @@ def _named(name: str, table: dict[str, Any]) -> Case:
 @cache
 def named_bodies() -> dict[str, Case]:
     """The named bodies by name, from bodies.toml: standard tests of multibody codes and of integrators."""
-    text = resources.files("heavytop").joinpath("bodies.toml").read_text("utf-8")
-    return {name: _named(name, table) for name, table in tomllib.loads(text).items()}
+    return {name: _named(name, table) for name, table in _tables().items()}
 
 
 def case(name: str, more: dict[str, Case] | None = None) -> Case:
@@ -239,7 +254,7 @@ def case(name: str, more: dict[str, Case] | None = None) -> Case:
 
 
 def require_possible(case: Case) -> Case:
-    """The case; raises InputError for data that are too large, a gamma that is no unit vector, and a start that the
+    """The case; raises InputError for data that are too large, a gamma off length 1, and a start that the
     system does not admit.
     """
     require_physical(case.top, case.start)

@@ -18,6 +18,7 @@ EXTRAS = {
     "plots": ("matplotlib",),
     "peers": ("scipy", "CyRK", "numba", "sksundae", "diffrax"),
     "cluster": ("dask", "distributed"),
+    "logs": ("rosbags",),
 }
 """The modules of each extra of ``pyproject.toml`` that the program itself imports."""
 
@@ -49,7 +50,8 @@ def require_extra(name: str) -> None:
 
 
 alone = False
-"""Whether heyoka is loaded without SymPy, which it converts to and from: so in the process of a command."""
+"""Whether heyoka is loaded without the packages that it converts to and from: so in the process of a command."""
+_CONVERTED = "sympy", "mpmath"
 _loading = Lock()
 
 
@@ -57,15 +59,13 @@ _loading = Lock()
 def import_heyoka() -> Any:
     """heyoka, when it is used; where it is :data:`alone`, in a third of the time."""
     with _loading:
-        if not alone or "heyoka" in sys.modules or "sympy" in sys.modules:
-            import heyoka
-
-            return heyoka
-        sys.modules["sympy"] = None  # type: ignore[assignment]  # as one that is not installed
+        hidden = [name for name in _CONVERTED if alone and not {name, "heyoka"} & sys.modules.keys()]
+        sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]  # as if they were not installed
         try:
             return import_module("heyoka")
         finally:
-            del sys.modules["sympy"]
+            for name in hidden:
+                del sys.modules[name]
 
 
 class Stub:

@@ -23,8 +23,6 @@ kill -KILL 0"""
 """The script of a guard's shell once its input has ended."""
 _ROUNDS = 20
 """How often what a process may just have started is looked for."""
-_LEAST_SHARE = 0.1
-"""Of wall time, which a clock shows at least."""
 
 
 def processors() -> int:
@@ -108,29 +106,39 @@ def _marked(mark: str) -> list[int]:
     return processes
 
 
-def stopwatch(process: int | None = None, *, with_children: bool = False) -> Callable[[], float]:
+def stopwatch(process: int | None = None, *, with_children: bool = False) -> Callable[..., float]:
     """Starts a clock: the seconds since then, less those that a process, or this thread, was ready to run and had no
-    processor, as far as the system counts them, which Linux does; a tenth remains at least.
+    processor, as far as the system counts them, which Linux does, and less seconds that are given.
+
+    What the process computed remains at least.
 
     with_children: less those of the processes that it started, too, for which it waits.
     """
 
-    def waited() -> float:
+    def counted() -> tuple[float, float]:
         children = _read(f"/proc/{process}/task/{process}/children") if with_children else ""
-        return sum(map(_waited, [str(process or "thread-self"), *children.split()]))
+        threads = [_scheduled(name) for name in [str(process or "thread-self"), *children.split()]]
+        return max(running for running, _ in threads), sum(waiting for _, waiting in threads)
 
-    waiting, began = waited(), perf_counter()
+    computed, waited, began = *counted(), perf_counter()
 
-    def seconds() -> float:
-        wall = perf_counter() - began
-        return max(wall - max(waited() - waiting, 0.0), _LEAST_SHARE * wall)
+    def seconds(late: float = 0.0) -> float:
+        wall, (computing, waiting) = perf_counter() - began, counted()
+        charged = wall - max(waiting - waited, 0.0) - late
+        return max(charged, min(computing - computed, wall))
 
     return seconds
 
 
-def _waited(process: str) -> float:
-    """Seconds for which a process was ready to run and had no processor; 0 where nobody counts them."""
-    return int([*_read(f"/proc/{process}/schedstat").split(), "0", "0"][1]) / 1e9
+def waited_for_processor() -> float:
+    """Seconds for which this thread was ready to run and had no processor; 0 where nobody counts them."""
+    return _scheduled("thread-self")[1]
+
+
+def _scheduled(process: str) -> tuple[float, float]:
+    """Seconds for which a process, or its first thread, ran, and was ready and had no processor; 0 if not counted."""
+    running, waiting = map(int, [*_read(f"/proc/{process}/schedstat").split(), "0", "0"][:2])
+    return running / 1e9, waiting / 1e9
 
 
 def _read(file: str) -> str:

@@ -125,7 +125,7 @@ def require(precision: Precision) -> Precision:
     reason = None if precision.family == "double" else available()[precision.family]
     if reason:
         raise InputError(
-            f"Precision {precision.name} is not available: {reason}.", "`heavytop list` shows what is there."
+            f"Precision {precision.name} is not available: {reason}.", "`heavytop list --json` shows what is there."
         )
     return precision
 
@@ -541,7 +541,7 @@ def vector(values: Iterable[Any], what: str) -> Vector:
 def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """The members of a list, a tuple, an array or another iterable with an order of its own.
 
-    Raises InputError for text, whose characters are no list of numbers, for sets and mappings, and for what is none.
+    Raises InputError for text, whose characters are not a list of numbers, sets, mappings, and anything else.
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
@@ -551,7 +551,7 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
             return members
         except HeavyTopError:
             raise
-        except Exception:  # what is no iterable, an array without dimensions, a generator that fails
+        except Exception:  # not iterable: an array without dimensions, a generator that fails
             pass
     raise InputError(f"{what} = {quoted(values)} is not a list.", remedy)
 

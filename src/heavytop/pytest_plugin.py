@@ -29,7 +29,7 @@ class DigitsRight(float):
 class Gated:
     """The result of ``heavytop_gate``.  score: as :func:`heavytop.score` returns it.
 
-    digits_right: a number, or nan where the run did not reach its last time or there is no reference.
+    digits_right: a number, or nan where the run did not reach its last time or lacks a reference.
     """
 
     def __init__(self, score: Score) -> None:
@@ -70,7 +70,7 @@ def gate(
         options: of :func:`heavytop.propagate`, such as ``tolerance``.
 
     Raises:
-        InputError: for what is no case, integrator, time or state.
+        InputError: for an invalid case, integrator, time or state.
         PeerFailed: where the integrator breaks its contract.
     """
     import heavytop as ht

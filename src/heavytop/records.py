@@ -25,10 +25,11 @@ UNSUPPORTED, OUT_OF_TIME, NOT_ASKED = "unsupported", "out_of_time", "not_asked"
 UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME, NOT_ASKED
 """Outcomes of a row that was aborted: it has no metrics, and says why in the place of a reference.
 
-failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
-cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row.
+failed: a third-party integrator raised an error, or returned no trajectory.  unsupported: it declares that it
+cannot do what was asked: not a failure.  out_of_time: it was stopped at the time limit of its row.
 not_asked: it had run out of time in two other rows of that run."""
 
+HEYOKA, MULTIWORD = "heyoka", "multiword"
 FINEST = "eps"
 """In the place of a tolerance: the finest that an integrator offers."""
 EXACT = "exact"
@@ -39,7 +40,7 @@ Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0)]
 UNRESOLVED_SECONDS = "unresolved"
-"""Of the seconds of a row: how many are resolved at least, where its own are fewer."""
+"""Part of the seconds of a row: how many are resolved at least, where its own are fewer."""
 MetricKind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
@@ -278,7 +279,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     how: with proven values, with computed ones, with equations, or with none but its own first integrals.
     radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
-    before that of all starts.  reason: why there is none, or none that is proven.
+    before that of all starts.  reason: why it is missing, or none that is proven.
     until: decimal text; the time from which all significant digits of the format are lost.
     """
 

@@ -236,3 +236,11 @@ def test_an_ensemble_of_a_peer_is_refused_as_one_motion_at_a_time() -> None:
         ht.ensemble(top, start, [1], integrator="splitting:4")
     with pytest.raises(ht.InputError, match="Unknown integrator"):
         ht.ensemble(top, start, [1], integrator="splitting:5")
+
+
+@pytest.mark.parametrize("ask", [ht.propagate, ht.reference])
+def test_moments_that_no_body_has_are_warned_of_in_the_line_that_asks(ask):
+    top = ht.HeavyTop((5, 1, 1), 1, ("0.1", 0, "0.2"))
+    with pytest.warns(UserWarning, match="I1 = 5 exceeds the sum 2 of the other two") as warnings:
+        ask(top, ht.State((1, 2, 3), (0, 0, 1)), times=[0, 1])
+    assert [each.filename for each in warnings] == [__file__]

@@ -12,8 +12,9 @@ from flint import arb
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact.bodies import BodyMotion, resolve
+from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.exact.resolved import resolve
 from heavytop.top.attitude import Attitude, multiplied, transposed
 from heavytop.top.bodies import IDENTITY, principal_axes
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
@@ -286,7 +287,7 @@ def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, ab
         assert found == []
         return
     (text,) = found
-    assert f"about the centre of mass, of principal moments {diagonal}, is no rigid body's" in text
+    assert f"about the centre of mass, of principal moments {diagonal}, is not a rigid body's" in text
     assert ("The tensor is about the centre of mass, and was read as about the pivot." in text) == (about == "pivot")
 
 

@@ -82,7 +82,7 @@ def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
     _, theirs = read(str(tmp_path / "quad.toml"), KINDS, integrator="scipy:DOP853")[2]
     row = measure(theirs)
     assert (row.outcome, row.metrics) == ("failed", {})
-    assert row.reference.reason.startswith("scipy:DOP853 has no quad in euler")
+    assert row.reference.reason.startswith("scipy:DOP853 has no quad, in euler")
 
 
 @pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])

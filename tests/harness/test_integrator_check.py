@@ -68,6 +68,23 @@ def test_what_was_found_before_a_part_that_hangs_stands(
     assert rest == ([] if verdict == "note" else ["rest of the contract"])
 
 
+@pytest.mark.parametrize(
+    ("fault", "step", "verdict"),
+    [
+        ("import random; random.seed(1)", "[random.gauss(a, 0.1 * abs(h) ** 4.5) + h / 6 * b", "note"),
+        ("", "[a + (0 if abs(a) > 1e-3 else 1e-9) + h / 6 * b", "violated"),
+    ],
+)
+def test_noise_of_the_size_of_the_error_moves_a_top_at_rest(
+    fault: str, step: str, verdict: str, tmp_path: Path
+) -> None:
+    """As of a probabilistic integrator, which perturbs each step."""
+    program = INTEGRATOR.replace("FAULT", fault).replace("[a + h / 6 * b", step)
+    (tmp_path / "mine.py").write_text(program)
+    contract = integrator_check._Contract(named(f"{tmp_path / 'mine.py'}:solve"))
+    assert integrator_check._judged("rest", contract._rest).verdict == verdict
+
+
 @pytest.mark.slow
 def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) -> None:
     """It holds the pipes of the process that forked it."""

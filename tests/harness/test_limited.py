@@ -124,9 +124,9 @@ def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Pa
     expected = ("success", "out_of_time", "out_of_time", "out_of_time", "failed")
     assert outcomes == dict(zip(names, expected, strict=True))
     against = {row["integrator"]: row["against"] for row in report["rows"]}
-    assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 3 s in euler"
-    assert against["mine.py:interrupts"] == "nothing: mine.py:interrupts raised KeyboardInterrupt in euler"
-    assert "mine.py:stuck was stopped after 3 s in euler in double" in done.stdout
+    assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 3 s, in euler"
+    assert against["mine.py:interrupts"] == "nothing: mine.py:interrupts raised KeyboardInterrupt, in euler"
+    assert "mine.py:stuck was stopped after 3 s, in euler in double" in done.stdout
     assert report["environment"]["integrators"] == {"silent": "faulty 1.2"}
     for words in ((str(PROGRAM),), ("sleep", "987")):
         assert gone(*words)
@@ -300,7 +300,7 @@ def test_an_integrator_that_ran_out_of_time_twice_is_not_asked_a_third_time(work
     assert 0 <= under_way < workers
     assert outcomes == ["not_asked"] * (2 - under_way) + ["out_of_time"] * (2 + under_way)
     (said, *_) = [row.reference.reason for row in found.values() if row.outcome == "not_asked"]
-    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was not asked again in ")
+    assert said.startswith("mine.py:sleeps ran out of time in 2 other rows and was not asked again, in ")
     assert not all_good(list(found.values()))
 
 

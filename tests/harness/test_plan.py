@@ -9,7 +9,8 @@ import pytest
 
 from heavytop.cases import CASES, case
 from heavytop.errors import InputError
-from heavytop.harness.plan import BUILT_IN, log_spaced, warnings
+from heavytop.harness import BUILT_IN
+from heavytop.harness.plan import log_spaced, warnings
 from support.reports import expand, load
 from support.reports import plan_of as plan_from
 from support.reports import read_plan as read

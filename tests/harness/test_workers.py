@@ -103,7 +103,7 @@ def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Pat
     assert digits_kept(lost) == 0
     assert list(contradictions(lost, KINDS["drift"])) == []
     assert str(ends) in summary_of([lost])
-    assert f"from {ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
+    assert f"lost at {ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
 
 
 class Poison:
@@ -279,8 +279,8 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
     before = worker_pids()
     found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
-    assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s in pendulum"
-    assert "mine.py:dies ended its process 3 times, with exit code 3 in pendulum" in found[2].against
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s, in pendulum"
+    assert "mine.py:dies ended its process 3 times, with exit code 3, in pendulum" in found[2].against
     assert worker_pids() == before
     assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout
 

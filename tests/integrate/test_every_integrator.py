@@ -73,7 +73,7 @@ def test_capabilities_are_those_of_the_functions(name: str) -> None:
 def test_an_integrator_added_as_the_manual_says_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     """An entry point, and a line of the table."""
     entry = EntryPoint("mine:own", "heavytop.integrate.peers.splitting:order2", "heavytop.peers")
-    monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [entry])
     monkeypatch.setattr(registry, "_of_packages", lru_cache(registry._of_packages.__wrapped__))
     monkeypatch.setitem(INTEGRATORS, "new", replace(INTEGRATORS["splitting:2"], name="new"))
     shown = heavytop("list", "--json")

@@ -1,6 +1,5 @@
 """heyoka behind one call: right in every format, the same bits however it is cut, and honest about failure."""
 
-import json
 from fractions import Fraction
 
 import numpy
@@ -9,7 +8,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
-from heavytop.integrate.trajectory import Outcome, Problem, ResumePoint
+from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, dot, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
@@ -97,13 +96,6 @@ def test_a_compiled_integrator_is_used_again_and_gives_the_same_bits_as_a_fresh_
     assert compiled(HEAVY_TOP, DOUBLE) is not compiled(GYROSTAT, DOUBLE)
 
 
-def test_there_and_back_again() -> None:
-    there = propagate(TOP, START, [6], QUAD)
-    end = [exact(value) for value in there.states[0]]
-    back = propagate(TOP, State(end[:3], end[3:]), [-6], QUAD)
-    assert max(abs(exact(v) - s) for v, s in zip(back.states[0], START.flat, strict=True)) < Fraction(1, 10**31)
-
-
 @pytest.mark.slow
 def test_the_error_shrinks_along_the_precision_ladder() -> None:
     truth = [exact(v) for v in propagate(TOP, START, [20], real(400)).states[0]]
@@ -186,60 +178,9 @@ def test_the_start_may_be_asked_for() -> None:
     assert run.times == (0, 1)
 
 
-@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(100)], ids=lambda p: p.name)
-@pytest.mark.parametrize(
-    ("top", "start"),
-    [
-        (HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))),
-        (HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, -1))),
-        (HeavyTop((3, 2, 1), 1, (0, "1/3", 0)), State((0, "14/9", 0), (0, 1, 0))),
-    ],
-    ids=["sleeping", "hanging", "permanent rotation"],
-)
-def test_an_equilibrium_stays_where_it_is(precision, top: HeavyTop, start: State) -> None:
-    run = propagate(top, start, [1, 2000], precision)
-    assert run.outcome is Outcome.SUCCESS
-    assert bits(run) == [[exact(number(v, precision)) for v in start.flat]] * 2
-    back = propagate(top, start, [-5], precision)
-    assert bits(back) == bits(run)[:1]
-
-
 def test_the_body_of_a_sleeping_top_turns_though_omega_and_gamma_rest() -> None:
     top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
     run = propagate(top, start, [1], QUAD, xi=perpendicular(start.gamma))
     values = [exact(v) for v in run.states[0]]
     assert values[:6] == list(start.flat)
     assert float(values[6]) == pytest.approx(float(numpy.cos(3.0)))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(100)], ids=lambda p: p.name)
-@pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
-def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
-    """Samples lie closer than steps and farther apart; -0 and rest are kept."""
-    top, start, sign, options = TOP, START, 1, {}
-    if case == "backward":
-        sign = -1
-    elif case == "attitude":
-        options = {"xi": perpendicular(START.gamma)}
-    elif case == "resting":
-        top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
-    times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
-
-    def run(place: ResumePoint | None = None):
-        states, places = [], []
-        found = propagate(
-            top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
-            observer=lambda time, state: states.append((time, [str(v) for v in state])), **options,
-        )  # fmt: skip
-        for each in places:
-            each["seconds"] = 0.0
-        return (found.outcome, found.steps, found.time_reached), states, places
-
-    summary, states, places = run()
-    assert len(places) == len(times)
-    for index, content in enumerate(places):
-        again, rest, later = run(ResumePoint.of(json.loads(json.dumps(content)), precision))
-        assert again == summary
-        assert rest == states[index + 1 :]
-        assert later == places[index + 1 :]

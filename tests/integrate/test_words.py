@@ -1,4 +1,4 @@
-"""The integrator multiword behind heyoka's call: proven accuracy, the same bits however it is cut, outcomes."""
+"""multiword behind heyoka's call, and what both keep: proven accuracy, the same bits however cut, outcomes."""
 
 import json
 import math
@@ -35,6 +35,14 @@ LAGRANGE = HeavyTop((1, 1, "1/2"), 1, (0, 0, 1))
 PAPER = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
 PAPER_START = State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7"))
 FORMATS = [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)]
+EVERY_FORMAT = [
+    pytest.param(run, precision, id=f"{name}-{precision.name}")
+    for name, run, formats in (
+        ("heyoka", propagate, (DOUBLE, EXTENDED, QUAD, real(100))),
+        ("multiword", propagate_multiword, FORMATS),
+    )
+    for precision in formats
+]
 
 
 def bits(run: Trajectory) -> list[list[Fraction]]:
@@ -123,11 +131,16 @@ def test_samples_and_chunks_change_no_bit(precision, monkeypatch: pytest.MonkeyP
     assert bits(propagate_multiword(TOP, START, [10, 20], precision)) == bits(few)
 
 
-def test_there_and_back_again() -> None:
-    there = propagate_multiword(TOP, START, [6], DOUBLE_DOUBLE)
+@pytest.mark.parametrize(
+    ("run", "precision", "limit"),
+    [(propagate, QUAD, 31), (propagate_multiword, DOUBLE_DOUBLE, 29)],
+    ids=["heyoka", "multiword"],
+)
+def test_there_and_back_again(run, precision, limit: int) -> None:
+    there = run(TOP, START, [6], precision)
     end = bits(there)[0]
-    back = propagate_multiword(TOP, State(end[:3], end[3:]), [-6], DOUBLE_DOUBLE)
-    assert max(abs(v - s) for v, s in zip(bits(back)[0], START.flat, strict=True)) < Fraction(1, 10**29)
+    back = run(TOP, State(end[:3], end[3:]), [-6], precision)
+    assert max(abs(v - s) for v, s in zip(bits(back)[0], START.flat, strict=True)) < Fraction(1, 10**limit)
 
 
 @pytest.mark.slow
@@ -181,7 +194,7 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
 @pytest.mark.parametrize(
     ("top", "start"),
     [
@@ -191,11 +204,12 @@ def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() ->
     ],
     ids=["sleeping", "hanging", "permanent rotation"],
 )
-def test_an_equilibrium_stays_where_it_is(precision, top: HeavyTop, start: State) -> None:
-    run = propagate_multiword(top, start, [1, 2000], precision)
+def test_an_equilibrium_stays_where_it_is(integrate, precision, top: HeavyTop, start: State) -> None:
+    run = integrate(top, start, [1, 2000], precision)
     assert run.outcome is Outcome.SUCCESS
     assert bits(run) == [[exact(number(v, precision)) for v in start.flat]] * 2
     assert run.steps == 0
+    assert bits(integrate(top, start, [-5], precision)) == bits(run)[:1]
 
 
 def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
@@ -221,9 +235,10 @@ def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
 @pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
-def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
+def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(integrate, precision, case: str) -> None:
+    """Samples lie closer than steps and farther apart; -0 and rest are kept."""
     top, start, sign, options = TOP, START, 1, {}
     if case == "backward":
         sign = -1
@@ -235,7 +250,7 @@ def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: 
 
     def run(place: ResumePoint | None = None):
         states, places = [], []
-        found = propagate_multiword(
+        found = integrate(
             top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
             observer=lambda time, state: states.append((time, [str(v) for v in state])), **options,
         )  # fmt: skip

@@ -27,7 +27,8 @@ def test_every_plan_ends_in_few_lines_that_are_not_cut(name: str) -> None:
     lines = brief(report, report.rows, KINDS).splitlines()
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
-    assert lines[0] == f"Plan {name}: {len(report.rows)} measurements, all finished."
+    said_of_plan = f"Plan {name}: {len(report.rows)} measurements, all finished."
+    assert (lines[0].startswith("heyoka in double: ") and said_of_plan in lines) or lines[0] == said_of_plan
     assert not any("lines more" in line for line in lines)
 
 
@@ -39,8 +40,8 @@ def test_the_digits_of_each_motion_and_format_stand_in_a_table() -> None:
         row(case="a" * 99, precision="quad", bits=113, metrics=digits | {"x": error("1")}, horizon="20"),
     ]
     assert said(*rows) == [
-        "Plan p: 3 measurements, all finished.",
         "heyoka in double: 7.0 of 16 digits right to T = 1e5 (euler).",
+        "Plan p: 3 measurements, all finished.",
         f"{'Digits right, to |t|':39}      double       quad",
         f"{'euler':39}  7.0 to 1e5          -",
         f"{'a' * 38}…           -  9.0 to 20",

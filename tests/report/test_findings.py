@@ -62,7 +62,7 @@ def test_the_order_of_whole_runs_of_a_method_with_a_memory_leads_too() -> None:
 
 
 def test_a_report_against_itself_has_one_sentence() -> None:
-    assert found([row()], [row()]) == ["Nothing changed: 2 metrics are the same within rounding noise."]
+    assert found([row()], [row()]) == ["Nothing changed: 2 metrics are within what is allowed."]
 
 
 def work(steps: int, size: str, drift: str = "", **changes: object) -> Row:
@@ -162,7 +162,7 @@ def test_rows_that_failed_are_counted_with_the_first_and_its_reason() -> None:
 def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
     pair = [rk5(), failing(rk5(case="delone"))]
     said = "1 row of mine:rk5 failed in both reports on delone at T = 100 (mine:rk5, double): it returned NaN."
-    assert found(pair, pair) == ["Nothing changed: 2 metrics are the same within rounding noise.", said]
+    assert found(pair, pair) == ["Nothing changed: 2 metrics are within what is allowed.", said]
     assert found(pair[1:], pair[1:]) == [said]
     worse = [replace(pair[0], metrics={"drift_energy_max": error("1")}), pair[1]]
     assert said in found(pair, worse)

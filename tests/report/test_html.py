@@ -12,7 +12,7 @@ from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.scalar import RELATIVE
-from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
+from heavytop.records import SCHEMA, Against, Law, Metric, Report, Row, Series
 from heavytop.report.compare.noise import Policy
 from heavytop.report.document.document import MOST_PLOTS, Card, Headline, In, Section, Word, points
 from heavytop.report.document.kind import document
@@ -371,6 +371,15 @@ def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
     assert digits_headline([row(outcome="time_limit")]) is None
 
 
+@pytest.mark.parametrize(
+    ("until", "named"), [("700", "), none on chaos."), ("1000", "), none on chaos."), ("1001", ").")]
+)
+def test_a_headline_names_a_motion_that_has_lost_all_digits_by_its_horizon(until: str, named: str) -> None:
+    lost = row(case="chaos", horizon="2000", reference=Against("proven", until=until))
+    said = "heyoka in double: 10.0 of 16 digits right to T = 1000 (euler"
+    assert digits_headline([row(), lost]).text == said + named
+
+
 @pytest.mark.parametrize(("law", "told"), [("t", 1), ("t^1.5", 0)])
 def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, told: int) -> None:
     healthy = row(measure="growth", starts=32)
@@ -406,7 +415,8 @@ ALONE = {
     "(ershkov-partial-6/backward), ψ not finite from |t| = 7.4; the stable form is off by up to 1.03e-15 in Ω "
     "(ershkov-partial-6/forward), finite throughout.",
     "homoclinic": "heyoka stays on a homoclinic motion up to |t| = 12.3 to 63 in double, 62.8 to 321 in real:237.",
-    "break_away_law": "A bit of the format buys 0.27 to 1.4 time units before the escape: ln 2 / rate within 19 %.",
+    "break_away_law": "Each bit of the format delays the escape by 0.27 to 1.4 time units: "
+    "ln 2 / growth rate at the saddle, within 19 %.",
 }
 
 

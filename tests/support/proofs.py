@@ -8,7 +8,7 @@ from fractions import Fraction
 import mpmath
 from flint import arb
 
-from heavytop.exact.closed_form import state_and_attitude
+from heavytop.exact.catalogue import state_and_attitude
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.top.equations import HEAVY_TOP, Parameters

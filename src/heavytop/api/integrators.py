@@ -11,7 +11,6 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from heavytop.cases import Case
 from heavytop.errors import InputError, quoted
 from heavytop.features import FEATURES
 from heavytop.files import replace
@@ -21,6 +20,8 @@ from heavytop.version import commit
 
 if TYPE_CHECKING:
     from heavytop.harness.integrator_check import Checked
+    from heavytop.top.equations import System
+    from heavytop.top.heavy_top import HeavyTop
 
 
 class Language(NamedTuple):
@@ -194,37 +195,47 @@ def _texts(part: str) -> dict[str, str]:
 # What there is to choose from.
 
 
-def listing() -> dict[str, Any]:
-    """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them."""
-    from heavytop.cases import CASES, named_bodies
-    from heavytop.harness.plan import BUILT_IN
+def listing(checked: bool = True) -> dict[str, Any]:
+    """Cases, bodies, plans, systems, formats, integrators and what these can do, as `list --json` prints them.
+
+    checked: whether the formats are those of the heyoka that is installed, which is loaded for it.
+    """
+    from heavytop.cases import CASES, described_bodies
+    from heavytop.harness import BUILT_IN
     from heavytop.integrate import registry
     from heavytop.precision import FORMATS, available
-    from heavytop.top.equations import SYSTEMS
+    from heavytop.top.equations import SYSTEMS, system_of
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
+    lacking = available() if checked else dict.fromkeys(notes)
     known, reasons = registry.known(), registry.available()
     integrators = {
         name: reasons[name] or (entry.formats_text if entry.streams else "") or "installed"
         for name, entry in sorted(known.items(), key=lambda item: not item[1].streams)
     }
     return {
-        "cases": [_listed(case) for case in CASES.values()],
-        "bodies": [_listed(case) for case in named_bodies().values()],
+        "cases": [_listed(case.name, case.system, case.about, case.top) for case in CASES.values()],
+        "bodies": [
+            _listed(name, system_of(None, body), about, body.top) for name, (about, body) in described_bodies().items()
+        ],
         "plans": list(BUILT_IN),
         "systems": [system.name for system in SYSTEMS],
         "formats": {
             "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
-            for name, reason in available().items()
+            for name, reason in lacking.items()
         },
         "integrators": integrators,
         "capabilities": {name: entry.capabilities() for name, entry in known.items()},
     }
 
 
-def _listed(case: Case) -> dict[str, Any]:
-    about = {"name": case.name, "system": case.system.name, "about": case.about}
-    return about | {"realisable": Body.realising(case.top) is not None}
+def _listed(name: str, system: System, about: str, top: HeavyTop) -> dict[str, Any]:
+    return {
+        "name": name,
+        "system": system.name,
+        "about": about,
+        "realisable": Body.realising(top) is not None,
+    }
 
 
 def case_document(name: str) -> dict[str, Any]:

@@ -107,7 +107,7 @@ def propagate(
         double, ``texts()`` in full.  A run that fails is an outcome, not an exception.
 
     Raises:
-        InputError: for what is no motion, time, format or option.
+        InputError: for an invalid motion, time, format or option.
         OutOfReach: where the run would take more than 1e12 steps, unless ``step_limit`` ends it before.
 
     Source:
@@ -306,7 +306,7 @@ def reference(
         balls, ``derivatives_numpy()``, shape (n, 6, 6), and ``lyapunov()``.
 
     Raises:
-        InputError: for what is no motion or time, and for other digits.
+        InputError: for an invalid motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
@@ -471,7 +471,7 @@ class Integrator:
             A :class:`Propagated`.  A run that fails is an outcome, not an exception.
 
         Raises:
-            InputError: for what is no start or time.
+            InputError: for an invalid start or time.
             OutOfReach: as :func:`propagate`.
         """
         targets, is_one = self._targets(times)

@@ -281,7 +281,7 @@ def drift(run: Trajectory, axes: Axes | None = None) -> Axes:
         run: a computed motion, in any format.  axes: plane axes, or None.
 
     Returns:
-        The axes, with a curve for each integral that the motion has; where it is exactly 0 there is none. Of more than
+        The axes, with a curve for each integral that the motion has; none where it is exactly 0. Of more than
         400 samples every nth is drawn, exactly as it is.
 
     Raises:
@@ -369,7 +369,7 @@ def animate(
         A ``FuncAnimation`` of matplotlib; in a notebook ``HTML(found.to_jshtml())`` shows it.
 
     Raises:
-        InputError: for another kind of file, for .mp4 where there is no ffmpeg, and as :func:`sphere`.
+        InputError: for another kind of file, for .mp4 without ffmpeg, and as :func:`sphere`.
     """
     from matplotlib.animation import FuncAnimation
 
@@ -562,7 +562,7 @@ def stability(top: HeavyTop, axes: Axes3D | None = None, *, speed: float = 1.0) 
         The axes; a grey point where the rotation is not steady.
 
     Raises:
-        InputError: for what is no top.
+        InputError: for an invalid top.
     """
     body, drawn = arguments.is_a(top, HeavyTop, "top"), _solid(axes)
     system = HEAVY_GYROSTAT if body.rotor else HEAVY_TOP

@@ -93,7 +93,7 @@ class Samples:
 
 
 def samples(run: Any) -> Samples:
-    """A motion in double; raises InputError for what is none, for fewer than two samples, and for ones not finite."""
+    """A motion in double; raises InputError for an invalid one, for fewer than two samples, and for ones not finite."""
     if not isinstance(run, Trajectory | Reference):
         raise InputError(
             f"run must be a motion; got {quoted(run)}.", "Give what heavytop.propagate or heavytop.reference returns."

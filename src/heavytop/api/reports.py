@@ -169,7 +169,7 @@ def run(
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: one of `harness.plan.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
+        plan: one of `harness.BUILT_IN`, such as default, or the path of a TOML file (`heavytop docs plans`).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
@@ -253,7 +253,7 @@ def compare(
         cannot be compared, else "better" or "same".
 
     Raises:
-        InputError: for what is no report or policy, and where there is nothing to compare.
+        InputError: for an invalid report or policy, and where there is nothing to compare.
     """
     return compared(baseline, candidate, policy, floor, loss)
 
@@ -305,7 +305,7 @@ def history(
         A :class:`History`.
 
     Raises:
-        InputError: for fewer than two reports, and for what is no report or policy.
+        InputError: for fewer than two reports, and for an invalid report or policy.
     """
     return read_history(reports, metric, case, policy, lambda: None)
 

@@ -70,7 +70,7 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON document on standar
 
 def plans(begun: str) -> list[str]:
     """Plans whose names begin so, for completion."""
-    from heavytop.harness.plan import BUILT_IN
+    from heavytop.harness import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(begun)]
 
@@ -126,7 +126,7 @@ def print_json(document: Any) -> None:
 
     try:
         text = msgspec.json.format(msgspec.json.encode(document), indent=1).decode()
-    except UnicodeEncodeError:  # the name of a file that is no text
+    except UnicodeEncodeError:  # the name of a file other than text
         text = json.dumps(msgspec.to_builtins(document), indent=1)
     print(printable(text))
 

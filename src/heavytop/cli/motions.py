@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial, reduce, wraps
 from inspect import Parameter, Signature, signature
+from itertools import combinations
 from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, get_type_hints
@@ -31,17 +32,17 @@ if TYPE_CHECKING:
 
 
 _SCREEN = Path("-")
-_LATEX = "--latex"
+_SCREEN_WITHOUT_FILE = ("--latex", "--bibtex")
 
 
 def with_file_of_latex(arguments: list[str]) -> list[str]:
-    """The arguments of the command line, with ``-`` for standard output behind a ``--latex`` without a file."""
+    """The arguments of the command line, with ``-`` for standard output behind ``--latex``, ``--bibtex`` alone."""
     files: list[str] = []
-    for argument in arguments:
-        if files[-1:] == [_LATEX] and argument.startswith("--"):
+    for argument in (*arguments, "--"):
+        if files and files[-1] in _SCREEN_WITHOUT_FILE and argument.startswith("--"):
             files.append(str(_SCREEN))
         files.append(argument)
-    return [*files, str(_SCREEN)] if files[-1:] == [_LATEX] else files
+    return files[:-1]
 
 
 def made_by() -> tuple[str, str]:
@@ -52,14 +53,17 @@ def made_by() -> tuple[str, str]:
     return shlex.join(["heavytop", *sys.argv[1:]]), version() + (f" (commit {made_from})" if made_from else "")
 
 
-def require_one_output(csv: Path | None, latex: Path | None, json: bool) -> None:
+def require_one_output(files: Mapping[str, Path | None], json: bool) -> None:
     """Raises InputError where standard output would get two documents, or one file two."""
-    asked = (("--csv", csv == _SCREEN), (_LATEX, latex == _SCREEN), ("--json", json))
-    on_screen = [name for name, wanted in asked if wanted]
+    on_screen = [f"--{name}" for name, path in files.items() if path == _SCREEN] + ["--json"] * json
     if len(on_screen) > 1:
         raise InputError(f"{' and '.join(on_screen)} both print on standard output.", "Give a file for one of them.")
-    if csv is not None and csv == latex != _SCREEN:
-        raise InputError(f"{csv} is asked for as CSV and as LaTeX.", "Give two files.")
+    for one, other in combinations([name for name, path in files.items() if path not in (None, _SCREEN)], 2):
+        if files[one] == files[other]:
+            raise InputError(f"{files[one]} is asked for as {_AS[one]} and as {_AS[other]}.", "Give two files.")
+
+
+_AS = {"csv": "CSV", "latex": "LaTeX", "bibtex": "BibTeX"}
 
 
 def farthest(times: Sequence[str]) -> Fraction:
@@ -108,6 +112,9 @@ Csv = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table 
 Latex = Annotated[
     Path | None, typer.Option(metavar="[FILE]", help="Write it as LaTeX (siunitx, booktabs); print it without FILE.")
 ]
+Bibtex = Annotated[
+    Path | None, typer.Option(metavar="[FILE]", help="Write how to cite it as BibTeX; print it without FILE.")
+]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma, quaternion or matrix to length 1 first.")]
 
 _PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
@@ -143,6 +150,7 @@ class _Options(NamedTuple):
     pivot: Pivot = None
     csv: Csv = None
     latex: Latex = None
+    bibtex: Bibtex = None
     json: Json = False
 
 
@@ -168,7 +176,8 @@ class _Asked:
     """A request, read before anything is computed; raises InputError for what cannot be read."""
 
     def __init__(self, times: str, options: _Options, further: list[MotionOptions]) -> None:
-        require_one_output(options.csv, options.latex, options.json)
+        self.files = {name: getattr(options, name) for name in _AS}
+        require_one_output(self.files, options.json)
         options_of_data = {name: getattr(options, name) for name in _DATA}
         self.options = options
         self.top, self.start, self.system = _motion(options_of_data, options.case, options.system, options.normalize)
@@ -200,9 +209,9 @@ class _Asked:
         Raises InputError for a file that cannot be written.
         """
         options, on_screen = self.options, None
-        only_json = options.json and options.csv is None and options.latex is None
+        only_json = options.json and not any(self.files.values())
         table = None if only_json else make_table().of_case(options.case)
-        for path, make in ((options.csv, "csv"), (options.latex, "latex")):
+        for make, path in self.files.items():
             if path is None or table is None:
                 continue
             content = getattr(table, make)()

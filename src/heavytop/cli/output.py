@@ -223,19 +223,20 @@ class Bar:
     """Called before its state is read, where the work does not report by itself."""
 
     def __init__(self, estimator: Estimator, count: int = 0, unit: str = "rows", console: Any = None) -> None:
-        from rich import progress
         from rich.console import Console
 
         self.estimator, self.count, self.unit, self.finished = estimator, count, unit, 0
         self.console = console or Console(file=messages())
         self.live = bool(self.console.is_terminal)
-        columns = (
-            progress.TextColumn("{task.description}"),
-            progress.BarColumn(),
-            progress.TextColumn("{task.fields[said]}"),
-        )
-        self.bar = progress.Progress(*columns, console=self.console, disable=not self.live, transient=True)
-        self.id = self.bar.add_task("starting", total=1.0, said=self.said())
+        self.bar = self._drawn() if self.live else None
+
+    def _drawn(self) -> Any:
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}")
+        bar = Progress(*columns, console=self.console, transient=True)
+        self.id = bar.add_task("starting", total=1.0, said=self.said())
+        return bar
 
     def said(self) -> str:
         """Parts done of all, per cent, time left."""
@@ -257,16 +258,19 @@ class Bar:
         """Draw it as it is now."""
         self.label = self.label if label is None else label
         named = None if label is None else label[:40]
-        self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
+        if self.bar is not None:
+            self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
 
     def __enter__(self) -> Self:
-        self.bar.start()
+        if self.bar is not None:
+            self.bar.start()
         _open.append(self)
         return self
 
     def __exit__(self, *_: object) -> None:
         _open.remove(self)
-        self.bar.stop()
+        if self.bar is not None:
+            self.bar.stop()
 
 
 class Progress(Bar):

@@ -1,1 +1,1 @@
-"""What is known: motions as balls with a radius, at any time and to any number of bits."""
+"""Known motions: motions as balls with a radius, at any time and to any number of bits."""

@@ -15,7 +15,7 @@ from functools import partial
 
 from flint import arb
 
-from heavytop.errors import LevelNotDone, OutOfReach
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.cases.dokshevich import Dokshevich
@@ -32,7 +32,18 @@ from heavytop.exact.cases.one_interval import Steklov
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.cases.staude import Staude
 from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
-from heavytop.exact.closed_form import ALL, CYCLIC, Axes, ClosedForm, Renamed, inverse, renamed_state, renamed_top
+from heavytop.exact.closed_form import (
+    ALL,
+    CYCLIC,
+    Attitude,
+    Axes,
+    ClosedForm,
+    Renamed,
+    Turned,
+    inverse,
+    renamed_state,
+    renamed_top,
+)
 from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import require_handy
 from heavytop.exact.solution import Conditions, ExactSolution, equilibrium, hold
@@ -148,7 +159,7 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 
 
 def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolution | LevelNotDone]:
-    """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
+    """:func:`matches`, and the reason, where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
     for entry in _CLASSES[system.name]:
@@ -182,3 +193,27 @@ def find(top: HeavyTop, start: State, system: System = HEAVY_TOP, effort: float 
     if level:
         return OnLevel(top, start, system, effort=effort, level=level)
     return Validated(top, start, system, effort=effort)
+
+
+def state_and_attitude(
+    solution: ExactSolution, latest: Fraction, bits: int, effort: float = EFFORT
+) -> tuple[str, Attitude]:
+    """How the attitude of ``solution`` is known, and Ω, γ, ξ at (time, bits), ξ from ``initial_xi`` of its γ.
+
+    By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
+    motion up to its reach, within the effort; the state of a motion that has a closed form is always of it.
+    It raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
+    """
+    if isinstance(solution, Validated):
+        return solution.method, solution.with_attitude
+    own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
+    if own is not None:
+        whole = Turned(solution, own)
+        try:
+            whole(latest, bits)
+        except (NotInClass, OutOfReach):
+            pass
+        else:
+            return solution.method, whole
+    enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
+    return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]

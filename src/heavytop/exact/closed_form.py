@@ -20,7 +20,6 @@ from flint import acb, acb_series, arb, arb_series, fmpq_series
 from heavytop.errors import InputError, NotInClass, OutOfReach
 from heavytop.exact.elliptic.quartic import Pair
 from heavytop.exact.elliptic.weierstrass import Winding
-from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import (
     FUNCTIONS,
     BallLike,
@@ -228,7 +227,7 @@ class Evaluated(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(Evaluated):
-    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method`` and its conditions.
+    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
     made: what :func:`heavytop.exact.closed_form.cached_per_precision` keeps.
@@ -237,6 +236,7 @@ class ClosedForm(Evaluated):
     top: HeavyTop
     start: State
     method: ClassVar[str]
+    source: ClassVar[str]
     body: ClassVar[Conditions] = ()
     starts: ClassVar[Conditions] = ()
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -356,35 +356,6 @@ class Turned:
         return rotation
 
 
-def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits: int) -> list[arb]:
-    """ξ of :class:`Turned` at ``time``: three balls of ``bits`` bits."""
-    return Turned(solution, own)(time, bits)[6:]
-
-
-def state_and_attitude(
-    solution: ExactSolution, latest: Fraction, bits: int, effort: float = EFFORT
-) -> tuple[str, Attitude]:
-    """How the attitude of ``solution`` is known, and Ω, γ, ξ at (time, bits), ξ from ``initial_xi`` of its γ.
-
-    By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
-    motion up to its reach, within the effort; the state of a motion that has a closed form is always of it.
-    It raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
-    """
-    if isinstance(solution, Validated):
-        return solution.method, solution.with_attitude
-    own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
-    if own is not None:
-        whole = Turned(solution, own)
-        try:
-            whole(latest, bits)
-        except (NotInClass, OutOfReach):
-            pass
-        else:
-            return solution.method, whole
-    enclosure = Validated(solution.top, solution.start, solution.system, effort=effort)
-    return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
-
-
 # Renaming of the principal axes, once for all cases.
 #
 # With Q a permutation of the axes and d = det Q = ±1, Q (u × v) = d Qu × Qv.  So if (Ω, γ) solves the equations of
@@ -448,7 +419,12 @@ class Renamed:
     def method(self) -> str:
         """The solution's own, and the names its axes have here."""
         there = inverse(self.axes)
-        return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
+        return f"{self.solution.method}, axes renamed {there[0] + 1}, {there[1] + 1}, {there[2] + 1}"
+
+    @property
+    def source(self) -> str:
+        """That of the solution."""
+        return self.solution.source
 
     @property
     def system(self) -> System:
@@ -481,7 +457,7 @@ class Renamed:
 
         Raises NotInClass where the solution has no attitude.
         """
-        return turned_to_start(self, self.own_attitude, time, bits)
+        return Turned(self, self.own_attitude)(time, bits)[6:]
 
     def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
         """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""

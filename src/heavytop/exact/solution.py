@@ -18,11 +18,14 @@ from heavytop.top.heavy_top import HeavyTop, State
 class ExactSolution(Protocol):
     """A motion known at any time to any number of bits.
 
-    method: the closed form or the enclosure behind it, for reports.
+    method: the closed form or the enclosure behind it, for reports.  source: where its formulas are published.
     """
 
     @property
     def method(self) -> str: ...
+
+    @property
+    def source(self) -> str: ...
 
     @property
     def system(self) -> System: ...

@@ -21,7 +21,7 @@ from heavytop.top.heavy_top import HeavyTop, State, data_texts
 _TIMES = ("1", "5", "10")
 _PLACES = 18
 _DIGITS = 40
-"""Of a start whose attitude is irrational."""
+"""Digits of a start whose attitude is irrational."""
 
 
 def case_data(case: Case) -> dict[str, Any]:
@@ -181,6 +181,6 @@ def _draw(case: Case, seed: int, index: int) -> State:
 
 
 def _kind(case: Case, start: State) -> type | None:
-    """The closed form that a random start of the top has as well, or the special one it has not."""
+    """The closed form that a random start of the top has as well, or the special one it lacks."""
     solution = next(matches(case.top, start, case.system), None)
     return None if solution is None else type(solution)

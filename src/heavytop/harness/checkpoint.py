@@ -59,7 +59,7 @@ class Saved:
             self.path.unlink(missing_ok=True)
 
     def load(self) -> dict[str, Any] | None:
-        """The content saved last by the same plan and program; None where there is none.
+        """The content saved last by the same plan and program; None where absent.
 
         Its checksum is right, but not that of a secret: anything may stand in it.
         """

@@ -151,7 +151,7 @@ class _Violated(Exception):
 
 
 class _Note(Exception):
-    """A remark that is no violation."""
+    """A remark that is not a violation."""
 
 
 class _Contract:
@@ -314,13 +314,13 @@ class _Contract:
             )
 
     def _rest(self) -> str:
-        top = HeavyTop((3, 2, 1), 1, [part / 2 for part in self.axis])
+        top = HeavyTop((3, 2, 1), 1, [-part / 2 for part in self.axis])  # hanging: upright, it amplifies noise
         run = self._run([1, 10], State((0, 0, 0), self.axis), top, system=HEAVY_TOP)
         off = max(_distance(state, (0, 0, 0, *self.axis)) for state in run.states)
         if off <= _RESTART * self.precision.eps:
             return "A top at rest stays at rest."
         moved = f"A top at rest moves by {decimal_text(off, 2)} until t = 10"
-        if off > _BY_ITS_ERROR * self._error(self._run([2])):
+        if off > _BY_ITS_ERROR * self._error(self._run([10])):
             raise _Violated(f"{moved}.")
         raise _Note(f"{moved}, which its error on a motion explains.")
 
@@ -430,7 +430,7 @@ class _Contract:
     def _huge(self) -> str:
         across = (0, _HUGE, 0) if self.axis[0] else (_HUGE, 0, 0)
         start = State(across, self.axis)
-        top = HeavyTop((3, 2, 1), 1, [part / 2 for part in self.axis])
+        top = HeavyTop((3, 2, 1), 1, [-part / 2 for part in self.axis])  # hanging: upright, it amplifies noise
         try:
             if self.program is None:
                 self._run([1], start, top, system=HEAVY_TOP)

@@ -23,19 +23,18 @@ import msgspec
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, invalid, prefixed, quoted
-from heavytop.exact.bodies import resolve
-from heavytop.features import FEATURES
+from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole
+from heavytop.harness import BUILT_IN, OF_FEATURES
 from heavytop.harness.rows import Kinds, PlanTable, Task
 from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.registry import IntegratorSource, command_of, commands_in, is_third_party, named, seconds_of
 from heavytop.integrate.registry import known as known_integrators
 from heavytop.integrate.registry import require as require_integrator
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, physical, require
-from heavytop.records import FINEST, RowKey
+from heavytop.records import FINEST, HEYOKA, RowKey
 from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop
@@ -43,8 +42,6 @@ from heavytop.top.heavy_top import HeavyTop
 _KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
-_OF_FEATURES = {plan: feature.package for feature in FEATURES for plan in feature.plans}
-BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest", *_OF_FEATURES)
 QUANTITIES = frozenset(
     (
         *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
@@ -85,7 +82,7 @@ class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     system: str | None = None
 
     def case(self) -> Case:
-        """The case; raises InputError for what is no body or start, or cannot be measured."""
+        """The case; raises InputError for an invalid body or start, and one that cannot be measured."""
         body, start = motion_of(msgspec.structs.asdict(self))
         about, system = "from the plan", system_of(self.system, body)
         if isinstance(body, HeavyTop) and start.attitude is None:
@@ -163,7 +160,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
 
 def _built_in(name: str) -> Traversable:
     shared = resources.files("heavytop.harness") / "plans"
-    return (resources.files(_OF_FEATURES[name]) if name in _OF_FEATURES else shared) / f"{name}.toml"
+    return (resources.files(OF_FEATURES[name]) if name in OF_FEATURES else shared) / f"{name}.toml"
 
 
 def document_of(text: str) -> dict[str, Any]:
@@ -191,7 +188,7 @@ def former(name: str) -> set[str]:
 
 
 def definitions(plan: Plan, folder: Path) -> dict[str, IntegratorSource]:
-    """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
+    """The integrators that a plan in that folder defines, by name; raises InputError for an invalid one, and for two of
     one name.
     """
     sources: list[IntegratorSource] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]

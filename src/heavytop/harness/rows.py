@@ -24,14 +24,13 @@ from heavytop.errors import (
     PeerFailed,
     Unsupported,
 )
-from heavytop.exact.bodies import resolve
+from heavytop.exact.resolved import resolve
 from heavytop.harness.checkpoint import Saved
 from heavytop.harness.sweeps import Sweep
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.registry import Integrator, IntegratorSource, described, is_third_party, name_of, require_reach
 from heavytop.integrate.trajectory import OtherFlags, Outcome, Problem, Trajectory
 from heavytop.measure.attitude_error import AttitudeScorer
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.truth import seconds_a_step as words_seconds
@@ -42,6 +41,8 @@ from heavytop.records import (
     EXACT,
     FAILED,
     FINEST,
+    HEYOKA,
+    MULTIWORD,
     NOT_ASKED,
     OUT_OF_REACH,
     OUT_OF_TIME,
@@ -307,7 +308,7 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
 def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Row:
     """The row of a task whose integrator failed: ``cause``, and in which case at which setting."""
     setting = task.key.subject.setting
-    return unmeasured(task, kind(" ".join(part for part in (cause, "in", task.title, setting) if part)))
+    return unmeasured(task, kind(" ".join(part for part in (f"{cause}, in", task.title, setting) if part)))
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:

@@ -1,1 +1,1 @@
-"""What is computed: integrators behind one call."""
+"""Computed motions: integrators behind one call."""

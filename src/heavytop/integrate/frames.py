@@ -11,7 +11,7 @@ import numpy
 from numpy.typing import NDArray
 
 from heavytop.errors import InputError
-from heavytop.exact.bodies import resolve
+from heavytop.exact.resolved import resolve
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, Vector, exact, number
 from heavytop.top.attitude import perpendicular, rotated, transposed
@@ -50,11 +50,6 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
             turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=rotated.dtype)
         rotated[:, begin : begin + 3] = turned
     return rotated
-
-
-def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
-    """One state of an observer, as :func:`in_frame`."""
-    return in_frame(numpy.array([state]), frame, precision)[0]
 
 
 def _permuted(part: NDArray[numpy.float64], frame: Frame) -> Any:
@@ -158,7 +153,7 @@ class Setup:
 
     def in_body_axes(self, state: Any) -> Any:
         """A state of an observer in the axes given."""
-        return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
+        return state if self.frame is None else in_frame(numpy.array([state]), self.frame, self.precision)[0]
 
     def exactly_in_body_axes(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
         """Vectors in principal axes, in the axes given, in exact rationals."""

@@ -15,9 +15,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, Protocol
 
@@ -73,7 +73,7 @@ class IntegratorSource(Protocol):
         ...
 
     def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where there is none."""
+        """The peer; raises InputError where absent."""
         ...
 
 
@@ -151,7 +151,7 @@ class Integrator:
         return found  # type: ignore[no-any-return]
 
     def _of_package(self) -> Integrator:
-        """The entry of another package's; raises InputError where there is none."""
+        """The entry of another package's; raises InputError where absent."""
         if self.name not in known():
             _of_packages.cache_clear()  # it may have been installed since
         if self.name not in known():
@@ -160,7 +160,7 @@ class Integrator:
 
     @property
     def remedy(self) -> str:
-        """What to do where it cannot be imported."""
+        """Remedy where it cannot be imported."""
         return "" if self.own else f"It comes from {self.function}: repair or remove that package."
 
     def capabilities(self) -> dict[str, Any]:
@@ -316,7 +316,7 @@ def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None
 
 def load(source: str | Callable[..., Any]) -> Any:
     """The object at ``module:name``, imported; a function itself."""
-    return EntryPoint("", source, "").load() if isinstance(source, str) else source
+    return resolve_name(source) if isinstance(source, str) else source
 
 
 loaded = lru_cache(maxsize=64)(load)  # for this program's own, looked up once
@@ -408,7 +408,8 @@ def commands_in(path: Path) -> list[Command]:
         text = path.read_text("utf-8")
         document = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path} cannot be read: {error}.", "Give a readable TOML file.") from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path} cannot be read: {why}.", "Give a readable TOML file.") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")
@@ -476,6 +477,8 @@ def known() -> dict[str, Integrator]:
 @lru_cache(maxsize=4)
 def _of_packages(path: tuple[str, ...]) -> dict[str, Integrator]:
     """Integrators of the packages on ``sys.path``, looked through once."""
+    from importlib.metadata import entry_points  # and with it, email
+
     entries = entry_points(group=GROUP)
     return {entry.name: foreign(entry.name, entry.value) for entry in entries if entry.name not in FORMER}
 

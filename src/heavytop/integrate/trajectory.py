@@ -423,7 +423,7 @@ class Trajectory(LazyStates, Tabular, InSpace):
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
     evaluations: of the field, where the engine counts them.
-    attitude: ξ, native numbers, shape (n, 3), where it was computed beside ``states`` and is no part of them.
+    attitude: ξ, native numbers, shape (n, 3), where it was computed beside ``states`` and is not part of them.
     frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
     problem, the principal axes.  principal: then the run as it was computed.
     angle_texts: φ, θ, ψ, followed from t = 0, as decimal text, shape (n, 3), where they were asked for.

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import arb
 
@@ -24,12 +24,14 @@ from heavytop.measure.scorer import (
     parameter_balls,
     split,
 )
-from heavytop.measure.truth import Truth, truth
 from heavytop.precision import Vector, cross, dot, exact
 from heavytop.records import Quantity
 from heavytop.top.attitude import SEQUENCES, Rows, matrix_of_quaternion, rotated, rows_of, rows_of_euler, transposed
 from heavytop.top.bodies import IDENTITY
 from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    from heavytop.measure.truth import Truth
 
 # How a trajectory file speaks of the attitude: order and direction of quaternions, Euler sequence, up, units.
 #
@@ -164,7 +166,7 @@ def attitude_angle(one: Sequence[Sequence[arb]], other: Sequence[Sequence[arb]])
     """
     off = [a - b for u, v in zip(one, other, strict=True) for a, b in zip(u, v, strict=True)]
     square = sum((part * part for part in off), arb(0)) / 8  # FLINT's power of a ball around 0 is nan
-    if square > _ONE:  # of what is no rotation
+    if square > _ONE:  # off a rotation
         return arb.pi()
     return 2 * arb.atan2(root(square), root(_ONE - square))
 
@@ -424,6 +426,8 @@ class AttitudeScorer(Scorer):
     ) -> None:
         super().__init__(replace(problem, xi=None), known, keep)
         assert problem.xi is not None
+        from heavytop.measure.truth import truth
+
         turned = truth(problem, times)
         posed = Posed(top, start, (problem.xi[0], problem.xi[1], problem.xi[2]), IDENTITY, top.centre)
         names = ("matrix", "position") if any(top.centre) else ("matrix",)

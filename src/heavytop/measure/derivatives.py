@@ -12,10 +12,10 @@ from flint import arb
 from numpy.typing import NDArray
 
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.derivatives import DATA, METHOD, derivatives
 from heavytop.exact.enclosure.run import EFFORT, Validated
 from heavytop.exact.flint.balls import ball, largest_singular_value, value_text, whole_evaluation, working_precision
+from heavytop.exact.resolved import Resolved, resolve
 from heavytop.measure.certify import bits_of
 from heavytop.precision import exact, shown
 from heavytop.top.bodies import Body
@@ -26,7 +26,7 @@ WHICH = ("start", "data", "all")
 STARTS = tuple(f"{name}(0)" for name in NAMES)
 """Names of the columns of the derivatives with respect to the start."""
 PARAMETERS = DATA
-"""Those of the derivatives with respect to the data."""
+"""Names of the columns of the derivatives with respect to the data."""
 _SPARE_BITS = 12
 
 Balls = list[list[arb]]

@@ -25,9 +25,9 @@ FEWEST_SAMPLES = 8
 NEAR = 0.12
 """A class exponent this far outside the interval still names the law: samples see a power only up to a transient."""
 BENT = 0.25
-"""Half the way from a class to the next: an exponent that surely changes by this within the span is no law."""
+"""Half the way from a class to the next: an exponent that surely changes by this within the span is not a law."""
 STRAIGHT = 0.1
-"""Of the variance of log |error|, what a line over |t| may leave: of a jump it leaves a quarter at least."""
+"""Part of the variance of log |error| that a line over |t| may leave: of a jump it leaves a quarter at least."""
 LOST = 0.1
 """An error of this part of the size of a quantity leaves no digit of it."""
 RESOLVED = 10

@@ -29,9 +29,6 @@ from heavytop.precision import Array, decimal_text, exact
 from heavytop.records import UNRESOLVED_SECONDS, Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
 
-HEYOKA, MULTIWORD = "heyoka", "multiword"
-
-
 # The seconds that an integrator takes, and whether what one of another package says of its runs can be.
 #
 # One of another package is believed nothing that can be measured.  It is timed by the clock here, in calls from starts

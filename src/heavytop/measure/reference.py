@@ -262,10 +262,12 @@ class Reference(Tabular, InSpace, msgspec.Struct, frozen=True, omit_defaults=Tru
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     the ξ(0) of `heavytop docs outputs`; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
+    source: where the formulas of the method are published.
     derivatives: on request, with respect to the start and the data.  stability: of a motion that is steady.
     """
 
     method: str
+    source: str = ""
     digits: int
     written_times: list[str] = msgspec.field(name="times")
     states: list[list[Ball]]
@@ -459,6 +461,7 @@ def reference(
         derived = known_derivatives(top, start, instants, digits, system, derivatives, effort)
     result = Reference(
         method=known.method,
+        source=known.source,
         digits=digits,
         written_times=[str(TimeText.of(time)) for time in times],
         states=[],

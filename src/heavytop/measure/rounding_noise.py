@@ -190,7 +190,7 @@ def _short(problem: Problem) -> Problem:
 
 
 def _each(p: Parameters, change: Callable[[Fraction], Fraction]) -> Parameters:
-    """The parameters with every number changed that is proportional to a mass: λ of the gyrostat is none."""
+    """The parameters with every number changed that is proportional to a mass: λ of the gyrostat stays."""
     inertia, moment = (tuple(map(change, part)) for part in (p.inertia, p.moment))
     rotor = tuple(map(change, p.rotor)) if isinstance(p.rotor, tuple) else p.rotor
     return p._replace(inertia=inertia, moment=moment, rotor=rotor)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import arb
 
@@ -24,10 +24,12 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_balls
-from heavytop.measure.truth import Truth
 from heavytop.precision import dot, log10
 from heavytop.records import Against, Metric, Quantity, Series, by_name
 from heavytop.top.equations import Integral, Parameters
+
+if TYPE_CHECKING:
+    from heavytop.measure.truth import Truth
 
 # Drift of first integrals along a computed motion, in one pass and constant memory.
 
@@ -205,13 +207,13 @@ SOLUTION_ERROR, INTEGRATION_ERROR = "solution_error", "integration_error"
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
 """Distance in one number: the largest over the samples, and that at the end."""
 OBSERVED_ORDER = Quantity("observed_order")
-"""Of a method, by its errors of single steps."""
+"""Order of a method, by its errors of single steps."""
 ORDER_OF_RUNS = Quantity("observed_order", "runs")
-"""Of a method, by the errors of whole runs at h, h/2, h/4."""
+"""Order of a method, by the errors of whole runs at h, h/2, h/4."""
 COMPONENTS = ("omega", "gamma", "along", "across")
 
 Errors = tuple[list[Sums], bool]
-"""What :meth:`SolutionError.following` finds."""
+"""Result of :meth:`SolutionError.following`."""
 
 
 class SolutionError(Statistics):
@@ -273,7 +275,7 @@ class SolutionError(Statistics):
             return self.errors(to_balls(state[:6]), truth)
 
     def known(self, time: Fraction) -> list[arb] | None:
-        """The true state; None where there is none."""
+        """The true state; None where absent."""
         return self.truth.state(time, self.bits) if self.truth.covers(time) else None
 
     def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
@@ -324,7 +326,7 @@ def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
 class DriftAndError:
     """Measures of the samples of a motion: drift, where the state is whole, and error, where there is a reference.
 
-    truth: the true motion, or why there is none.
+    truth: the true motion, or why it is missing.
     """
 
     truth: Truth | str
@@ -357,7 +359,7 @@ class DriftAndError:
 class Scorer(DriftAndError):
     """Takes in the states of one motion, one after the other, and holds what they are worth.
 
-    problem: what the integrator was given.  truth: the true motion, or why there is none.
+    problem: what the integrator was given.  truth: the true motion, or why it is missing.
     keep: the times whose values go into the series.
     threshold, until, name: as in :class:`heavytop.measure.scorer.SolutionError`.
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.
@@ -433,6 +435,8 @@ def sample_errors(
     def state_at(time: Fraction, bits: int) -> list[arb]:
         with working_precision(bits):
             return to_balls(true[time])
+
+    from heavytop.measure.truth import Truth
 
     error = SolutionError(problem, Truth(Against("computed"), state_at), times)
     # as many bits as tell a state of the format from one that is right to as many digits again

@@ -20,8 +20,7 @@ from msgspec.structs import replace as replace_struct
 
 from heavytop.errors import HeavyTopError, InputError, NotInClass, OutOfReach
 from heavytop.exact.cases.gyrostat import Gyrostat
-from heavytop.exact.catalogue import matches
-from heavytop.exact.closed_form import state_and_attitude
+from heavytop.exact.catalogue import matches, state_and_attitude
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
@@ -207,7 +206,7 @@ def _finer(problems: Sequence[Given], bits: int, first: Sequence[_Served]) -> in
 
 
 def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
-    """Times within the horizon over 4^n, each list longer than the one before; where there is none, its end."""
+    """Times within the horizon over 4^n, each list longer than the one before; without any, its end."""
     ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
     counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
     before = [[ends[n]] for n, count in counts.items() if not count]
@@ -482,7 +481,7 @@ _TOO_FEW = "the closed form is certified to too few digits"
 
 @dataclass(frozen=True, slots=True)
 class EnsembleReference:
-    """The references of an ensemble: the truth of each start, or why there is none.
+    """The references of an ensemble: the truth of each start, or why it is missing.
 
     blur: how far each state may be off, absolute, for each start and time that is covered; shape (starts, samples).
     """

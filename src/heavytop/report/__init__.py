@@ -1,1 +1,1 @@
-"""What is reported: reports on disk, two of them, and documents on terminal, page, JSON and Markdown."""
+"""Reporting: reports on disk, two of them, and documents on terminal, page, JSON and Markdown."""

@@ -1,1 +1,1 @@
-"""What moves: the top, its equations, its first integrals, its angles.  Independent of number formats."""
+"""Moving bodies: the top, its equations, its first integrals, its angles.  Independent of number formats."""

@@ -213,7 +213,7 @@ class Angle:
         return exact_text(self.number) + (_DEGREES if self.degrees else "")
 
     def quarters(self) -> int | None:
-        """How many right angles it is; None where its sine or cosine is none of 0 and ±1."""
+        """How many right angles it is; None where its sine or cosine is other than 0 and ±1."""
         if self.number == 0:
             return 0
         turns = self.number / 90
@@ -461,7 +461,7 @@ def rotation_angle(
 
 
 def unwrap(angles: Iterable[Any], turn: Any) -> list[Any]:
-    """The same angles shifted by multiples of ``turn`` (2π) so that neighbours differ by at most half a turn.
+    """Angles shifted by multiples of ``turn`` (2π) so that neighbours differ by at most half a turn.
 
     Meaningful only where the samples are dense enough that the true angle moves less than half a turn between them.
     """

@@ -229,6 +229,8 @@ PIVOT, CENTRE = "pivot", "centre of mass"
 _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
 """A plate or a rod in rounded numbers is one."""
+_PRINTED_DATA = Fraction(1, 10**6)
+"""Of the tensor: a plate or a rod in seven digits is not warned of."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 
@@ -409,13 +411,13 @@ def _tensor(inertia: Iterable[Any]) -> Tensor:
 
 def _warnings_about_centre(body: Body) -> list[str]:
     """Whether the tensor about the centre of mass can be that of a body; where not, with the slip that mends it."""
-    slack = _ROUNDED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
+    slack = _PRINTED_DATA * sum(body.tensor[i][i] for i in range(3)) / 2
     if has_second_moments(body.central, slack):
         return []
     moments = ", ".join(six_digits(value) for value in _principal_moments(body.central))
     six, at_pivot = six_of(body.central if body.about == CENTRE else body.tensor), body.about != CENTRE
     slip = mending(MassProperties(six, body.mass, body.centre, at_pivot, slack))
-    sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is no rigid body's."
+    sentence = f"The inertia tensor about the centre of mass, of principal moments {moments}, is not a rigid body's."
     return [f"{sentence} {slip}".rstrip()]
 
 
@@ -455,7 +457,7 @@ def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[Heavy
     values: by the keys of :data:`BODY` and :data:`START`; lists of texts, or one text for a number.  With mass and
     gravity it is a body in any axes, with weight a top in principal axes.
     normalize: move γ, or a quaternion or matrix, to a rotation in exact rationals near it.
-    Raises InputError for what is missing, contradicts another, or is no body or start.
+    Raises InputError for what is missing, contradicts another, or describes an invalid body or start.
     """
     data = {key: value for key, value in values.items() if value is not None and value != []}
     if "file" in data:

@@ -205,7 +205,7 @@ class State:
         return self
 
     def unit_gamma_nearby(self) -> str:
-        """How to repair a γ that is no unit vector, where nothing can do it for the user: one near it in full."""
+        """How to repair a γ off length 1, where nothing can do it for the user: one near it in full."""
         if not any(self.gamma):
             return "Give the components of a unit vector, such as 3/5, 0, 4/5."
         near = ", ".join(map(str, self.normalized(_NEAR_BITS).gamma))

@@ -165,7 +165,7 @@ def realisable(central: Tensor, slack: Fraction = Fraction(0)) -> bool:
 
 
 def _is_rod(central: Tensor, slack: Fraction) -> bool:
-    """Whether a principal moment is 0 within rounding, or below it: all mass lies on a line, or there is none."""
+    """Whether a principal moment is 0 within rounding, or below it: all mass lies on a line, or is missing."""
     least = max(slack, _SMALL * max(abs(value) for value in six_of(central)))
     return not is_positive(central) or not _semidefinite(central, -least)
 

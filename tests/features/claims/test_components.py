@@ -148,7 +148,6 @@ def test_the_papers_rate_of_psi_is_refuted_for_the_top_by_conditions_that_do_not
         ({"start": None}, "start"),
         ({"component": {"reduced": None}}, "reduced"),
         ({"component": {"quantity": "C"}}, "constant"),
-        ({"component": {"phi": "t"}}, "phi"),
     ],
 )
 def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], message: str) -> None:
@@ -158,3 +157,17 @@ def test_a_component_without_what_it_needs_is_refused(change: dict[str, Any], me
     }
     with pytest.raises(InputError, match=message):
         claim_from_table(table, "claim")
+
+
+@pytest.mark.slow
+def test_a_start_that_is_rational_at_no_sample_is_named() -> None:
+    report = audit(
+        parameters={"C": ["2", "3"]},
+        definitions={"c": "sqrt(C)"},
+        top={"inertia": ["1", "1", "c"]},
+        start={"omega": ["0", "L*(u2 - u1)/(4/5)", "L/c"]},
+        component={"value": None, "psi": None},
+        quadrature={"psi": "L*(u2 - gamma3)/(1 - gamma3^2)"},
+    )
+    reasons = {c.reason for row in report.rows for c in row.conditions if not c.discharged}
+    assert any("rational" in reason for reason in reasons)

@@ -61,7 +61,7 @@ def test_colliding_and_complex_roots_leave_no_bounded_branch(g2: str, g3: str) -
 def test_poles_on_the_real_line_are_never_passed_over(rate: str, domain: str) -> None:
     report = _audit(rate, domain=domain)
     assert report.verdict == "undecided"
-    assert "t is no period of wp(u, " in _open(report)
+    assert "t is not a period of wp(u, " in _open(report)
 
 
 def test_of_numbers_poles_are_excluded_by_balls() -> None:

@@ -10,6 +10,7 @@ import sympy
 from heavytop.features.claims.algebra.conditions import conditions_for_zero, is_exactly_zero
 from heavytop.features.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.features.claims.audit.context import STATE
+from heavytop.features.claims.audit.judge import Audit
 from heavytop.features.claims.audit.user_claims import states_on
 from heavytop.top.equations import HEAVY_TOP
 
@@ -28,6 +29,10 @@ TOPS = {
 
 
 def verdict(top: str, value: str, where: tuple[str, ...] = (), kind: str = "integral", **parts) -> str:
+    return audit(top, value, where, kind, **parts).verdict
+
+
+def audit(top: str, value: str, where: tuple[str, ...], kind: str = "integral", **parts) -> Audit:
     inertia, centre = TOPS[top]
     table = {
         "name": "on conditions",
@@ -35,7 +40,7 @@ def verdict(top: str, value: str, where: tuple[str, ...] = (), kind: str = "inte
         "top": {"inertia": inertia, "weight": "1", "centre": centre},
         "integral": {"value": value, "where": list(where)},
     } | parts
-    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP).verdict
+    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP)
 
 
 TRUE = [
@@ -210,8 +215,13 @@ def test_conditions_too_large_to_expand_end_at_once():
     ],
 )
 def test_no_witness_is_off_the_unit_sphere(value, where):
-    """Where γ1 = 1, γ is (1, 0, 0) and γ2² rests; with γ = (1, 3/5, -1/2) it does not, and that is no body's state."""
-    assert verdict("free", value, where) == "undecided"
+    """With γ = (1, 3/5, -1/2) γ2² does not rest, and that is no body's state; from (1, 0, 0) γ1 leaves 1 as t²."""
+    report = audit("free", value, where)
+    assert report.verdict == ("refuted" if where[0] in ("gamma1 - 1", "gamma3 + 1") else "undecided")
+    for row in report.rows:
+        point = row.witness["parameters"] if row.witness else {"gamma1": 1}
+        assert sum(Fraction(point.get(f"gamma{axis}", 0)) ** 2 for axis in (1, 2, 3)) == 1
+        assert not row.witness or "the flow leaves" in row.residual
 
 
 def test_a_witness_is_looked_for_on_the_unit_sphere():

@@ -160,7 +160,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     for bad, first in ((part, 2), (none, 0)):
         found = compare(whole, bad, Policy())
         assert (found.verdict, found.exit_code, len(found.findings)) == ("worse", 1, 1)
-        assert f"heyoka aborted in many[{first}]" in found.findings[0].reason
+        assert f"heyoka aborted, in many[{first}]" in found.findings[0].reason
     assert compare(none, none, Policy()).verdict == "same"
 
 

@@ -183,7 +183,7 @@ def goryachev_motion(
 ) -> AlgebraicMotion:
     """Goryachev's motion for B, 3/5 < B < 5/8, and b4 < 0, with Ω1 = ``place`` and these signs of Ω2, Ω3 at t = 0.
 
-    Raises InputError where there is no such top, or no real motion at the place.
+    Raises InputError without such a top, or a real motion at the place.
     """
     return algebraic_motion("Goryachev's", lambda: goryachev_curve(second, quartic), place, signs)
 
@@ -218,7 +218,7 @@ def chaplygin_motion(
 ) -> AlgebraicMotion:
     """Chaplygin's motion for B, 3/2 < B < 1.5966, and b1 > 0, with Ω1 = ``place``³ at t = 0, by default at rest.
 
-    signs: of √(b1 + b3 x⁴) and √(c1 + c3 x⁴).  Raises InputError where there is no such top, or no real motion there.
+    signs: of √(b1 + b3 x⁴) and √(c1 + c3 x⁴).  Raises InputError without such a top, or a real motion there.
     """
     return algebraic_motion("Chaplygin's", lambda: chaplygin_curve(second, first), place, signs)
 
@@ -259,6 +259,6 @@ def kowalewski_motion(
 ) -> AlgebraicMotion:
     """N. Kowalewski's motion for B, 10/17 < B < 0.645, and b3 ≠ 0, with Ω1 = ``place`` and these signs of Ω2, Ω3.
 
-    Raises InputError where there is no such top, or no real motion at the place.
+    Raises InputError without such a top, or a real motion at the place.
     """
     return algebraic_motion("N. Kowalewski's", lambda: kowalewski_curve(second, cubic), place, signs)

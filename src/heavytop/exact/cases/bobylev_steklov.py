@@ -130,6 +130,7 @@ class BobylevSteklov(ClosedForm):
     """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
 
     method = "closed form: Bobylev-Steklov, Jacobi functions"
+    source = "E. Leimanis, The General Problem of the Motion of Coupled Rigid Bodies about a Fixed Point (1965)"
     body = *ON_AXIS_1, ExactRelation("I1 = 2 I3", "I1 - 2 I3", lambda top, _: (top.inertia[0] - 2 * top.inertia[2],))
     starts = (
         ExactRelation("Omega2 = 0", "Omega2", lambda _, start: start.omega[1:2]),

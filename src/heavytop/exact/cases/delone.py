@@ -170,6 +170,7 @@ class Delone(WithBearing, ClosedForm):
     """
 
     method = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
+    source = "Delone's class of Kovalevskaya's top; formulas derived in the program"
     body = plane_top(2)
     starts = (XI,)
 
@@ -251,6 +252,7 @@ class DeloneHomoclinic(WithAngles):
     alpha: Fraction
     i1: Fraction
     method = "closed form: Delone homoclinic"
+    source = "Delone's class of Kovalevskaya's top; formulas derived in the program"
     system = HEAVY_TOP
     body = plane_top(2)
     starts = (

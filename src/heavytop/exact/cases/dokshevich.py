@@ -267,6 +267,7 @@ class Dokshevich(_Moving, ClosedForm):
     """
 
     method = "closed form: Dokshevich, inversion of an elliptic integral"
+    source = "A. I. Dokshevich, Doklady 167 (1966) 1251; formulas derived in the program"
     body = (
         IN_PLANE_13,
         OFF_AXES_13,
@@ -406,7 +407,7 @@ def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> Al
 
     place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.  Both are read by
     :func:`heavytop.precision.exact`.
-    Raises InputError where there is no such top, and for a place out of range.
+    Raises InputError without such a top, and for a place out of range.
     """
     with prefixed("place"):
         where = exact(place)

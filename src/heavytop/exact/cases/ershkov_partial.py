@@ -50,6 +50,7 @@ class ErshkovPartial(WithAngles):
     i1: Fraction
     i3: Fraction
     method = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
+    source = "S. V. Ershkov, On the invariant motions of rigid body rotation, (4.2)-(4.6)"
     system = GYROSTAT
     body = (
         ExactRelation("I1 = I2", "I1 - I2", lambda top, _: (top.inertia[0] - top.inertia[1],)),

@@ -45,6 +45,7 @@ class Euler(WithAttitude):
     """Every motion of a top without moment of the weight.  Raises NotInClass unless P r = 0 exactly."""
 
     method = "closed form: Euler-Poinsot, Jacobi functions"
+    source = "E. T. Whittaker, Analytical Dynamics, chapter VI"
     body = (NO_TORQUE,)
 
     @property

@@ -583,6 +583,7 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
+    source = "S. A. Chaplygin, Trudy otd. fiz. nauk 12 (1904)"
     body = plane_top(4)
     starts = GAMMA, LEVEL_MOMENTUM
 
@@ -609,6 +610,7 @@ class Sretensky(GoryachevChaplygin):
     """
 
     method = "closed form: Sretensky's gyrostat, inversion of Abel's integrals"
+    source = "L. N. Sretensky, Doklady 149 (1963) 292"
     system = HEAVY_GYROSTAT
     body = *GoryachevChaplygin.body, AXIAL_ROTOR
 

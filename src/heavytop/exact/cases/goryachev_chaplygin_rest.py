@@ -88,6 +88,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev, through rest, Jacobi functions"
+    source = "D. N. Goryachev, Mat. sbornik 21 (1900) 431"
     body = plane_top(4)
     starts = (
         GAMMA,

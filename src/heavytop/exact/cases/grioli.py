@@ -43,6 +43,7 @@ class Grioli(WithAttitude):
     """Every Grioli precession of a top with b = 0.  Raises NotInClass where the top, Ω or γ is not one's exactly."""
 
     method = "closed form: Grioli regular precession"
+    source = "G. Grioli, Ann. Mat. Pura Appl. 26 (1947) 271"
     body = (
         IN_PLANE_13,
         TORQUE,

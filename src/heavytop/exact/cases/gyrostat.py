@@ -45,6 +45,7 @@ class Gyrostat(ClosedForm):
 
     rotor: Fraction
     method = "closed form: gyrostat, Weierstrass functions of M2"
+    source = "V. Volterra, Acta Math. 22 (1899) 201; formulas derived in the program"
     system = GYROSTAT
 
     @classmethod

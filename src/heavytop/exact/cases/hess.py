@@ -157,6 +157,7 @@ class Hess(WithBearing, ClosedForm):
     """
 
     method = "closed form: Hess, elliptic height and the matrix of a linear system over its period"
+    source = "W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892) 508"
     body = HESS_TOP
     starts = ACROSS_CENTRE, GAMMA, INCLINED_MOMENTUM
 
@@ -340,6 +341,7 @@ class HessPendulum(WithAttitude):
     """
 
     method = "closed form: Hess with zero area integral, Jacobi functions"
+    source = "W. Hess, Math. Ann. 37 (1890) 153; N. E. Zhukovsky, Trudy otd. fiz. nauk 5 (1892)"
     body = HESS_TOP
     starts = (
         ACROSS_CENTRE,

@@ -533,6 +533,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
     """
 
     method = "closed form: Kovalevskaya, inversion of Abel's integrals"
+    source = "S. Kovalevskaya, Acta Math. 12 (1889) 177; F. Kötter, Acta Math. 17 (1893) 209"
     body = plane_top(2)
     starts = GAMMA, NOT_XI
 

@@ -77,6 +77,7 @@ class Lagrange(ClosedForm):
     """
 
     method = "closed form: Lagrange, Weierstrass functions of gamma3"
+    source = "J.-L. Lagrange, Mécanique analytique (1788); F. Klein, A. Sommerfeld, Theorie des Kreisels (1897)"
     body = SYMMETRIC
 
     @property
@@ -274,6 +275,7 @@ class SphericalTop(Lagrange):
     """
 
     method = "closed form: spherical top, Weierstrass functions of n·gamma"
+    source = "derived in the program; Lagrange's top with equal moments"
     body = SPHERICAL, TORQUE
 
     @property
@@ -305,6 +307,7 @@ class LagrangeGyrostat(ClosedForm):
     """
 
     method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
+    source = "derived in the program; Lagrange's top with a rotor on its axis"
     system = HEAVY_GYROSTAT
     body = *SYMMETRIC, AXIAL_ROTOR
 

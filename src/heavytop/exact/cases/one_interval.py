@@ -335,6 +335,7 @@ class Steklov(WithBearing, ClosedForm):
     """
 
     method = "closed form: Steklov, inversion of an elliptic integral"
+    source = "V. A. Steklov (1899); formulas derived in the program"
     body = *ON_AXIS_1, ExactRelation("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, differ)
     starts = (
         GAMMA,

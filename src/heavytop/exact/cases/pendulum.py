@@ -62,6 +62,7 @@ class Pendulum(WithAttitude):
     """
 
     method = "closed form: physical pendulum, Jacobi functions"
+    source = "E. T. Whittaker, Analytical Dynamics, chapter IV"
     body = (TORQUE,)
     starts = (
         GAMMA,

@@ -28,6 +28,7 @@ class Staude(WithAttitude):
 
     system: System = HEAVY_TOP
     method = "closed form: permanent rotation"
+    source = "O. Staude, J. reine angew. Math. 113 (1894) 318"
 
     def __post_init__(self) -> None:
         require("A permanent rotation", (equilibrium(self.system),), self.top, self.start)

@@ -69,10 +69,11 @@ _UNITS: tuple[Vector, ...] = tuple(tuple(Fraction(int(i == j)) for j in range(3)
 class ZhukovskyVolterra(ClosedForm):
     """The motion of a gyrostat without weight, γ of any length and direction.
 
-    Raises NotInClass where n is not 0, LevelNotDone where M(t) is no elliptic function but a limit of some.
+    Raises NotInClass where n is not 0, LevelNotDone where M(t) is not an elliptic function but a limit of some.
     """
 
     method = "closed form: Zhukovsky-Volterra, Weierstrass functions"
+    source = "N. E. Zhukovsky (1885); V. Volterra, Acta Math. 22 (1899) 201; formulas derived in the program"
     system = HEAVY_GYROSTAT
     body = (NO_TORQUE,)
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, inf, log10
 from threading import Lock
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from flint import arb, arb_series
 from gmpy2 import mpq
@@ -51,6 +51,7 @@ from heavytop.exact.flint.balls import (
     whole_evaluation,
     working_precision,
 )
+from heavytop.exact.resolved import Uncertainty
 from heavytop.extras import has_extra
 from heavytop.multiword.codegen.recurrence import rates
 from heavytop.multiword.fixed_point import fixed_point_run
@@ -317,7 +318,7 @@ class ScaledMotion:
         return None if self.grid(precision) is None else self.certified(precision)
 
     def grid(self, precision: int) -> Grid | None:
-        """That of so many bits; None where there is none."""
+        """That of so many bits; None where absent."""
         return next((grid for grid in _GRIDS if self.in_words and grid.total == precision), None)
 
     def seconds(self, planned: tuple[int, bool], lost: float, steps: float) -> float:
@@ -376,17 +377,6 @@ def _ladder(bits: float) -> int:
     return -(-whole // unit) * unit
 
 
-@dataclass(frozen=True, slots=True)
-class Uncertainty:
-    """How far the true motion is from the rational data that stand for it.
-
-    start: of each component of (Ω, γ, ξ) at t = 0.  rate: of each component of Ω', at any time of the true motion.
-    """
-
-    start: tuple[Fraction, ...]
-    rate: Fraction
-
-
 _PILOT_BITS = 128
 _PILOT_ROOM = 72
 """The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
@@ -423,6 +413,7 @@ class Validated:
     xi: Vector | None = None
     effort: float = EFFORT
     method: str = "validated: Taylor enclosure"
+    source: ClassVar[str] = "theorem of a step: exact/enclosure/step.py of the program"
     uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], EnclosureRun] = field(

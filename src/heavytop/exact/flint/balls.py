@@ -374,7 +374,7 @@ _RADIUS_DIGITS = 3
 _ENOUGH = 1 << 15
 """Working bits that are always tried: tops whose moments, weight and spin differ by a thousand decades need them."""
 _SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient would not be a power series")
-"""What python-flint says of a division by a power series whose first coefficient may be 0, instead of nan."""
+"""Message of python-flint on a division by a power series whose first coefficient may be 0, instead of nan."""
 
 
 class Undecided(ArithmeticError):

@@ -25,7 +25,7 @@ def body(
 
     Says whether a body has it, and if not, which slip makes it one.
 
-    Exit 0 for a body, 1 where there is none with this tensor or the tensor is implausible, 2 for a file that cannot be
+    Exit 0 for a body, 1 where none has this tensor or it is implausible, 2 for a file that cannot be
     read.  Prints the body as a table for a plan.
     """
     from heavytop.features.body.document import assess

@@ -1,4 +1,4 @@
-"""What `heavytop body` says of the mass properties in a file: as JSON, as text, as the table of a plan."""
+"""Answer of `heavytop body` on the mass properties in a file: as JSON, as text, as the table of a plan."""
 
 from __future__ import annotations
 

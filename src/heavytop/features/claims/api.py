@@ -31,8 +31,7 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
         An :class:`Audit`; ``verdict`` is "holds" only where every equation is proven on its whole domain.
 
     Raises:
-        InputError: for an unknown claim, system or branch, for a file that is no claim, and for one whose audit takes
-            too long.
+        InputError: for an unknown claim, system or branch, a file without a claim, and one whose audit takes too long.
     """
     if branch is not None:
         require_branch(arguments.text(branch, "branch"))

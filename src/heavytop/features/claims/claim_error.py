@@ -185,7 +185,7 @@ DIGITS = 6
 """Significant digits of the time in reports."""
 _BITS = 128
 _SHORTEST = Fraction(1, 2**80)
-"""Of an interval, relative to the time: shorter ones tell nothing at this working precision."""
+"""Length of an interval, relative to the time: shorter ones tell nothing at this working precision."""
 _EFFORT = 20.0
 """Seconds that a validated truth may cost."""
 

@@ -77,7 +77,7 @@ def claims(
     tag: Annotated[str | None, typer.Option(help="Only those with that tag, such as a class or a system.")] = None,
     json: Json = False,
 ) -> int:
-    """List the library of published claims, by verdict.
+    """List published claims and usual misprints, by verdict.
 
     Proven or refuted by `heavytop audit NAME`; verdicts that are not known from before take a second each.
     """

@@ -120,6 +120,8 @@ def audit_text(report: Audit) -> RenderableType:
         return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
     parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
     parts += [Text(f'With assume = [..., "{bound}"] the verdict is: {verdict}.') for bound, verdict in report.deciding]
+    if report.unused:
+        parts.append(Text(f"No formula uses {', '.join(report.unused)} of [parameters]."))
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
         parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
@@ -139,12 +141,15 @@ def _entry(report: Audit) -> list[RenderableType]:
 
 
 def _table(report: Audit) -> Table:
+    """A line a statement; branch and domain stand in it where the claim has more than the smooth one and all times."""
+    usual = {"branch": {"smooth"}, "domain": {"all"}}
+    own = [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
     table = Table(box=None, pad_edge=False)
-    for name in ("equation", "branch", "domain", "verdict", "residual", "statement"):
-        table.add_column(name, overflow="fold", no_wrap=name in ("equation", "branch", "domain", "verdict"))
+    for name in ("equation", *own, "verdict", "residual", "statement"):
+        table.add_column(name, overflow="fold", no_wrap=name not in ("residual", "statement"))
     for row in report.rows:
         verdict = Text(VERDICTS[row.holds], style=_AUDIT_STYLES[row.holds])
-        cells = (Text(value) for value in (_label(row), row.branch, row.domain))
+        cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in own)))
         table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
     return table
 

@@ -39,7 +39,7 @@ class DerivativeScore(Tabular):
     worst: the name of the entry with that error at each, such as ``∂Ω1/∂γ2(0)``; errors: its |error|/max(1, |value|).
     of_digits: decimal digits of what was given.  against: what it was compared with, and its largest radius.
     diagnosis: a convention that fits better, a sentence each.
-    passed: whether as many digits are right as were required; None, which is no pass, where that is not known.
+    passed: whether as many digits are right as were required; None, not a pass, where that is not known.
     """
 
     outcome: str
@@ -93,7 +93,7 @@ def score_derivatives(
         A :class:`DerivativeScore`.
 
     Raises:
-        InputError: for what is no motion, time or number, and for arrays of another shape.
+        InputError: for an invalid motion, time or number, and for arrays of another shape.
         OutOfReach: where the derivatives cannot be proven to so many digits.
     """
     needed = None if require is None else required(require)

@@ -14,12 +14,11 @@ from heavytop.harness.plan import positive, uniform
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, run_with_attitude
 from heavytop.integrate.trajectory import Problem, ResumePoint, Trajectory
 from heavytop.kind import Kind, with_explanation
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
+from heavytop.records import HEYOKA, NOISE, NOT_CARRIED, NOT_MEASURED, Beside, Metric, Row
 from heavytop.report.document.document import Block, Chart
 from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
 from heavytop.report.render.plots import digits, growth
@@ -98,7 +97,7 @@ class DriftKind(Kind):
         a place reached with other flags.
         """
         if task.options.attitude and task.integrator.carries_attitude:
-            return _with_attitude(task)
+            return _row(task, *run_with_attitude(task))
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # samples are taken at the rounded times, so the series must be asked for by these
@@ -150,11 +149,6 @@ def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
     assert task.case is not None
     plain = Problem.of(task.case.top, task.given.start, DOUBLE, task.given.system)
     return Reruns(plain, task.integrator, task.seed).drift_bands(run, task.times, scorer.metrics(), scorer.truth)
-
-
-def _with_attitude(task: Task) -> Row:
-    """The row of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
-    return _row(task, *run_with_attitude(task))
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

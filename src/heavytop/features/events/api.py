@@ -10,9 +10,9 @@ from typing import Any, overload
 from heavytop import arguments
 from heavytop.arguments import Number
 from heavytop.errors import InputError, OutOfReach, prefixed, quoted
-from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import require_handy, value_text
+from heavytop.exact.resolved import Resolved, resolve
 from heavytop.features.events.functions import (
     PROVEN,
     EventFunction,
@@ -110,11 +110,11 @@ def events(
     Returns:
         :class:`Events`: ``times`` (n,), ``states`` (n, 6) and ``directions`` (n,), each time and state rounded once
         from the Taylor polynomial of its step, and ``guarantee``; or with ``digits`` :class:`ReferenceEvents`, whose
-        times and states are balls. t = 0 is no event, also where the function vanishes there; a zero that is only
-        touched is none.
+        times and states are balls. t = 0 is not an event, also where the function vanishes there; a zero that is only
+        touched is not.
 
     Raises:
-        InputError: for what is no motion, time or function; where the function is zero along the motion, or raises.
+        InputError: for an invalid motion, time or function; where the function is zero along the motion, or raises.
         OutOfReach: for more than 1e8 steps; with ``digits`` beyond the reach of the enclosure, and where it is not
             decided whether the function changes sign or only touches zero.
     """

@@ -30,7 +30,7 @@ class EventOptions(NamedTuple):
     event_direction: Direction = 0
 
     def require(self) -> str:
-        """Raises InputError for what is no function or direction."""
+        """Raises InputError for an invalid function or direction."""
         from heavytop.features.events.api import require_direction
         from heavytop.features.events.functions import event_function
 

@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 from flint import arb, arb_poly
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
-from heavytop.exact.bodies import Resolved
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import Step
 from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
+from heavytop.exact.resolved import Resolved
 from heavytop.features.events.functions import (
     EventFunction,
     composed,

@@ -19,13 +19,13 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, input_roundin
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kind import Kind
 from heavytop.measure.attitude_error import AttitudeScorer
-from heavytop.measure.integrator import HEYOKA, Ended, complete, growing
+from heavytop.measure.integrator import Ended, complete, growing
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import DRIFT, Scorer
 from heavytop.measure.truth import EnsembleReference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
-from heavytop.report.document.document import Block, Cell, Chart, computed_by, short
+from heavytop.records import HEYOKA, NOT_CARRIED, Beside, Law, Metric, Quantity, Row, by_name
+from heavytop.report.document.document import Block, Cell, Chart, computed_by, integral_text, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import laws_headline
 from heavytop.report.render.plots import digits
@@ -131,7 +131,7 @@ class Growth(Kind):
     place = 50
 
     def carries_band(self, metric: Metric) -> bool:
-        """Every error; how many starts failed is none."""
+        """Every error; the number of failed starts is not one."""
         return super().carries_band(metric) and metric.quantity != FAILED
 
     def least_band(self, starts: int) -> float:
@@ -188,7 +188,7 @@ class Growth(Kind):
         notes += [f"No attitude, which it does not carry: {', '.join(lacking)}."] if lacking else []
         columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
         columns.append("lost at |t|")
-        title = "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
+        title = "Growth laws: root mean square over the starts, of drifts of first integrals and errors"
         cells = [_cells(row, law) for row in rows for law in row.laws.values()]
         yield Cells(title, columns, cells, notes)
         yield from (Chart(digits), Chart(over_time))
@@ -263,8 +263,12 @@ def _label(law: Law) -> str:
     """The quantity of a law, in words."""
     quantity = law.quantity or Quantity("")
     if quantity.name == DRIFT:
-        return quantity.component
-    return f"error {quantity.component or quantity.name.removesuffix('_error')}"
+        return integral_text(quantity.component)
+    component = quantity.component or quantity.name.removesuffix("_error")
+    return f"error {_SYMBOLS.get(component, component)}"
+
+
+_SYMBOLS = {"omega": "Ω", "gamma": "γ"}
 
 
 def _exponent(law: Law) -> str:

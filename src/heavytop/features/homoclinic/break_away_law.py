@@ -13,10 +13,9 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import (
     DASHED,
     Block,
@@ -125,8 +124,8 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "Escape times",
         [
             "A homoclinic motion tends to a saddle, which multiplies every rounding error by e^(rate·|t|). No "
-            "integrator stays on it: more digits buy time in proportion. Dashed: the law, ln 2 / rate time units per "
-            "bit, through the mean of the points."
+            "integrator stays on it: more digits buy time in proportion. Rate: the growth rate at the saddle. Dashed: "
+            "the law, ln 2 / rate time units per bit, through the mean of the points."
         ],
         columns=["case", "escape |t| per format", "slope (time per bit)", "ln 2 / rate"],
         place=40,
@@ -154,8 +153,7 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         section.rows.append([label, listed, short(measured), short(expected)])
     if slopes:
         section.key(_LAW)
-    axes.set_xlim(left=0)
-    axes.set_ylim(bottom=0)
+    axes.set(xlim=(0, 1.06 * axes.dataLim.x1), ylim=(0, 1.06 * axes.dataLim.y1))
     section.pictures.append(finish(axes, "Escape time against bits", spoken(alternative), "break-away"))
     return section
 
@@ -211,8 +209,9 @@ class BreakAwayLaw(Kind):
         slopes, off = ([float(row.metrics[metric.text]) for row in rows if row.metrics] for metric in (SLOPE, OFF_BY))
         if slopes:
             low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
-            buys = f"A bit of the format buys {low if low == high else f'{low} to {high}'} time units before the escape"
-            yield Headline(f"{buys}: ln 2 / rate within {100 * max(off):.2g} %.")
+            delay = low if low == high else f"{low} to {high}"
+            law = f"ln 2 / growth rate at the saddle, within {100 * max(off):.2g} %"
+            yield Headline(f"Each bit of the format delays the escape by {delay} time units: {law}.")
         yield Table(
             "Escape time gained per bit of the format",
             ("case", "measured", "ln 2 / rate", "off by"),

@@ -18,13 +18,12 @@ from heavytop.harness.plan import samples, signed
 from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row, time_metric
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import DRIFT, INTEGRATION_ERROR, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
-from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip, short
 from heavytop.report.document.document import Table as Cells
@@ -146,8 +145,8 @@ class Homoclinic(Kind):
             both((row, _cells(row)) for row in rows),
             [
                 "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first "
-                "integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost. α: the "
-                "angular velocity of the rotation that the motion tends to; of none, the largest |Ωi| at the start.",
+                "integral, of all samples; escape: when Ω is first off by 1e-3 α. α: the "
+                "angular velocity of the rotation that the motion tends to; else the largest |Ωi| at the start.",
                 NOISE_BAND,
             ],
         )

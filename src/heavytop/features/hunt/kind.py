@@ -15,11 +15,10 @@ from heavytop.harness.plan import positive
 from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, failed
 from heavytop.integrate.registry import described
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, exact_text, parse, time_text
-from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document.document import Block, Card, In, Note
+from heavytop.records import HEYOKA, Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document.document import Block, Card, In, Note, short
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 
 NAME = "hunt"
@@ -141,5 +140,6 @@ def _measured(hunted: Hunted) -> str:
 
 
 def _line(row: Row) -> str:
-    worst = row.metrics[WORST.text].value
-    return f"{row.case} {row.integrator} {row.precision}: nothing found; the worst is {worst} of what is explained"
+    worst = short(row.metrics[WORST.text].value)
+    about = f"the worst error is {worst} times what law and amplification explain"
+    return f"{row.case} {row.integrator} {row.precision}: nothing found; {about}"

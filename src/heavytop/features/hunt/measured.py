@@ -425,7 +425,7 @@ class MeasuredMotion:
 
     outcome: of its run; "" where the truth is unknown, and nothing can be said.  error: infinite of a run that did not
     reach its horizon.  amplification: of the motion.  turns: its rate times the horizon.
-    other: the error of the integrator that it is compared with, None where there is none.
+    other: the error of the integrator that it is compared with, None where absent.
     """
 
     motion: Motion

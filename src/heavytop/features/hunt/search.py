@@ -41,11 +41,10 @@ from heavytop.harness.case_text import forms
 from heavytop.harness.plan import Top, document_of
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import Precision, decimal_text, shown, time_text
-from heavytop.records import OUT_OF_TIME
+from heavytop.records import HEYOKA, MULTIWORD, OUT_OF_TIME
 from heavytop.top.amplification import rate
 from heavytop.top.equations import GYROSTAT, system_of
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
@@ -297,7 +296,7 @@ _LEAST_LAW = 0.05
 _LOST = 0.01
 """An error that would be explained up to here says nothing: the format has lost all significant digits."""
 _SPARE = 0.8
-"""Of a budget in seconds; the rest is for shrinking and proving."""
+"""Part of a budget in seconds; the rest is for shrinking and proving."""
 
 Advance = Callable[[int, int], None]
 """Told (motions done, motions in all)."""
@@ -541,7 +540,7 @@ def documents(hunted: Hunted, integrator: str) -> list[dict[str, Any]]:
 
 
 def digits_lost(error: float, eps: float) -> float:
-    """Decimal digits of the format that an error costs: all of them where there is no result."""
+    """Decimal digits of the format that an error costs: all of them without a result."""
     if math.isinf(error):
         return round(-math.log10(eps), 1)
     return round(min(max(math.log10(max(error, eps) / eps), 0.0), -math.log10(eps)), 1)
@@ -587,7 +586,7 @@ def _document(asked: Asked, m: MeasuredMotion, proven: Proof, integrator: str, n
 
 
 def kept(path: Path) -> tuple[Motion, ...]:
-    """The motions that a file keeps, none where there is no file yet; raises InputError for any other file."""
+    """The motions that a file keeps, none before the file exists; raises InputError for any other file."""
     try:
         document = document_of(path.read_text("utf-8"))
         if document.keys() - {"top"}:

@@ -97,7 +97,7 @@ def _found(hunted: Hunted, number: int, document: dict[str, Any], m: MeasuredMot
 
 def _right(error: float, eps: float) -> str:
     """Digits right, at most those of the format."""
-    return f"{-math.log10(eps) - digits_lost(error, eps):.1f}"
+    return f"{-math.log10(eps) - digits_lost(error, eps):z.1f}"
 
 
 def _beside(other: Integrator, p: Proof, eps: float) -> str:

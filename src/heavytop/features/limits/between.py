@@ -83,7 +83,7 @@ def between_samples(
         and "lagrange" (of Ω and γ), measured at seven points of each interval.
 
     Raises:
-        InputError: for what is no motion, for more than 20,000 intervals, and for other numbers.
+        InputError: for an invalid motion, for more than 20,000 intervals, and for other numbers.
     """
     body, state = arguments.motion(top, start)
     about, end, step = arguments.system(system, body), exact(until), exact(spacing)

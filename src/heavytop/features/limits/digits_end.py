@@ -91,7 +91,7 @@ class DigitsEnd(Tabular):
 
     def _table(self) -> TitledTable:
         rows = [
-            (decimal_text(time, 6), f"{digits:.1f}")
+            (decimal_text(time, 6), f"{digits:z.1f}")
             for time, digits in [*zip(self.times, self.digits, strict=True)][_EACH - 1 :: _EACH]
         ]
         title = f"Digits that one rounding to {self.precision} leaves, of {self.of_digits:.1f}"
@@ -116,7 +116,7 @@ def digits_end(
         A ``DigitsEnd``: ``first`` and ``last`` with ``time``, ``rounded_at`` and ``proven``; ``digits`` (64,).
 
     Raises:
-        InputError: for what is no motion or time, and for the gyrostat of the paper.
+        InputError: for an invalid motion or time, and for the gyrostat of the paper.
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)

@@ -52,7 +52,7 @@ class LimitOptions(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """What was measured, by the keys of the document."""
+    """Measurements, by the keys of the document."""
 
     found: dict[str, Any]
 

@@ -30,7 +30,7 @@ from heavytop.top.inertia_slips import minus, plus, six_of, steiner
 Motion = tuple[HeavyTop | Body, State, System]
 _MOST = 100_000
 _SUBSTEP = 1 / 16
-"""Of a radian, for the classical Runge-Kutta method."""
+"""Part of a radian, for the classical Runge-Kutta method."""
 _G = Fraction("9.8") / Fraction("9.81")
 
 
@@ -125,7 +125,7 @@ def power(
         A ``Power``: ``faults`` with ``name``, ``detected_from`` and ``tolerance``; ``error``, ``passes``.
 
     Raises:
-        InputError: for what is no motion, an unknown fault, more than 100,000 samples, and for other numbers.
+        InputError: for an invalid motion, an unknown fault, more than 100,000 samples, and for other numbers.
     """
     body, state = arguments.motion(top, start)
     motion = body, state, arguments.system(system, body)
@@ -134,7 +134,8 @@ def power(
     end, most = exact(until), exact(tolerance)
     apart = end / 100 if step is None else exact(step)
     if not (0 < apart <= end and most > 0):
-        raise InputError("until, step and tolerance must be positive, and step at most until.", "Give such as 10, 0.1.")
+        asked = f"until = {until}, step = {apart}, tolerance = {tolerance}"
+        raise InputError(f"{asked}: these must be positive, and step at most until.", "Give such as 10, 0.1, 1e-6.")
     count = int(end // apart)
     if count > _MOST:
         raise InputError(f"{count} samples are more than {_MOST}.", "Give a larger step, or an earlier end.")

@@ -31,7 +31,7 @@ _DROP, _ALIKE = 100.0, 30.0
 _ROUNDINGS = 1e4
 """Of eps and the size of the state: smaller errors of a step are not asked about."""
 _RADIANS = 1 / 32
-"""Of a substep, whose error of order 4 is 1e-10 of it."""
+"""Part of a step that a substep is, whose error of order 4 is 1e-10 of it."""
 _ACTIVE = 1e-4
 """Of the whole field: a factor that moves less of a motion is not fitted."""
 _SMALL = 1e-3

@@ -24,11 +24,10 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, computed_row
 from heavytop.integrate.registry import Integrator, is_third_party, load
 from heavytop.integrate.trajectory import Outcome, TaylorStep, Trajectory
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import OBSERVED_ORDER, ORDER_OF_RUNS
 from heavytop.precision import decimal_text, exact, parse
-from heavytop.records import Against, Beside, Explained, Metric, Quantity, Row, by_name
+from heavytop.records import HEYOKA, Against, Beside, Explained, Metric, Quantity, Row, by_name
 from heavytop.report.document.document import Block, Cell, Headline, In, Note, Value, clip, computed_by, short
 from heavytop.report.document.document import Table as Cells
 
@@ -171,7 +170,7 @@ def _size(row: Row) -> float:
 
 
 def _number(row: Row, name: str) -> str:
-    """The metric in short; "" where there is none."""
+    """The metric in short; "" where absent."""
     metric = row.metrics.get(name)
     return "" if metric is None or metric.value == "missing" else short(metric.value)
 

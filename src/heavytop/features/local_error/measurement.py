@@ -235,7 +235,7 @@ def error_at_end(run: Trajectory) -> Fraction:
     return off
 
 
-# The order of whole runs, which that of single steps is no evidence of where a method keeps a memory.
+# The order of whole runs, of which single steps are not evidence where a method keeps a memory.
 
 
 _REFINED = (0, -1, -2, -3, -4)

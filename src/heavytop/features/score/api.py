@@ -107,7 +107,7 @@ class Score(Tabular):
     against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
     of_digits: decimal digits of the format.  peer: heyoka's own run over the same times in the same format; None
     without a reference, and where heyoka does not get there.  diagnosis: what explains the error, a sentence each.
-    passed: whether as many digits are right as were required; None, which is no pass, where the run ended early or that
+    passed: whether as many digits are right as were required; None, not a pass, where the run ended early or that
     is not known.
     used: which columns were scored, in a sentence, where these are not Ω and γ in principal axes.
     assessment, needed, sha256: what all of it is made of, the digits required, and the checksum of the file.
@@ -228,7 +228,7 @@ def score(
         A :class:`Score`.
 
     Raises:
-        InputError: for what is no motion, time or number, and for arrays of another shape.
+        InputError: for an invalid motion, time or number, and for arrays of another shape.
         Contradiction: where two proofs of the known motion exclude each other.
     """
     needed = None if require is None else required(require)
@@ -276,7 +276,7 @@ def read_trajectory(
         require, normalize: as in :func:`score`.
 
     Raises:
-        InputError: for a file that is no trajectory, an unknown case, and digits that are no positive number.
+        InputError: for a file that holds no trajectory, an unknown case, and digits that are not positive.
     """
     from heavytop.cases import case as case_named
     from heavytop.features.score.trajectories.files import read
@@ -334,7 +334,7 @@ def drift(run: Trajectory) -> Drifts:
         integral: largest, root mean square and last over the samples.  With an attitude also |ξ|² and ξ·γ.
 
     Raises:
-        InputError: for what is no trajectory, and for one whose states went to an observer.
+        InputError: for an invalid trajectory, and for one whose states went to an observer.
 
     Source:
         (1.3) of the paper, and the integrals of the classical cases.

@@ -69,7 +69,7 @@ def score(
     motion, needed = read_trajectory(trajectory, case, require=require, normalize=normalize)
     for warning in motion.warnings():
         say(f"warning: {warning}")
-    with counted("score", 2 * len(motion.times), "states", _STATE_SECONDS) as advance:
+    with counted("score", 2 * len(motion.times), "states of it and heyoka's", _STATE_SECONDS) as advance:
         score = scored(motion, needed, advance)
     if out is not None:
         _write_report(score.report(), out)

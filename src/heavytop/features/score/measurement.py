@@ -37,7 +37,7 @@ from heavytop.measure.scalar import (
 )
 from heavytop.measure.scorer import SOLUTION_ERROR, DriftAndError, Running, Scorer, Sums
 from heavytop.measure.truth import truth
-from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, round_to, shown, time_text
+from heavytop.precision import DOUBLE_DOUBLE, Precision, decimal_text, dot, exact, plain_decimal, round_to, time_text
 from heavytop.records import Metric, Peer, Quantity, Row, RowKey, Subject, by_name
 
 Progress = Callable[[], None]
@@ -150,7 +150,7 @@ def _lengths(observed: Observed, times: Sequence[Fraction], precision: Precision
         return None
     worst = max(range(len(off)), key=lambda row: off[row])
     size = decimal_text(off[worst], 3)
-    return Diagnosis("quaternion_length", {"off": size, "t": shown(times[worst])}, float(off[worst]))
+    return Diagnosis("quaternion_length", {"off": size, "t": plain_decimal(times[worst], 6)}, float(off[worst]))
 
 
 def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
@@ -162,7 +162,7 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
         if float(off.max()) > _OVERLAP:
             row = int(numpy.argmax(off > _OVERLAP))
             numbers = {"columns": f"{_WORDS[one]} and {_WORDS[other]}", "by": f"{float(off.max()):.2e}"}
-            said.append(Diagnosis("columns_disagree", {**numbers, "t": shown(times[row])}))
+            said.append(Diagnosis("columns_disagree", {**numbers, "t": plain_decimal(times[row], 6)}))
     return said
 
 
@@ -430,7 +430,7 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
 def passed(row: Row, needed: Fraction | None) -> bool | None:
     """Whether so many digits are right; False where fewer are, also of a run that ended early.
 
-    None, which is no pass, where it ended early, and where it is not known how many are right, or only that so many are
+    None, not a pass, where it ended early, and where it is not known how many are right, or only that so many are
     which the reference resolves.  needed: None for no demand.
     """
     good = None if not complete(row) else True

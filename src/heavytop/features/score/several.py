@@ -27,7 +27,7 @@ _WIDTH = 44
 
 @dataclass(frozen=True, slots=True)
 class ScoredFile:
-    """A file with its score, or why there is none.
+    """A file with its score, or why it is missing.
 
     method: what files have in common that differ in their step alone; step: 0 where the file does not say it.
     """
@@ -111,7 +111,7 @@ def text(files: Sequence[ScoredFile]) -> str:
     lines = [f"{'file':{width}}  digits right  explained by"]
     lines += [f"{clip(file.path, width):{width}}  {file.digits:>12}  {file.explained}".rstrip() for file in files]
     for order in orders(files):
-        said = f"order {order.order:.1f} over {len(order.paths)} steps"
+        said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")
     return "\n".join(lines)
 

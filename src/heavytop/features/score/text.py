@@ -68,6 +68,13 @@ _CONVENTION_SENTENCES = {
     "up": "Another axis points up: up = {up}",
     "left_handed": "The axes are left-handed: the {axis} axis is reversed",
     "inertia_about": "The inertia tensor is that about the {about}",
+    "steiner": "The inertia tensor is the one that is given and {times} times its Steiner term, m (r² 1 − r rᵀ)",
+    "weight": "The weight is {factor} times the one that is given",
+    "mass": "The mass is {factor} times the one that is given, in the weight and in the Steiner term",
+    "top": "{number} of the body is {factor} times the one that is given",
+    "start": "The motion starts elsewhere: turned by {angle} degrees, with Ω = ({omega}) in body axes",
+    "column_scaled": "{column} is {factor} times what fits",
+    "column_order": "The columns of {columns} stand in each other's place",
     "no_gravity": "There is no gravity in this motion: gravity = 0 fits",
     "free_about_centre_of_mass": "The body turns freely about its centre of mass: it is not held at the fixed point",
     "tensor_axes_conjugated": "The principal axes of the inertia tensor are turned the other way: Qᵀ D Q for Q D Qᵀ",
@@ -121,6 +128,7 @@ def sentence(fit: Diagnosis) -> str:
         apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
         return f"Columns contradict each other: {apart}."
     said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
+    said += f" ({numbers['entries']} alone)" if "entries" in numbers else ""
     said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
     where = {
         "columns": ", in the columns but not in the start",
@@ -182,6 +190,8 @@ _SENTENCES = {
     "system": "The states fit the system {other_system}, not {system}",
     "times_shifted": "The times are shifted: the state given at t is that at t {signed}",
     "component_sign": "The equation of {column} has the other sign: the states fit with its derivative negated",
+    "term_missing": "The equation of {column} lacks {term}: the states fit without it",
+    "term_sign": "In the equation of {column} {term} has the other sign: the states fit so",
     "weight": "The states fit another weight: {named}",
     "start": "The states fit another start: {named}",
     "top": "The states fit another top: {named}",
@@ -197,7 +207,7 @@ _SENTENCES = {
     "row_twice": "A row too many: from t = {t} on, the states are those of the times before",
     "column_order": "The columns stand in another order: they are {columns}",
     "axes_of_space": "{whose} given in axes fixed in space, of which axis {vertical} is vertical",
-    "frozen": "From t = {t} on nothing moves: {states} states are the same.",
+    "frozen": "From t = {t} on {still} the same.",
     "constant": "Every state is the same: nothing moves.",
     "reset": "From t = {t} on the motion starts again: the program went back to its start",
     "clock": "The times are off multiples of the step {step} by {off} at most, as a sum of steps is: at the multiples "
@@ -257,8 +267,13 @@ def _said(fit: Diagnosis, system: str) -> str:
         "signed": _signed(numbers.get("shift", "")),
         "whose": _WHOSE.get(numbers.get("of", ""), ""),
         "in_full": _IN_FULL,
+        "still": _still(**numbers) if fit.kind == "frozen" else "",
     }
     return text.format(**more, **numbers)
+
+
+def _still(states: str, vector: str = "", **_: str) -> str:
+    return f"{vector} does not move: in {states} states it is" if vector else f"nothing moves: {states} states are"
 
 
 def _time_unit(factor: str, steps: str = "") -> str:
@@ -484,8 +499,8 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
         "over-time",
         "Digits right over time",
         [
-            "Digits right: −log10 of the error along the flow (phase), across it, of the attitude in radians, of the "
-            f"position. Dashed: all {most:.0f} digits of {row.precision}."
+            f"−log10 of the error: {', '.join(held)}; the verdict counts the worst component of Ω and γ. "
+            f"Dashed: all {most:.0f} digits of {row.precision}."
         ],
         columns=["t", *held],
     )
@@ -507,6 +522,8 @@ def digits_over_time(sources: Sources, first: Iterable[str] = ()) -> Section | N
 
     at = [dict(zip(series.times, series.values, strict=True)) for series in held.values()]
     times = dict.fromkeys(time for values in at for time in values)
+    if row.samples > len(times):
+        section.notes.append(f"{len(times)} of {row.samples} samples, evenly in log |t|; the errors are those of all.")
     section.rows = [[short(time), *(cell(values.get(time, "")) for values in at)] for time in times]
     section.pictures.append(finish(axes, section.title, spoken(alternative), section.id))
     return section

@@ -27,7 +27,7 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
         is missing.
 
     Raises:
-        InputError: where there is no survey, for a column that is not there, and where pandas (of a lazy one, polars)
+        InputError: without a survey, for a column that is not there, and where pandas (of a lazy one, polars)
             is not installed.
     """
     where = arguments.path(path, "path")

@@ -45,8 +45,8 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
         "surveys",
         "Surveys of many motions",
         [
-            "A distribution is the part of the motions in each quarter of a decade. In the map a cell is the darker "
-            "the fewer digits are right in it (the median). Each of the worst motions is drawn as the path of the "
+            "A distribution is the part of the motions in each quarter of a decade. In the map a stronger colour "
+            "means fewer digits right (the median). Each of the worst motions is drawn as the path of the "
             f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {_LONGEST}; dashed behind.",
         ],
         columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
@@ -97,7 +97,7 @@ def _distribution(section: Section, rows: Sequence[tuple[str, Row]], keys: Keys,
         part = numpy.array([0, *histogram.counts, 0]) / sum(histogram.counts)
         middles = histogram.first + histogram.width * (numpy.arange(len(part)) - 0.5)
         draw(axes, key, middles, part)
-        alternative.append(f"{key.label}: most at 10^{middles[int(part.argmax())]:.1f}.")
+        alternative.append(f"{key.label}: most at 10^{middles[int(part.argmax())]:z.1f}.")
     axes.set_ylim(bottom=0)
     return finish(axes, f"Distribution: {_NAMES[name]}", spoken(alternative), f"survey-{name.replace('_', '-')}")
 
@@ -122,13 +122,14 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
             if value is not None:
                 paint(left, bottom, right - left, top - bottom, value)
     axes.set_xlim(cells.x_edges[0], cells.x_edges[-1])
+    axes.locator_params(axis="x", nbins=6)
     axes.set_ylim(cells.y_edges[0], cells.y_edges[-1])
     for step in range(_SHADES):
         lost = high + (low - high) * step / (_SHADES - 1)
         paint(0.3 + 0.4 * step / _SHADES, 1.005, 0.4 / _SHADES, 0.03, lost, transform=axes.transAxes, clip_on=False)
     for position, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
         axes.text(position, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
-    said = f"From {digits - high:.1f} digits right, the darkest, to {digits - low:.1f}, the lightest."
+    said = f"From {digits - high:.1f} digits right, the strongest colour, to {digits - low:.1f}, the faintest."
     return finish(axes, f"Digits right over {x} and {y}: {label}", said, name, said)
 
 

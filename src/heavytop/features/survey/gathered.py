@@ -90,7 +90,7 @@ def write(path: Path, chunks: Iterable[bytes]) -> None:
 
 
 WIDTH = 0.25
-"""Of a bin, in decades."""
+"""Width of a bin, in decades."""
 _CELLS = 24
 _MOST_BINS = 2000
 _FIRST = ("omega", "gamma", "inertia", "moment", "rotor")

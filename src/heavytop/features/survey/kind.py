@@ -22,9 +22,8 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row
 from heavytop.harness.sweeps import Lazy, Sweep
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kind import Kind
-from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse
-from heavytop.records import Against, Beside, Metric, Row, Spread
+from heavytop.records import HEYOKA, Against, Beside, Metric, Row, Spread
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, short
 from heavytop.report.document.motions import LossLimits, WorseMotions
 
@@ -174,6 +173,10 @@ def _line(row: Row) -> str:
     if row.outcome != Outcome.SUCCESS.value:
         return f"{row.case} {row.integrator} {row.precision}: {row.outcome}"
     metrics = {part: row.metric("solution_error", "relative", part) for part in ("median", "q99", "max")}
-    said = ", ".join(f"{name} {float(metric):.2g}" for name, metric in metrics.items() if metric is not None)
+    said = ", ".join(
+        f"{name.replace('q99', '99 % below')} {float(metric):.2g}"
+        for name, metric in metrics.items()
+        if metric is not None
+    )
     worst = f"; the worst is {row.worst[0].case}" if isinstance(row.worst, tuple) and row.worst else ""
     return f"{row.case} {row.integrator} {row.precision} to T = {row.horizon}: {counts}; error: {said}{worst}"

@@ -25,10 +25,10 @@ from heavytop.integrate.heyoka.lanes import states_on_a_grid
 from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
+from heavytop.records import HEYOKA
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -263,7 +263,7 @@ def _alone(
 
 
 def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
-    """(motions, samples, 6) of native states, exact in two doubles; NaN where there is none."""
+    """(motions, samples, 6) of native states, exact in two doubles; NaN where absent."""
     high, low = (numpy.full((len(states), samples, 6), math.nan) for _ in range(2))
     for index, run in enumerate(states):
         if not len(run):

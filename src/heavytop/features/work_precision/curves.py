@@ -70,7 +70,7 @@ class WorkPrecisionLine:
     def order_text(self) -> str:
         """The order seen, and the declared one behind it; "-" where none is seen."""
         declared = f" (declared: {self.declared})" if self.declared else ""
-        return "-" if self.order is None else f"{round(self.order, 1) + 0.0:.1f}{declared}"
+        return "-" if self.order is None else f"{self.order:z.1f}{declared}"
 
     @property
     def label(self) -> str:
@@ -128,7 +128,7 @@ class Lead:
 
     @property
     def short(self) -> str:
-        """The ratios in a line, who is faster first; "" where there is none."""
+        """The ratios in a line, who is faster first; "" where absent."""
         if self.ratio is None:
             return ""
         if self.ratio < 1:

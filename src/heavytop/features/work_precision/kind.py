@@ -57,7 +57,7 @@ with other roundings, CVODE and splitting methods move by up to a decade."""
 
 
 class Options(NamedTuple):
-    """What is measured of a run beside the usual."""
+    """Further measurements of a run."""
 
     timings: bool = False
     attitude: bool = False

@@ -186,7 +186,7 @@ class Lanes:
             self._take_samples()
 
     def _load(self, lane: int) -> None:
-        """Put the next problem into the lane; when there is none, a dummy motion."""
+        """Put the next problem into the lane; without one, a dummy motion."""
         taken = self.work.take()
         parameters, state = arrays(taken[1]) if taken else _DUMMY
         run = _Run(*taken, perf_counter(), parameters) if taken else None

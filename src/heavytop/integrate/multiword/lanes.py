@@ -193,7 +193,7 @@ class WordsLanes:
                 self._leave(eight, lane, Outcome.NON_FINITE, eight.taken(lane, self.work.step_limit))
 
     def _record(self, motion: _Motion, native: Any) -> bool:
-        """Keep a sample, or send it to the observer; False where there is none, being too large for the format."""
+        """Keep a sample, or send it to the observer; False where absent, being too large for the format."""
         if native is None:
             return False
         self.work.keep(motion, native)

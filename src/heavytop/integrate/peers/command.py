@@ -28,7 +28,7 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.guard import Guard, how_it_ended, stopwatch
+from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number, rounded, vector
@@ -47,7 +47,6 @@ NOT_COUNTED = {"steps": "not counted"}
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
-_GREETING = 20.0
 _MANY = 4
 """States still due, from which on they are read several at a time: each waking of the reader slows the program."""
 _NAP, _NAP_SHARE, _NAP_LEFT = 1e-3, 1 / 4, 1 / 3
@@ -61,7 +60,7 @@ _FAREWELL = 0.3
 _MOST_OVERHEAD = 1e-3
 """Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
 _LEAST_SHARE = 0.1
-"""Of the seconds of a request, which remain at least: less than its noise is not measured."""
+"""Part of the seconds of a request, which remain at least: less than its noise is not measured."""
 _RESOLUTION = 1e-4
 """Seconds by which requests without times differ, on a busy machine; fewer are not resolved."""
 _DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -130,7 +129,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return CommandIntegrator(self)
 
     def argv(self) -> list[str]:
-        """The program as an absolute path and its arguments; raises PeerFailed where there is none to run."""
+        """The program as an absolute path and its arguments; raises PeerFailed if it is missing."""
         program, *rest = (sys.executable if part == PYTHON else part for part in self.command)
         path = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
         if not os.path.isfile(path):
@@ -543,14 +542,16 @@ class Session:
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         seconds = stopwatch(self.process.pid)
-        self._exchange(text, reply, "done", most)
-        reply.wall = seconds()
+        reply.wall = seconds(self._exchange(text, reply, "done", most))
         return reply
 
-    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> None:
-        """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then."""
+    def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str, seconds: float = inf) -> float:
+        """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then.
+
+        Returns for how many seconds this thread had no processor since it last found nothing to read.
+        """
         began, seconds = monotonic(), min(seconds, self.command.seconds)
-        deadline, awake_until = began + seconds, began + _AWAKE
+        deadline, awake_until, looked = began + seconds, began + _AWAKE, waited_for_processor()
         waiting = self._write(memoryview(text))
         if waiting:
             self._poll.register(self._in, select.POLLOUT)
@@ -558,16 +559,19 @@ class Session:
             if waiting and not (waiting := self._write(waiting)):
                 self._poll.unregister(self._in)
             if self._lines(reply):
-                return
+                return waited_for_processor() - looked
             left = deadline - monotonic()
             if left <= 0:
                 raise self._failed(f"did not say {awaited} within {seconds:g} s", answered=True)
             now = monotonic()
             awake = not waiting and reply.due < _MANY and now < awake_until
-            events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
-            if awake and not events:
-                os.sched_yield()
-                continue
+            waited = waited_for_processor()
+            events = self._poll.poll(0)
+            if not events:
+                looked = waited
+                if awake:
+                    continue
+                events = self._poll.poll(1000 * min(left, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             if events and not waiting and reply.due >= _MANY:
@@ -713,7 +717,7 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them; raises PeerFailed where it does not within 20 s."""
-    program = Session(msgspec.structs.replace(command, timeout=str(min(command.seconds, _GREETING))))
+    """Name and version as the program says them; raises PeerFailed where it does not within its timeout."""
+    program = Session(command)
     program.close(_FAREWELL)
     return program.greeting

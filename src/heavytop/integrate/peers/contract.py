@@ -132,7 +132,7 @@ def said(what: object) -> str:
     """Text of others, as one line of at most 200 characters that can be shown."""
     try:
         text = str(what)
-    except Exception:  # a message that cannot be made is none
+    except Exception:  # no message can be made
         return ""
     line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_SAID]).split())
     return line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
@@ -332,7 +332,9 @@ class CheckedPlugin:
         self._require(issubclass(type(returned), Trajectory), f"a {type(returned).__name__} instead of a Trajectory")
         began = perf_counter()
         run = SimpleNamespace(**{name: getattr(returned, name) for name in Trajectory.__slots__ if name != "problem"})
-        self._require(isinstance(run.outcome, Outcome), f"the outcome {said(repr(run.outcome))}, which is none")
+        self._require(
+            isinstance(run.outcome, Outcome), f"the outcome {said(repr(run.outcome))} instead of a member of Outcome"
+        )
         states = tuple(self._state(state, problem) for state in run.states)
         spent += perf_counter() - began
         self._require(len(states) <= len(asked), f"{len(states)} states for {len(asked)} times")

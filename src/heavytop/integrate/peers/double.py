@@ -155,7 +155,7 @@ def double_peer(
         began = perf_counter()
         solved = _from_start(name, request, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
-        flags = {control: repr(request.control), "field": field_kind()}
+        flags = {control: repr(request.control), "field": "python" if compiler().__module__ == __name__ else "numba"}
         return _judged(problem, name, order, request, solved, seconds, flags)
 
     def with_step(
@@ -301,11 +301,6 @@ def compiler() -> Callable[[Any], Any]:
     product = vectors.cross
     overload(product, strict=False)(lambda a, b: product)
     return numba.njit
-
-
-def field_kind() -> str:
-    """How the field is evaluated: the flag of a row."""
-    return "python" if compiler().__module__ == __name__ else "numba"
 
 
 def reader(system: System) -> Callable[[Any], Parameters]:

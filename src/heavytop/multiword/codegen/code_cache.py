@@ -32,7 +32,7 @@ def key_of(function: Any, arguments: tuple[Any, ...], processor: object) -> str:
 
 
 def read(key: str) -> tuple[bytes, bytes] | None:
-    """The code of a name and what stands beside it; None where there is none that can be trusted."""
+    """The code of a name and what stands beside it; None without one that can be trusted."""
     try:
         with (cache_folder("multiword") / key).open("rb") as file:
             status = os.fstat(file.fileno())

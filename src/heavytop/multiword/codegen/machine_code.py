@@ -182,7 +182,7 @@ def pointer(array: Doubles | Integers) -> Any:
 # Vectors of eight doubles in LLVM's intermediate representation, and loops over them.
 #
 # Every operation is one IEEE operation, rounded to nearest: no fast-math flag is ever set and nothing is contracted, so
-# the bits are those of any processor.  Only ``fma`` fuses, and where there is no such instruction it is computed.
+# the bits are those of any processor.  Only ``fma`` fuses, and without such an instruction it is computed.
 
 
 LANES = 8

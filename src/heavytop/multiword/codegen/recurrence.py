@@ -315,7 +315,7 @@ class Recurrence:
         ]
 
     def _gather(self, word: Operand, part: int) -> Operand:
-        """A summand of the products, of four, without its signs; 0 where there is none."""
+        """A summand of the products, of four, without its signs; 0 where absent."""
         lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
@@ -323,7 +323,7 @@ class Recurrence:
         return value if min(_signs(part)) >= 0 else value * self.code.constant(_signs(part))
 
     def _anywhere(self, word: Operand, part: int) -> Operand:
-        """A summand, of four, and any number where there is none."""
+        """A summand, of four, and any number where absent."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
     def constant(self, vector: int, row: int) -> Constant:
@@ -442,5 +442,5 @@ class Recurrence:
 
 
 def _signs(part: int) -> list[int]:
-    """The signs of a summand of the products, lane by lane; 0 where there is none."""
+    """The signs of a summand of the products, lane by lane; 0 where absent."""
     return [*(sign for _, sign in GATHERED[part]), 0, 0]

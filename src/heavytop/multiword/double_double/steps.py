@@ -75,7 +75,7 @@ _MOST_UNIT_BITS, STEEPEST = 400, 8
 _SPARSE, _ROOM = 2.0**-6, 8.0
 """The part of 2^21 units that a step uses at least; the next has between four and eight times what this one needed."""
 SLACK, TOLERATED_SLOPE = 0.25, 0.375
-"""What the slope exceeds log2 of the inverse radius by, and what it may have too much beside that."""
+"""Excess of the slope over log2 of the inverse radius, and what it may have too much beside that."""
 MOST_TRIES = 3
 _FRACTION_BITS, _BIAS = 52, 1023
 _EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS

@@ -68,7 +68,7 @@ from heavytop.multiword.problem import Scaled
 _UP = 1 + 2.0**-40
 _ROOM = 1 - 2.0**-20
 _BEHIND_ALONE = 2.0**-880
-"""What has no words before those is smaller."""
+"""Numbers without words before those are smaller."""
 _UNDERFLOW = 2.0**-1000
 """More than sizes lose below the smallest double."""
 

@@ -136,7 +136,7 @@ def _side(code: Code, y: list[Operand], which: Sum) -> list[Operand]:
 
 BITS = 24
 SUM_BITS = 38
-"""Of the sum of a level over 700 orders: 50 groups of orders in 8 tiles, or fewer in more, of 2^29 and 2^23 each."""
+"""Bits of the sum of a level over 700 orders: 50 groups in 8 tiles, or fewer in more, of 2^29 and 2^23 each."""
 _PRODUCTS = 120
 _ROUND = 1.5 * 2.0**52
 

@@ -29,7 +29,7 @@ MOST, _LONGEST, _CLIPPED = 8, 300, 20
 RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW, Verdict.SAME)
 """The verdicts, the worst first."""
 _ORDER_MOVED = 0.5
-"""An order between two settings that moved by less is no finding: errors near rounding bend it by as much."""
+"""An order between two settings that moved by less is not a finding: errors near rounding bend it by as much."""
 _DIGITS_MOVED = 0.1
 """Digits right that moved by less are said to one place, and so not at all."""
 _ENDS_AS_BEFORE = 0.5
@@ -97,7 +97,7 @@ class Change(NamedTuple):
         )
 
     def decades(self, name: str) -> float | None:
-        """Decades by which the error of that name grew; None for what is no error, or not a number in both rows."""
+        """Decades by which the error of that name grew; None for another metric, and where one is not a number."""
         old, new = (self.metric(row, name) for row in (self.old, self.new))
         if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
             return None
@@ -241,7 +241,7 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     """
     if not changes.rows:
         counted = same - sum(row.outcome in UNMEASURED for row in failed)
-        numbers = f"{plural(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        numbers = f"{plural(counted, 'metric is', 'metrics are')} within what is allowed"
         return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed), *_yardstick(changes)]
     orders = list(_orders(changes))
     ranked = [*_explained(changes), *(sentence for moved, sentence in orders if moved < 0)]
@@ -272,7 +272,7 @@ def _yardstick(changes: Changes) -> list[str]:
 
 
 def _still_failed(rows: Sequence[Row]) -> list[str]:
-    """A sentence for the rows that failed in both reports; none where there is no such row."""
+    """A sentence for the rows that failed in both reports; none without such a row."""
     if not rows:
         return []
     whose, on = _whose([row.identity for row in rows]), _on([row.identity for row in rows])
@@ -410,7 +410,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                     steps = " to ".join(f"{10 ** steps_range.steps[0]:.0f}" for steps_range in (coarse, fine))
                     first = next(iter(rows))
                     where = f"{_case(first)} from {steps} steps ({clip(first.program, 40)}, {precision})"
-                    text = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
+                    text = f"Order observed {max(before, 0):z.1f} → {max(after, 0):z.1f} on {where}."
                     yield name, after - before, Sentence(text, frozenset(rows))
 
 

@@ -406,7 +406,7 @@ def _size(metric: Metric) -> float:
 
 
 def _added(metric: Metric) -> float:
-    """log10 of how far the noise moves a number, in its own unit; -inf where there is none."""
+    """log10 of how far the noise moves a number, in its own unit; -inf where absent."""
     if metric.log10 is None:
         return -math.inf
     return math.log10(10 ** max(metric.band or 0.0, _LEAST / 10) - 1) + metric.log10

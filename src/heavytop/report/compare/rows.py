@@ -13,11 +13,11 @@ import msgspec
 
 from heavytop.integrate.registry import is_third_party
 from heavytop.measure.growth import BENT, CLASSES, Interval
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import least
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact
 from heavytop.records import (
+    HEYOKA,
     NOISE,
     NOT_MEASURED,
     UNRESOLVED_SECONDS,
@@ -85,7 +85,7 @@ _APART = 0.1
 """Exponents of two reruns are apart by that part of the width of the baseline's interval: of the dozens of laws in a
 report some intervals just do not meet.  Figures: docs/compare.md."""
 _BENDS_APART = 0.5
-"""The same of bends, each the difference of two exponents over half of the span."""
+"""Least difference of bends, each the difference of two exponents over half of the span."""
 _LOST_AT = 0.3
 """Decades by which the time of the last digit may come earlier, beyond what the noise of the error itself makes it."""
 
@@ -258,7 +258,7 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
         return self.row.key.subject.name, self.row.key.precision
 
     def as_same(self) -> Finding:
-        """The finding, but that it is none."""
+        """The finding, as the same."""
         return Finding(self.row, self.name, Verdict.SAME, self.baseline, self.candidate)
 
     @property
@@ -445,7 +445,7 @@ class RowComparison:
             if a is None or b is None:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
-                # the same series again has no other roundings, so that another law of it is no chance
+                # the same series again has the same roundings, so that another law of it is not chance
                 rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
                 judged = judge_law(a, b, self._noise(name, old, limits), rerun)
                 if judged[0] is Verdict.SAME and a.quantity != b.quantity:
@@ -454,7 +454,7 @@ class RowComparison:
             yield Finding(key, name, judged[0], before, after, judged[1], "growth")
 
     def _series(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
-        """Findings of series that changed: an equal one is no finding."""
+        """Findings of series that changed: an equal one is not a finding."""
         for name, series in old.series.items():
             limits = self.limits(old, f"series {name}")
             match = new.series.get(name)

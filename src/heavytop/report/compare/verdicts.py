@@ -54,7 +54,7 @@ class Verdict(Enum):
 
 
 NAN, MISSING = "nan", "missing"
-"""Words in the place of a number: the value is none, or it was not measured."""
+"""Words in the place of a number: the value is missing, or was not measured."""
 Judged = tuple[Verdict, str]
 """A verdict and why."""
 SAME: Judged = (Verdict.SAME, "")
@@ -318,7 +318,7 @@ _DIGITS_KEPT = 0.8
 _TIME_KEPT = 0.5
 """Part of the certified time, and of the certified starts, that must stay."""
 _COMPUTED_DECADES = 2.0
-"""What two computed runs agree within varies by a decade from one ensemble to the next."""
+"""Agreement of two computed runs varies by a decade from one ensemble to the next."""
 
 
 def weaker(old: Against, new: Against) -> str:

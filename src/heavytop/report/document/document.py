@@ -13,9 +13,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError
-from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import decimal_text, exact, log10
-from heavytop.records import Identity, Metric, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, Identity, Metric, Quantity, Report, Row, Series
 from heavytop.report.document.svg import COLOURS, MARKERS, Picture
 from heavytop.top.equations import HEAVY_TOP
 
@@ -88,7 +87,7 @@ MOST_PLOTS = 12
 TIME = "|t| (time units of the data)"
 DASHED = (0, (6.0, 3.0))
 _DASHES = ("", "6 3", "2 2", "8 2 2 2")
-"""Of SVG, in line widths; the first is a whole line."""
+"""Dashes of SVG, in line widths; the first is a whole line."""
 
 Sources = Sequence[tuple[str, Report]]
 
@@ -230,7 +229,7 @@ class Value:
     noise: bool = False
 
     def __str__(self) -> str:
-        """``2.3e-13 ± 0.12``; "-" where there is none."""
+        """``2.3e-13 ± 0.12``; "-" where absent."""
         if self.metric is None:
             return "-"
         band = self.metric.band if self.noise else None

@@ -90,7 +90,7 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def new_axes(x: str, y: str, height: float = 2.8, right: float = 0.12) -> Any:
+def new_axes(x: str, y: str, height: float = 2.8, right: float = 0.22) -> Any:
     """Axes of their own figure, ``height`` inches high, with labels; ``right``: inches for names of curves."""
     from matplotlib.figure import Figure
 

@@ -8,7 +8,7 @@ FORMATS = {
     "junit": f"{_EXPORT}:junit",
     "csv": f"{_EXPORT}:metrics_csv",
 }
-"""What `heavytop export` writes, by name: ``module:function``, called with a report and the kinds, returns the text.
+"""Formats of `heavytop export`, by name: ``module:function``, called with a report and the kinds, returns the text.
 
 `heavytop export --help`, its errors and :meth:`heavytop.Report.export` take the names from here.
 """

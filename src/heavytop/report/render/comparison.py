@@ -33,7 +33,7 @@ def comparison(result: Differences, full: bool = False) -> RenderableType:
     for motions in result.motions:
         parts += _motions(motions)
     if result.environment:
-        parts += [Text(), Text("Environments differ:", style="bold")]
+        parts += [Text(), Text("Inputs or environments differ:", style="bold")]
         changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
         parts += [Text(line) for change in changes for line in wrapped(change, "    ", "  ")]
     return Group(*parts)
@@ -93,5 +93,5 @@ def metric_name(finding: Finding) -> str:
 
 
 def values(finding: Finding) -> tuple[str, str]:
-    """The two values with few digits; a dash where there is none."""
+    """The two values with few digits; a dash where absent."""
     return short(finding.baseline or "-"), short(finding.candidate or "-")

@@ -2,7 +2,7 @@
 
 Every number is such that smaller is better: log10 of the relative error (digits right with a minus sign) and of the
 largest drift of each first integral, none below the eps of its format; exponents of growth laws; seconds.  What is not
-a number in a report (a row that failed, an error that is NaN) is none here either: :data:`LOST` counts these.
+a number in a report (a row that failed, an error that is NaN) is left out here too: :data:`LOST` counts these.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from heavytop.version import version
 LOST = "rows without a number"
 _TOTAL = "heavytop"
 _LARGEST = "error_max"
-"""Of a row that has no digits right: work against precision."""
+"""Metric exported for a row without digits right, one of work against precision."""
 
 
 class Measure(NamedTuple):
@@ -253,7 +253,12 @@ def comparison_markdown(result: Differences, page: Path | None = None) -> str:
     rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
     end = []
     if result.environment:
-        end += ["<details><summary>Environments differ</summary>", "", "| | baseline | candidate |", "|---|---|---|"]
+        end += [
+            "<details><summary>Inputs or environments differ</summary>",
+            "",
+            "| | baseline | candidate |",
+            "|---|---|---|",
+        ]
         end += ["| " + " | ".join(map(escaped_cell, difference)) + " |" for difference in result.environment[:_MOST]]
         end += ["", "</details>", ""]
     if page is not None:
@@ -274,7 +279,7 @@ def _rows(result: Differences) -> list[str]:
 
 
 def _metrics(result: Differences) -> list[str]:
-    """What changed in each row, largest, rms and last value of one quantity in one line; folded."""
+    """Changes of each row, largest, rms and last value of one quantity in one line; folded."""
     head = ["<details><summary>Every quantity that changed</summary>", ""]
     head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
     changes = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))

@@ -164,7 +164,7 @@ def _made(report: AnyReport) -> tuple[str, str]:
 
 
 def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
-    """What stands on the axis for each report: heavytop's version, else the name of its folder, else its number, the
+    """Label of each report on the axis: heavytop's version, else the name of its folder, else its number, the
     first by which all differ.
     """
     versions = [_made(report)[0] for report in reports]
@@ -216,6 +216,10 @@ def _points(track: Track) -> dict[int, float]:
     return {number: value for number, value in logs.items() if value is not None}
 
 
+_REASONS = 2
+"""Steps, at most, that are explained below a picture; the numbers have all."""
+
+
 def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], name: str) -> Picture:
     """The metrics of one row over the reports, each named at its end, their steps marked."""
     labels = [clip(track.metric or "whole row", 30) for track in tracks]
@@ -231,7 +235,7 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
             mark = _STEPS.get(verdict)
             if mark and number in points:
                 draw(axes, section.key(mark), [number + 1], [points[number]], size=7)
-            reasons.append(f"{label} {verdict.value} at {number + 1}: {reason}")
+            reasons.append(clip(f"{label} {verdict.value} at {number + 1}: {reason}", 100))
         last = max(points)
         ends.append(End(label, COLOURS[key.colour], last + 1, points[last]))
         values = ", ".join(f"{number + 1}: {scientific(value)}" for number, value in points.items())
@@ -243,4 +247,5 @@ def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], na
     pad = max(1.0, 0.15 * (max(heights) - min(heights)))
     axes.set_ylim(min(heights) - pad, max(heights) + pad)
     decades(axes.yaxis, 5)
-    return finish(axes, section.title, spoken(alternative), name, clip("; ".join(reasons), 200), ends)
+    more = f"; and {len(reasons) - _REASONS} more" if len(reasons) > _REASONS else ""
+    return finish(axes, section.title, spoken(alternative), name, "; ".join(reasons[:_REASONS]) + more, ends)

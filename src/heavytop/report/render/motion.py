@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import shlex
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, pairwise
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -101,6 +105,22 @@ class MotionTable:
             parts += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
         return "\n".join([*head, *parts]) + "\n"
 
+    def bibtex(self) -> str:
+        """An entry @misc that cites the numbers: program, version, commit, command, method and its source."""
+        facts = {key: _one_line(text) for key, text in self.facts}
+        facts["command"] = _without_paths(facts["command"])
+        digest = hashlib.sha256(f"{facts['command']} {facts['version']}".encode()).hexdigest()
+        made = ("method", "method of the attitude", "source", "precision", "integrator", "digits")
+        fields = {
+            "author": "{The heavytop authors}",
+            "title": _bibtex(f"{facts['system']}: a motion by heavytop {facts['version']}"),
+            "version": _bibtex(facts["version"]),
+            "howpublished": r"\texttt{" + _bibtex(facts["command"]) + "}",
+            "note": _bibtex("; ".join(f"{key}: {facts[key]}" for key in made if key in facts)),
+        }
+        lines = [f"  {name} = {{{text}}}," for name, text in fields.items()]
+        return "\n".join([f"@misc{{heavytop-{digest[:12]},", *lines, "}"]) + "\n"
+
     def _tex_lines(self, row: int) -> list[str]:
         """The lines of one time."""
         lines = []
@@ -140,6 +160,7 @@ def of_reference(reference: Reference, outputs: Sequence[Output], command: str, 
         parts.append([list(_flat(value)) for value in reference.balls(output)])
     facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(reference)), ("system", reference.system)]
     facts += [("precision", _wide_format(reference)), ("digits", str(reference.digits)), ("method", reference.method)]
+    facts.append(("source", reference.source))
     if reference.attitude_method not in (None, reference.method):
         facts.append(("method of the attitude", str(reference.attitude_method)))
     lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
@@ -201,7 +222,7 @@ def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
-    """What makes an output definite: sequence, point, pivot."""
+    """Parameters of an output: sequence, point, pivot."""
     result = []
     for output in outputs:
         if output.name == "euler":
@@ -238,6 +259,33 @@ def _escaped(text: str) -> str:
     for mark in "\\{}$&#%_^~":
         text = text.replace(mark, {"\\": "/", "^": r"\^{}", "~": r"\~{}"}.get(mark, "\\" + mark))
     return text.replace("'", "{'}")
+
+
+def _without_paths(command: str) -> str:
+    """The command without the files that it writes, and with those that it reads by their names."""
+    options = tuple(f"{option}=" for option in (*_WRITTEN, *_READ))
+    words = [w for word in shlex.split(command) for w in (word.split("=", 1) if word.startswith(options) else [word])]
+    kept = []
+    for before, word in pairwise(["", *words]):
+        if word not in _WRITTEN and (before not in _WRITTEN or word.startswith("--")):
+            kept.append(Path(word).name if before in _READ else word)
+    return shlex.join(kept)
+
+
+_WRITTEN, _READ = ("--csv", "--latex", "--bibtex"), ("--file", "--integrator")
+_ACCENTS = {"\u0300": r"\`", "\u0301": r"\'", "\u0302": r"\^", "\u0308": r"\""}
+
+
+def _bibtex(text: str) -> str:
+    """Text of ASCII in which braces are balanced and accents are those of TeX."""
+    text = text.translate(str.maketrans("{}", "()"))
+    parts: list[str] = []
+    for letter in unicodedata.normalize("NFD", _escaped(text)):
+        if letter in _ACCENTS:
+            parts[-1] = f"{{{_ACCENTS[letter]}{parts[-1]}}}"
+        else:
+            parts.append(letter if letter.isascii() else r"$\cdot$" if letter == "·" else "?")
+    return "".join(parts)
 
 
 def _breakable(text: str) -> str:

@@ -16,13 +16,12 @@ from msgspec.structs import replace as replace_struct
 from heavytop.display import plural
 from heavytop.extras import has_extra, install
 from heavytop.files import replace
-from heavytop.harness.plan import BUILT_IN
+from heavytop.harness import BUILT_IN
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import HEYOKA, MULTIWORD, NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import Change, folded, line, statistics
 from heavytop.report.document.document import (
@@ -184,7 +183,7 @@ def _badness(row: Row) -> tuple[bool, bool, float]:
 
 
 def main_metric(row: Row) -> str:
-    """What a line about a row says first: an error if it has one that is a number, else what its kind is about."""
+    """Beginning of a line about a row: an error if it has one that is a number, else what its kind is about."""
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
     errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
     name = next(iter(errors or row.metrics), None)
@@ -197,14 +196,16 @@ _MAIN = {RELATIVE.text: "relative error", ERRORS[0].text: "error"}
 
 
 def metric_cells(row: Row) -> list[list[str]]:
-    """Name, value, and rounding noise in decades of the first metrics."""
+    """Name, value, and rounding noise in decades where one is known, of the first metrics."""
+    metrics = list(islice(row.metrics.items(), MOST_METRICS))
+    columns = 3 if any(metric.band for _, metric in metrics) else 2
     return [
         [
             clip(name.replace("_", " "), 80),
             clip(metric.value, 40) + (f" (below {short(metric.bound)})" if metric.bound else ""),
             f"{metric.band:.2f}" if metric.band else "",
-        ]
-        for name, metric in islice(row.metrics.items(), MOST_METRICS)
+        ][:columns]
+        for name, metric in metrics
     ]
 
 
@@ -282,7 +283,7 @@ _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved
 def digits_headline(rows: Sequence[Row]) -> Headline | None:
     """The fewest digits right at the longest horizon: of a third-party integrator beside heyoka's, else of heyoka
     beside those of multiword.  A motion whose reference is valid until an earlier time, for the format has lost all
-    significant digits, counts where there is no other.
+    significant digits, counts as the last choice.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
@@ -329,7 +330,7 @@ def _place(row: Row) -> tuple[str, int, str]:
 
 
 def named(rows: Sequence[Row]) -> Callable[[Row], str]:
-    """What a row is called among these: its case, and its integrator, where they have several and it is not heyoka."""
+    """Name of a row among these: its case, and its integrator, where they have several and it is not heyoka."""
     several = len({row.key.subject.name for row in rows}) > 1
     return lambda row: row.key.case + (f",{name}" if several and (name := computed_by(row)) else "")
 
@@ -404,12 +405,13 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``0.0 from 700`` where the format has lost all significant digits by then."""
+    """``9.2 to 1e5``; ``lost at 700`` where the format has lost all significant digits by then."""
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    return f"{digits_text(kept)} {'from' if row.reference.until else 'to'} {time}{_digits_of_attitude(row)}"
+    digits = f"lost at {time}" if row.reference.until else f"{digits_text(kept)} to {time}"
+    return digits + _digits_of_attitude(row)
 
 
 def _digits_of_attitude(row: Row) -> str:
@@ -438,7 +440,7 @@ def _motion(row: Row) -> list[Cell]:
         row.horizon,
         str(row.steps),
         row.outcome,
-        digits + (f" from {row.reference.until}" if row.reference.until else ""),
+        f"lost at {row.reference.until}" if row.reference.until else digits,
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
         "  ".join(f"{integral_text(name)} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
     ]

@@ -103,7 +103,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         [
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
             "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
-            "that holds is no proof that the motion is right: the distance from the true motion stands beside it.",
+            "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
             "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
             "exponential, over the span that was fitted, and the 95 % interval as a fan. A shade around a curve is the "
             "interval in which rounding noise alone moves it.",
@@ -187,7 +187,7 @@ def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
 
 
 def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float]) -> bool:
-    """Draw the law through the mean of its samples, and the fan of its interval; False where there is none."""
+    """Draw the law through the mean of its samples, and the fan of its interval; False where absent."""
     if law.exponent is None or law.growth == "unresolved":
         return False
     ends = [logarithm(end) for end in (law.first, law.last)]
@@ -206,7 +206,7 @@ def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float
 def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
     """The heights over ``grid`` of a law with that slope through the middle of the points ``fitted``; all log10.
 
-    slope: exponent of a power, rate of an exponential, whose logarithm is no line over log10 |t|.
+    slope: exponent of a power, rate of an exponential, whose logarithm is not a line over log10 |t|.
     """
     shape: Callable[[float], float] = (lambda x: math.log10(math.e) * 10**x) if law.growth == "exponential" else float
     height = sum(b - slope * shape(a) for a, b in fitted) / len(fitted)

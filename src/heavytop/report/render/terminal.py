@@ -13,10 +13,9 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.text import Text
 
 from heavytop.display import plural, printable
-from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.scalar import digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import UNMEASURED, Quantity, Report, Row, Series
+from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
@@ -34,7 +33,7 @@ _FEWEST = 2
 
 
 _STYLES = {"soft": "dim", "big": "bold"}
-"""Of lines."""
+"""Styles of lines."""
 
 
 def summary(report: Report, kinds: Kinds) -> RenderableType:
@@ -97,7 +96,7 @@ def _shown(blocks: Iterable[Block], brief: bool = False) -> Iterator[RenderableT
 
 
 def _lines(parts: Iterable[RenderableType]) -> list[str]:
-    """What a terminal of 80 columns shows, without colours."""
+    """Text that a terminal of 80 columns shows, without colours."""
     console = Console(width=WIDTH, file=StringIO(), color_system=None, force_terminal=False, legacy_windows=False)
     console.print(Group(*parts), highlight=False, markup=False)
     assert isinstance(console.file, StringIO)
@@ -109,6 +108,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     stream = iter(rows)
     first = list(islice(stream, MOST_ROWS + 1))
     failures: list[str] = []
+    answers: list[Block] = []
     number = bad = 0
 
     def seen(rows: Iterable[Row]) -> Iterable[Row]:
@@ -124,7 +124,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if len(first) <= MOST_ROWS:
         held = list(seen(first))
         blocks = document(replace(report, rows=held), kinds, In.SHORT)
-        answers: list[Block] = [*headlines(blocks, kinds)]
+        answers += headlines(blocks, kinds)
         others = ([block for block in blocks if block not in answers] for blocks in blocks.values())
         parts = [_lines(_shown(blocks, brief=True)) for blocks in (answers, *others)]
         parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
@@ -135,6 +135,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
+    if answers and not bad:  # what was measured and how good it is comes first, unless something failed
+        parts.insert(1, [lines.pop()])
     return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
 
 
@@ -196,7 +198,7 @@ _MEANS = {
 }
 """Laws of the error along the flow."""
 _WIDTHS = {"integrals": 16, "along": 12, "across": 12}
-"""What is summed up, and the characters there are for it."""
+"""Subject of a summary, and the characters there are for it."""
 _COLUMNS = "", "integrals", "error along", "across"
 _FAR = 2.0
 """Decades."""
@@ -260,7 +262,7 @@ def _meaning(row: Row) -> str:
 
 
 def _larger(row: Row, ours: Row) -> str:
-    """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
+    """A remark that no law makes: an error that is far larger than heyoka's of the same motion; "" where it is not."""
     error, known = (row.metric(SOLUTION_ERROR, "along", "final") for row in (row, ours))
     if error is None or known is None or size(error) - size(known) < _FAR:
         return ""
@@ -274,7 +276,7 @@ def _lately(series: Series | None) -> str:
         return ""
     end = max(known)
     begin = min(known, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
+    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):z.1f}"
 
 
 def _either(growths: Iterable[str], width: int) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -20,7 +20,9 @@ from heavytop.measure.scorer import DRIFT
 from heavytop.records import FAILED, NOT_ASKED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
 from heavytop.report.document.document import Cell, Value, Word, cell_text, computed_by
 from heavytop.report.document.kind import Kinds, kind_of
-from heavytop.report.store.store import AnyReport
+
+if TYPE_CHECKING:
+    from heavytop.report.store.store import AnyReport
 
 
 def largest_over(rows: Iterable[Row]) -> str:
@@ -38,7 +40,7 @@ NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 
 def failed(row: Row, kinds: Kinds) -> bool:
     """Whether a measurement did not succeed; that a run aborts may be what its rows are there to show.
 
-    What an integrator declares that it cannot do is no failure.
+    What an integrator declares that it cannot do is not a failure.
     """
     if row.outcome == UNSUPPORTED:
         return False
@@ -46,7 +48,7 @@ def failed(row: Row, kinds: Kinds) -> bool:
 
 
 def unsupported(rows: Iterable[Row]) -> str:
-    """What integrators declare that they cannot do, in one line; empty where there is no such row."""
+    """Requests that integrators declare unsupported, in one line; empty without such a row."""
     lacking = [row for row in rows if row.outcome == UNSUPPORTED]
     why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
     return f"Not supported, and not measured: {plural(len(lacking), 'row')}; {'; '.join(why)}." if lacking else ""
@@ -69,7 +71,7 @@ def head(report: AnyReport, rows: int) -> Text:
 
 
 WORD_STYLES = {"refuted": "bold red", "holds": "bold green"}
-"""Of verdicts; others are yellow."""
+"""Colours of verdicts; others are yellow."""
 
 
 def title(text: str) -> Text:

@@ -276,7 +276,7 @@ def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
 
 
 def _check_series(file: Path, rows: Iterable[Row]) -> None:
-    """Raises InputError where a series has not one value for each time, or a text that is not a number."""
+    """Raises InputError where the values of a series are not as many as its times, or a text that is not a number."""
     for row in rows:
         for name, series in row.series.items():
             if len(series.times) != len(series.values):
@@ -287,7 +287,7 @@ def _check_series(file: Path, rows: Iterable[Row]) -> None:
 
 
 def _floats(texts: Sequence[str]) -> list[float]:
-    """Numbers, told without the cost of exact ones; nan alone where a text is none, or one in Python's way only."""
+    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
     joined = "".join(texts)
     try:
         return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
@@ -300,7 +300,7 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     values = numpy.array(_floats([metric.value for metric in metrics]))
     logarithms = numpy.array([metric.log10 if metric.bound is None else None for metric in metrics], dtype=float)
     with numpy.errstate(all="ignore"):
-        # the logarithm of a negative number is none
+        # a negative number has no logarithm
         plain = numpy.abs(numpy.log10(values) - logarithms) < CLOSE / 2
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
@@ -339,7 +339,7 @@ WORDS = {
     "duration": ("nan", "missing", "never"),
     "value": ("nan", "missing", "never", UNRESOLVED),
 }
-"""What may stand in the place of a number, for each kind of metric."""
+"""Words in the place of a number, for each kind of metric."""
 
 
 def _check_metric(where: str, metric: Metric, finite: bool) -> None:

@@ -23,7 +23,6 @@ from heavytop import records
 from heavytop.errors import InputError
 from heavytop.extras import import_heyoka
 from heavytop.files import read_whole, replace, without_repeats
-from heavytop.harness.run import versions
 from heavytop.precision import available
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.document.kind import Kinds
@@ -207,6 +206,8 @@ def _has_its_digest(file: Path, content: bytes) -> bool:
 def environment() -> dict[str, Any]:
     """Versions, processor, formats; ``commit`` of the checkout or of the wheel, where one is known."""
     import flint
+
+    from heavytop.harness.run import versions
 
     heyoka = import_heyoka()
     import numpy

@@ -73,7 +73,7 @@ class Arcs:
                     self._forms[index] = form
 
     def _form_of(self, index: int) -> fmpq_mpoly | None:
-        """Inverse function ``index`` through those before it and π; None where there is no such relation."""
+        """Inverse function ``index`` through those before it and π; None without such a relation."""
         field = self._field
         is_log = field.tower.generators[index].kind == "log"
         alike = [other for other in self._free if (field.tower.generators[other].kind == "log") is is_log]

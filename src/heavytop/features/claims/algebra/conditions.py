@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
+from functools import lru_cache
 from itertools import islice, product
 from math import comb, prod
 
@@ -64,7 +65,7 @@ class Need:
     @property
     def text(self) -> str:
         """The condition as people read it."""
-        text = self.shown or self.kind.value.format(self.expression)
+        text = self.shown or self.kind.value.format(as_text(self.expression))
         return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
     def is_met(self, values: Mapping[sympy.Symbol, Fraction]) -> bool | None:
@@ -75,14 +76,23 @@ class Need:
             return None
         if not ball.is_finite():
             return None
-        rational = self.expression.is_rational_function(*self.expression.free_symbols)
-        if ball.is_zero() or (rational and ball.contains(0) and is_exactly_zero(self.expression, values)):
+        if ball.is_zero() or (ball.contains(0) and self._is_zero_at(values)):
             return self.kind is ConditionKind.NONNEGATIVE
         if self.kind is ConditionKind.NONZERO:
             return True if not ball.contains(0) else None
         above = ball > 0 if self.kind is ConditionKind.POSITIVE else ball >= 0
         below = ball <= 0 if self.kind is ConditionKind.POSITIVE else ball < 0
         return True if above else False if below else None
+
+    def _is_zero_at(self, values: Mapping[sympy.Symbol, Fraction]) -> bool:
+        e = self.expression
+        return bool(e.is_rational_function(*e.free_symbols) and is_exactly_zero(e, values))
+
+
+@lru_cache(maxsize=10_000)
+def as_text(expression: sympy.Expr) -> str:
+    """As SymPy writes it, which takes it a millisecond."""
+    return str(expression)
 
 
 def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Need]:
@@ -95,13 +105,13 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
     elif function == "log":
         needs = {Need(ConditionKind.POSITIVE, u)}
     elif function in ("asin", "acos"):
-        needs = {Need(ConditionKind.NONNEGATIVE, 1 - u**2, f"-1 ≤ {u} ≤ 1")}
+        needs = {Need(ConditionKind.NONNEGATIVE, 1 - u**2, f"-1 ≤ {as_text(u)} ≤ 1")}
     elif function in ("tan", "sec"):
         needs = {Need(ConditionKind.NONZERO, sympy.cos(u))}
     elif function in ("coth", "csch"):
         needs = {Need(ConditionKind.NONZERO, sympy.sinh(u))}
     elif function in ("wp", "wpprime", "wzeta"):
-        text = f"{u} is no period of wp(u, {arguments[1]}, {arguments[2]})"
+        text = f"{u} is not a period of wp(u, {arguments[1]}, {arguments[2]})"
         needs = {Need(ConditionKind.NONZERO, wpinverse(*arguments), text)}
     elif function in ("wp3", "wp3prime", "wzeta3", "wsigma3"):
         _, g2, g3 = arguments
@@ -130,7 +140,7 @@ _OF_PARAMETER: dict[str, tuple[ConditionKind | None, ConditionKind]] = {
     **dict.fromkeys(("ellipticF", "ellipticK", "ellipticPi"), (None, _P)),
     "ellipticE": (None, _N),
 }
-"""What the last argument, a parameter m or a nome q, is compared with 0, and 1 with it."""
+"""Sign conditions on the last argument, a parameter m or a nome q, compared with 0, and 1 with it."""
 
 
 def _is_plain(need: Need) -> bool:
@@ -139,10 +149,21 @@ def _is_plain(need: Need) -> bool:
     return bool(e.is_Rational and (e > 0 or (e < 0 and need.kind is ConditionKind.NONZERO)))
 
 
+def parts_of(expressions: Iterable[sympy.Expr]) -> set[sympy.Expr]:
+    """Every subexpression once, of a residual too, which as a tree is a hundred times as large."""
+    parts: set[sympy.Expr] = set()
+    waiting = [*expressions]
+    while waiting:
+        if (part := waiting.pop()) not in parts:
+            parts.add(part)
+            waiting.extend(part.args)
+    return parts
+
+
 def conditions_of(expressions: Iterable[sympy.Expr]) -> frozenset[Need]:
     """The conditions of sympy expressions, as they stand: what has been simplified away is not seen."""
     needs: set[Need] = set()
-    for part in {node for e in expressions for node in sympy.preorder_traversal(e)}:
+    for part in parts_of(expressions):
         if isinstance(part, sympy.exp):
             continue
         if part.is_Pow:
@@ -431,7 +452,7 @@ def _occurs_inside(field: Field, index: int, p: fmpq_mpoly) -> bool:
 
 
 _ORDERS = 4
-"""Derivatives that are looked at where a formula is no polynomial."""
+"""Derivatives that are looked at where a formula is not a polynomial."""
 _MOST_OPERATIONS = 60
 """Of a formula that is looked at."""
 _MAY_JUMP = (sympy.Abs, sympy.sign, sympy.DiracDelta, sympy.atan2)

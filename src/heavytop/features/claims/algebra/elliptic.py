@@ -161,7 +161,7 @@ FORMULAS: dict[str, tuple[Any, int]] = {
     "thetaRate": (theta_rate, 2),
     "thetaArgument": (theta_argument, 3),
 }
-"""What formulas may call, with the number of its arguments."""
+"""Functions that formulas may call, with the number of its arguments."""
 FREE = {function.__name__: function for function in (*_OF_ANGLE, third, thetan, modulus, *_TOWERS[-4:])}
 """Functions that are free generators; those of ℘ have a relation."""
 WEIERSTRASS = {function.__name__: function for function in (wp, wpprime, wp3, wp3prime, wpinverse)}

@@ -410,7 +410,7 @@ class Regularity:
         tower = self._field.tower
         g = tower.generators[index]
         if index in tower.signs.numbers:
-            return "" if tower.signs.numbers[index].is_finite() else f"{g.meaning} is no real number"
+            return "" if tower.signs.numbers[index].is_finite() else f"{g.meaning} is not real"
         for argument in g.arguments:
             if obstacle := self.obstacle(argument, analytic=analytic):
                 return obstacle

@@ -42,7 +42,7 @@ class Expressions(Protocol):
 def same_as(name: str, u: Quotient, field: Expressions, known: Known) -> Quotient | None:
     """asin, acos or atan of ``u`` through a function that the field has already, or through the angle in it.
 
-    known: the generator of a function of an argument, None where there is none yet.
+    known: the generator of a function of an argument, None before the first.
     """
     if name not in ("asin", "acos", "atan"):
         return None
@@ -122,7 +122,7 @@ _MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
 _OF_ANGLE = ("am", "ellipticF", "ellipticE", "ellipticPi")
 """Odd functions that increase."""
 _POSITIVE = {"thetan": True, "wsigma3": True, "modulus": False}
-"""Whether it is never 0."""
+"""Whether it is never 0; where not, it is 0 with its argument alone."""
 Circle = tuple[Quotient, Quotient]
 
 
@@ -436,7 +436,7 @@ class Transcendental:
             number *= abs(Fraction(int(constant.p), int(constant.q))) ** (1 - 2 * side)
             for factor, power in factors:
                 known = t.signs.of(factor)
-                if known.value:  # where it is 0, the logarithm of the whole is none
+                if known.value:  # where it is 0, the whole has no logarithm
                     sign *= known.value ** int(power)
                     weight = t.number(int(power) * (1 - 2 * side))
                     total = t.sum((total, t.product((weight, self._logarithm_of_factor(factor * known.value)))))
@@ -490,7 +490,7 @@ class Transcendental:
             elif name in _OF_ANGLE:
                 sign = self._tower.sign(arguments[FREE[name].moving - 1])
             elif name in _POSITIVE:
-                sign = Sign(1, _POSITIVE[name])
+                sign = Sign(1, _POSITIVE[name] or self._tower.sign(arguments[0]).strict)
             index = self._new(name, meaning, arguments, sign)
             if name == "modulus":
                 self._tower.signs.declare(1 - self._tower.gens[index], Sign(1, True))

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
 
 import sympy
 from flint import arb, fmpq_mpoly
@@ -16,11 +15,13 @@ from heavytop.features.claims.algebra.arcs import Arcs
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
     Need,
+    as_text,
     for_no_parameters,
     is_exactly_zero,
     is_never_zero,
     is_small_polynomial,
     on_conditions,
+    parts_of,
     written,
 )
 from heavytop.features.claims.algebra.evaluate import evaluate
@@ -422,6 +423,7 @@ class Prover:
         self._regions: dict[int, Region] = {}
         self._conditions: dict[object, tuple[Condition, ...]] = {}
         self._places: dict[tuple[str, str], list[Place]] = {}
+        self._met: dict[object, bool] = {}
 
     # --- fields -----------------------------------------------------------------------------------------------------
 
@@ -437,7 +439,7 @@ class Prover:
             parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
             self._fields[key] = self._make(alike, sign, strict, parts)
         if self._fields[key] is None:
-            alone: Key = (*key, _text(statement.residual))
+            alone: Key = (*key, as_text(statement.residual))
             if alone not in self._fields:
                 self._fields[alone] = self._make([statement], sign, strict, [])
             return self._fields[alone]
@@ -518,7 +520,7 @@ class Prover:
         return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
 
     def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
-        """The divisors that stand against the proof; None where there is no proof."""
+        """The divisors that stand against the proof; None without a proof."""
         if region is None:
             return None
         flow = statement.flow
@@ -542,6 +544,8 @@ class Prover:
 
     def _why_no_place(self, statement: Statement) -> str:
         setting = self._setting
+        if not setting.samples:
+            return "no exact state is known: give samples at which the start is rational and moves, or states"
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at no sample is each principal moment at most the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)
@@ -553,12 +557,16 @@ class Prover:
     def is_defined(self, statement: Statement, point: Place) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
         formulas = statement.formulas
-        if not all(need.is_met(point) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
+        needed = formulas.sampled or formulas.needs | formulas.angle_needs, frozenset(point.items())
+        if needed not in self._met:
+            self._met[needed] = all(need.is_met(point) for need in needed[0])
+        if not self._met[needed]:
             return False
-        # a derivative of |u| is none where u is 0
+        # |u| has no derivative where u is 0
         if any(
             Need(ConditionKind.NONZERO, kink.args[0]).is_met(point) is not True
-            for kink in statement.residual.atoms(sympy.sign)
+            for kink in parts_of([statement.residual])
+            if isinstance(kink, sympy.sign)
         ):
             return False
         try:
@@ -655,10 +663,4 @@ def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Exp
 
 
 def _sorted(needs: Iterable[Need]) -> list[Need]:
-    return sorted(needs, key=lambda need: (need.kind.value, _text(need.expression)))
-
-
-@lru_cache(maxsize=10_000)
-def _text(expression: sympy.Expr) -> str:
-    """As SymPy writes it, which takes it a millisecond."""
-    return str(expression)
+    return sorted(needs, key=lambda need: (need.kind.value, as_text(need.expression), need.shown))

@@ -33,7 +33,7 @@ _MAX_TERMS = 40
 
 
 def denested(tower: Tower, p: fmpq_mpoly, depth: int = _DEPTH) -> Quotient | None:
-    """√p through roots that are nested less, for a polynomial ``p`` in roots; None where there is no such sum.
+    """√p through roots that are nested less, for a polynomial ``p`` in roots; None without such a sum.
 
     It is √p wherever that is real.
     """
@@ -302,7 +302,7 @@ class Tower(PolynomialRing):
         return self.polynomial(self.gens[self.root_of(square)])
 
     def known_root(self, square: fmpq_mpoly) -> int | None:
-        """The generator √square, None where there is none yet."""
+        """The generator √square, None before the first."""
         return self._roots.get(str(square))
 
     def root_of_number(self, value: Any) -> Quotient:

@@ -326,37 +326,41 @@ class Assumed:
     weak: tuple[sympy.Expr, ...]
 
 
-def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
-    """(larger, smaller) of ``formula > formula``, and of each link of a chain such as ``0 < k < 1``.
+def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
+    """(larger, smaller, strictly) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
 
     Raises InputError for anything else.
     """
-    sign = ">" if ">" in text else "<"
-    parts = [part.strip() for part in text.split(sign)]
-    if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
-        raise InputError(
-            f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula, or formula != formula."
-        )
-    links = list(pairwise(parts))
-    return links if sign == ">" else [(right, left) for left, right in links]
+    parts = [part.strip() for part in re.split(r"([<>]=?)", text)]
+    sides, signs = parts[::2], parts[1::2]
+    if len({sign[0] for sign in signs}) != 1 or not all(sides) or "=" in "".join(sides):
+        raise InputError(f"{where}: {text[:60]!r} is not understood.", f"Write: formula > formula{_OR[where]}.")
+    pairs = [pair if signs[0][0] == ">" else pair[::-1] for pair in pairwise(sides)]
+    return [(*pair, len(sign) == 1) for pair, sign in zip(pairs, signs, strict=True)]
 
 
-def inequalities(texts: Iterable[str]) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """Assumptions of ``assume``: the (larger, smaller) of its comparisons, both sides of each ``formula != formula``.
+_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
+Sides = list[tuple[str, str]]
+
+
+def inequalities(texts: Iterable[str]) -> tuple[Sides, Sides, Sides]:
+    """Assumptions of ``assume``: (larger, smaller) of its strict comparisons and of the others, both sides of each !=.
 
     Raises InputError for anything else.
     """
-    above: list[tuple[str, str]] = []
-    apart: list[tuple[str, str]] = []
+    above: Sides = []
+    at_least: Sides = []
+    apart: Sides = []
     for text in texts:
         left, sign, right = (part.strip() for part in text.partition("!="))
         if not sign:
-            above += comparisons(text)
+            for larger, smaller, strictly in comparisons(text, "assume"):
+                (above if strictly else at_least).append((larger, smaller))
         elif left and right and not set("<>=!") & {*left, *right}:
             apart.append((left, right))
         else:
             raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
-    return above, apart
+    return above, at_least, apart
 
 
 def assume(
@@ -365,11 +369,13 @@ def assume(
     moments: Iterable[sympy.Expr],
     symbols: Iterable[sympy.Symbol],
     apart: Iterable[Bound] = (),
+    at_least: Sequence[Bound] = (),
 ) -> Assumed:
     """Consequences of left > right of each bound, from what these need to be real, and from positive moments.
 
-    apart: the sides of what is assumed to be unequal.
+    apart: the sides of what is assumed to be unequal.  at_least: bounds with left >= right.
     """
+    at_least = [*at_least, *(implied for bound in at_least for implied in _through_monotone(bound))]
     bounds = [*bounds, *(implied for bound in bounds for implied in _through_monotone(bound))]
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
@@ -394,8 +400,9 @@ def assume(
     facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
     facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
     facts += [(left - right) ** 2 for left, right in apart]
-    weak = tuple(need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE)
-    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
+    weak = [need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE]
+    weak += [left - right for left, right in at_least]
+    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges([*bounds, *at_least])), tuple(weak))
 
 
 _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = {

@@ -92,7 +92,7 @@ class Signs:
         self._known.clear()
 
     def can_have_form(self, index: int, form: fmpq_mpoly) -> bool:
-        """Whether ``form`` may be declared: there is none yet, and nothing in it has the form of its reciprocal."""
+        """Whether ``form`` may be declared: it is the first, and nothing in it has the form of its reciprocal."""
         return index not in self._forms and not self._below_one & used(form)
 
     def declare_below_one(self, index: int) -> None:
@@ -240,7 +240,7 @@ class Signs:
             return total
 
     def _by_number(self, p: fmpq_mpoly) -> Sign:
-        """A number that is no fraction: its ball."""
+        """A number other than a fraction: its ball."""
         total = self.ball(p)
         if total is None or not total.is_finite() or total.contains(0):
             return UNKNOWN

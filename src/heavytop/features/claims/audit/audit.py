@@ -156,7 +156,7 @@ def audit_claim(
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
-    return Audit(*said, deciding)
+    return Audit(*said, deciding, claim.unused if isinstance(claim, Assuming) else ())
 
 
 def _rows(
@@ -186,7 +186,7 @@ def would_decide(
             continue
         try:
             verdict = verdict_of(_rows(claim.assuming(bound), about))
-        except HeavyTopError:  # a sample breaks it, or the formula is none that may be assumed
+        except HeavyTopError:  # a sample breaks it, or the formula may not be assumed
             continue
         if verdict != "undecided":
             deciding.append((bound, verdict))
@@ -194,7 +194,7 @@ def would_decide(
 
 
 def require_branch(branch: str) -> None:
-    """Raises InputError for what is no branch."""
+    """Raises InputError for an invalid branch."""
     if branch not in ("smooth", "printed"):
         raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
 
@@ -220,7 +220,7 @@ _ROOMS = ("features/claims", "top", "exact")
 class Judged(msgspec.Struct, frozen=True):
     """The verdict on an entry, and the seconds that its audit took when it was made.
 
-    reason: why there is no verdict, where the audit was stopped or the file cannot be judged.
+    reason: why a verdict is missing, where the audit was stopped or the file cannot be judged.
     """
 
     verdict: Verdict
@@ -284,7 +284,7 @@ def _kept(entry: Entry) -> Judged | None:
 
 
 def _keep(entry: Entry, judged: Judged) -> None:
-    """Beside others that write the same at once; a cache that cannot be written is none."""
+    """Beside others that write the same at once; a cache that cannot be written is left out."""
     path = _place(entry)
     part = path.with_suffix(f".{os.getpid()}.part")
     with suppress(OSError):

@@ -100,10 +100,6 @@ class UserComponent(UserIntegral):
         if table.value is not None and self._square is None:
             remedy = "Give reduced = f(u) in [component], or time or integrand in [quadrature]."
             raise InputError("[component] gives a value and no reduced equation u'^2 = f(u).", remedy)
-        rates = self.content.quadrature
-        for name in _ANGLES:
-            if getattr(table, name) is not None and (rates is None or getattr(rates, name) is None):
-                raise InputError(f"[component] gives {name} and no rate of it.", f"Give {name} in [quadrature].")
 
     def _levels(self) -> Iterator[Formula]:
         """First integrals less their values at the start."""
@@ -221,6 +217,15 @@ class UserComponent(UserIntegral):
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
 
+    def _true_rate(self, name: str, system: System) -> Formula:
+        """The rate of an angle as a function of u, where the first integrals have their values."""
+        omega = tuple(system.angular_velocity(self.context.parameters(system), STATE))
+        zeros = [*(part.expression for part in self.where), OFF_SPHERE]
+        held = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
+        if held is None:
+            raise InputError(f"The rate of {name} is no function of {self._u}.", f"Give {name} by its rate alone.")
+        return replace(symbol(held[0] / held[1]), needs=condition("/", (held[1], held[2])))
+
     # --- in time ------------------------------------------------------------------------------------------------------
 
     def _in_time(self, system: System) -> list[Statement]:
@@ -251,9 +256,9 @@ class UserComponent(UserIntegral):
         equations.append(made("start", 3, self._at_start(OFF_SPHERE), "|gamma|^2 = 1 at t = 0", at_zero))
         for index, name in enumerate(_ANGLES, 1):
             angle, claimed = self._of(name, self._component, True), self._of(name, self.content.quadrature, False)
-            if angle is not None and claimed is not None:
-                if claimed.expression.free_symbols & frozenset(STATE):
-                    raise InputError(f"{name} is given in t, and its rate in the state.", f"Give its rate in {u}.")
+            if angle is not None:
+                if claimed is None or claimed.expression.free_symbols & frozenset(STATE):
+                    claimed = self._true_rate(name, system)
                 needs = angle.needs | _put(claimed.needs, u, c) | formulas.needs
                 residual = _IN_TIME(angle.expression) - claimed.expression.xreplace({u: c})
                 equations.append(

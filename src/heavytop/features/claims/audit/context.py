@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -70,11 +70,16 @@ class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ClaimedMotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[motion]: Ω(t), γ(t), and the angles (φ, θ, ψ); γ may be left out where the angles are given, and so may Ω."""
+    """[motion]: Ω(t), γ(t), and the attitude by one of angles (φ, θ, ψ), quaternion (w, x, y, z) and matrix R.
+
+    γ and Ω may be left out where the attitude is given.
+    """
 
     omega: Three | None = None
     gamma: Three | None = None
     angles: Three | None = None
+    quaternion: Annotated[list[Text], msgspec.Meta(min_length=4, max_length=4)] | None = None
+    matrix: Annotated[list[Three], msgspec.Meta(min_length=3, max_length=3)] | None = None
 
 
 class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -274,7 +279,7 @@ class Context:
         return tuple(system for system in SYSTEMS if system is not GYROSTAT or turns_about_two)
 
     def parameters(self, system: System) -> Parameters:
-        """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
+        """Parameters of the field; raises InputError where the file lacks the rotor of the system."""
         if (system is HEAVY_GYROSTAT) is not (self.carried is not None):
             raise _other_rotor(system)
         if self.carried is not None:
@@ -288,7 +293,7 @@ class Context:
 
 
 def _other_rotor(system: System) -> InputError:
-    """The error where one of the two has a rotor of three components, and the other has not."""
+    """The error where one of the two has a rotor of three components, and the other lacks it."""
     if system is HEAVY_GYROSTAT:
         cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
         return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
@@ -303,7 +308,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     for name in (*content.parameters, *content.definitions):
         if name in reserved or (name in content.parameters and name in content.definitions):
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
-    above, apart = inequalities(content.assume)
+    compared = inequalities(content.assume)
+    above = compared[0]
     tensor = read_tensor(content.top.inertia)
     # the moments of inertia of a top are positive, said or not
     positive = {left for left, right in above if right == "0"} | {text.strip() for text in tensor.diagonal}
@@ -315,9 +321,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         names[name] = parse(text, names, f"definition of {name}")
-    sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in (*above, *apart)]
-    pairs = [(left.expression, right.expression) for left, right in sides]
-    bounds, unequal = pairs[: len(above)], pairs[len(above) :]
+    sides = [[(parse(a, names, "assume"), parse(b, names, "assume")) for a, b in pairs] for pairs in compared]
+    bounds, at_least, unequal = ([(a.expression, b.expression) for a, b in pairs] for pairs in sides)
+    needs = needs_of(side for pairs in sides for link in pairs for side in link)
     top = content.top
     moments = [parse(text, names, "top.inertia") for text in tensor.texts]
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
@@ -335,7 +341,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     context = Context(
         names,
         symbols,
-        assume(bounds, needs_of(side for link in sides for side in link), minors(inertia), symbols.values(), unequal),
+        assume(bounds, needs, minors(inertia), symbols.values(), unequal, at_least),
         tuple(
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
@@ -349,8 +355,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         frozenset() if rotor is None else rotor.needs,
         tuple(part.expression for part in carried) or None,
     )
-    _check_samples(context, bounds, unequal)
-    return context
+    _check_samples(context, bounds, at_least, unequal)
+    return replace(context, samples=(*context.samples, *_at_equality(context, bounds, at_least, unequal)))
 
 
 def sample_number(text: str, what: str) -> Fraction:
@@ -383,24 +389,53 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
-def _check_samples(context: Context, bounds: Sequence[Bound], unequal: Sequence[Bound]) -> None:
+def _check_samples(context: Context, *compared: Sequence[Bound]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in context.samples:
         shown = ", ".join(f"{name} = {value}" for name, value in sample.items()) or "without parameters"
-        broken = [f"assumption {left} > {right}" for left, right in bounds if not _at(left - right, sample) > 0]
-        broken += [
-            f"assumption {left} != {right}"
-            for left, right in unequal
-            if is_exactly_zero(left - right, sample) is not False
-        ]
-        broken += [f"relation {zero} = 0" for zero in context.relations if is_exactly_zero(zero, sample) is False]
-        if broken:
-            raise InputError(f"The sample {shown} breaks the {written(broken[0])}.", "Change the sample.")
+        broken = next(_broken(context, sample, *compared), None)
+        if broken is not None:
+            raise InputError(f"The sample {shown} breaks the {written(broken)}.", "Change the sample.")
         for index, moment in enumerate(minors(context.top.inertia), 1):
             if not _at(moment, sample) > 0:
                 full = isinstance(context.top.inertia[0], tuple)
                 what = "the tensor of inertia not positive definite" if full else f"I{index} not positive"
                 raise InputError(f"The sample {shown} makes {what}.", "Change the sample.")
+
+
+def _broken(
+    context: Context,
+    sample: dict[sympy.Symbol, Fraction],
+    bounds: Sequence[Bound],
+    at_least: Sequence[Bound],
+    unequal: Sequence[Bound],
+) -> Iterator[str]:
+    """The assumptions and relations that a sample breaks."""
+    for a, b in bounds:
+        if not _at(a - b, sample) > 0:
+            yield f"assumption {a} > {b}"
+    for a, b in at_least:
+        if not _at(a - b, sample) > 0 and is_exactly_zero(a - b, sample) is not True:
+            yield f"assumption {a} >= {b}"
+    yield from (f"assumption {a} != {b}" for a, b in unequal if is_exactly_zero(a - b, sample) is not False)
+    yield from (f"relation {zero} = 0" for zero in context.relations if is_exactly_zero(zero, sample) is False)
+
+
+def _at_equality(
+    context: Context, bounds: Sequence[Bound], at_least: Sequence[Bound], unequal: Sequence[Bound]
+) -> Iterator[dict[sympy.Symbol, Fraction]]:
+    """Samples at which an assumption that allows equality has it, where a parameter stands alone on one side."""
+    for pair in at_least:
+        for parameter, other in (pair, pair[::-1]):
+            for sample in context.samples if parameter.is_Symbol else ():
+                value = other.subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+                if not value.is_Rational:
+                    continue
+                at_end = {**sample, parameter: Fraction(int(value.p), int(value.q))}
+                moments = (_at(moment, at_end) for moment in minors(context.top.inertia))
+                if all(m > 0 for m in moments) and not any(_broken(context, at_end, bounds, at_least, unequal)):
+                    yield at_end
+                    break
 
 
 def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
@@ -459,6 +494,9 @@ def of_file(asked: System | None, written: str | None, usual: System) -> System:
     return asked or own or usual
 
 
+_NO_FORMULAS = ("name", "kind", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
+
+
 @dataclass(frozen=True)
 class FileClaim:
     """A claim of a file."""
@@ -489,6 +527,16 @@ class FileClaim:
         """Parameters of whose sign no assumption says anything."""
         words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
         return [name for name in self.content.parameters if name not in words]
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Parameters that stand in no formula, nor in a definition that does."""
+        content = structs.asdict(self.content)
+        tables = {name: part for name, part in content.items() if name not in _NO_FORMULAS}
+        words = set(re.findall(r"\w+", str(msgspec.to_builtins(tables))))
+        for name, text in reversed(self.content.definitions.items()):
+            words |= set(re.findall(r"\w+", text)) if name in words else set()
+        return tuple(name for name in self.content.parameters if name not in words)
 
     def assuming(self, bound: str) -> Self:
         """The claim with one assumption more; raises InputError where a sample breaks it."""
@@ -570,8 +618,11 @@ def read_clock(content: ClaimFile, context: Context) -> Clock:
     integrand = clock.expression if table.time is None else rate_along({u: sympy.Integer(1)})(clock.expression)
     if integrand == 0:
         raise InputError(f"[quadrature]: t = {text[:60]} does not move with {u}.", "Give t as a function of it.")
-    links = [link for text in table.where for link in comparisons(text, "where of [quadrature]")]
-    sides = [[parse(side, context.names, "where of [quadrature]") for side in link] for link in links]
+    where = "where of [quadrature]"
+    links = [link for text in table.where for link in comparisons(text, where)]
+    if not all(strictly for *_, strictly in links):
+        raise InputError(f"{where}: a bound of {u} is not a value of it.", "Write < and > in the place of <= and >=.")
+    sides = [[parse(side, context.names, where) for side in link[:2]] for link in links]
     facts = tuple(above.expression - below.expression for above, below in sides)
     label = ", ".join(table.where) or f"all {u}"
     domain = Domain(label, 0, _points(table, u, facts, context.samples), f"{u} is the variable of [quadrature]", facts)

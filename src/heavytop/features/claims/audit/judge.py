@@ -105,6 +105,7 @@ class Audit(Tabular):
     satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
     constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
     deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
+    unused: parameters of a file that stand in its assumptions at most.
     """
 
     claim: str
@@ -117,6 +118,7 @@ class Audit(Tabular):
     kind: str = "motion"
     entry: Entry | None = None
     deciding: tuple[tuple[str, str], ...] = ()
+    unused: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -143,6 +145,7 @@ class Audit(Tabular):
         }
         if self.entry is not None:
             document["entry"] = msgspec.to_builtins(self.entry)
+        document |= {"unused": list(self.unused)} if self.unused else {}
         return document | ({"would_decide": dict(self.deciding)} if self.deciding else {})
 
     def _table(self) -> TitledTable:
@@ -175,18 +178,21 @@ def judge(
 
 
 def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> StatementVerdict:
-    witness = next(_witnesses(statement, setting, prover), None)
     proven, conditions = prover.prove(statement)
+    certain = proven and all(condition.discharged for condition in conditions)
+    witness = next(_witnesses(statement, setting, prover, _BITS[:1] if certain else _BITS), None)
     if witness is not None:
         proof = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if proof is None else _closed_form(statement, setting, proof)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
     for text, rate in statement.flow.kept if statement.flow is not None else ():
-        left = next(_witnesses(replace(statement, residual=rate), setting, prover), None)
+        # where it is 0 at a witness, its own rate may not be
+        rates = (rate, statement.flow.rate(rate)) if statement.flow is not None else ()
+        left = next((w for r in rates for w in _witnesses(replace(statement, residual=r), setting, prover)), None)
         if left is not None:
             residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
             return _row(statement, False, residual, conditions, left)
-    if proven and all(condition.discharged for condition in conditions):
+    if certain:
         return _row(statement, True, "0", conditions)
     residual = "0 where the conditions are met" if proven else _bound(statement, prover)
     return _row(statement, None, residual, conditions)
@@ -206,11 +212,13 @@ def _row(
     )
 
 
-def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
+def _witnesses(
+    statement: Statement, setting: Setting, prover: Prover, precisions: Sequence[int] = _BITS
+) -> Iterator[dict[str, Any]]:
     """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
     always = () if statement.flow is None else statement.flow.always
     places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
-    for bits in _BITS:
+    for bits in precisions:
         for values in places:
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
@@ -337,6 +345,11 @@ class Assuming(Auditable, Protocol):
     @property
     def unassumed(self) -> list[str]:
         """Parameters of which the claim assumes nothing."""
+        ...
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Parameters that no formula holds."""
         ...
 
     def assuming(self, bound: str) -> Auditable:

@@ -15,7 +15,13 @@ from heavytop.features.claims.algebra.conditions import Need
 from heavytop.features.claims.algebra.statement import Domain, Formulas, Statement
 from heavytop.features.claims.audit.judge import ExplanationStep
 from heavytop.precision import cross, dot
-from heavytop.top.attitude import attitude_from_angles, gamma_from_angles, omega_from_angles
+from heavytop.top.attitude import (
+    attitude_from_angles,
+    gamma_from_angles,
+    matrix_of_quaternion,
+    omega_from_angles,
+    transposed,
+)
 from heavytop.top.equations import (
     GYROSTAT,
     HEAVY_GYROSTAT,
@@ -46,6 +52,8 @@ SYMBOLIC = SimpleNamespace(
 
 Derivative = Callable[[sympy.Expr], sympy.Expr]
 Triple = tuple[sympy.Expr, sympy.Expr, sympy.Expr]
+Rows = Sequence[Sequence[sympy.Expr]]
+Identities = tuple[tuple[sympy.Expr, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +64,7 @@ class ClaimedMotion:
     constants: (|γ|², C0, C1) that (1.3) should have; without them (1.3) says that the three are constant.
     needs: what Ω and γ need to be defined.  attitude, angle_needs, pole: as in Formulas.
     clock: of a quadrature, F' and 1/F', which have to be continuous for the motion to exist.
+    turned: of a quaternion or a matrix, what is 0 where it is the attitude, each with the equation in words.
     """
 
     branch: str
@@ -71,6 +80,7 @@ class ClaimedMotion:
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
     clock: tuple[sympy.Expr, ...] = ()
+    turned: tuple[tuple[sympy.Expr, str], ...] = ()
 
     @property
     def state(self) -> tuple[sympy.Expr, ...]:
@@ -112,6 +122,40 @@ def motion_statements(motion: ClaimedMotion, p: Parameters, system: System) -> I
             text = f"{turning} = psi', theta', phi' of the angles"
             statement = _statement("3.1", component, motion, ours - theirs, text)
             yield replace(statement, formulas=motion.angle_formulas)
+    for component, (residual, text) in enumerate(_turning(motion, system.angular_velocity(p, y)), 1):
+        yield replace(_statement("attitude", component, motion, residual, text), formulas=motion.angle_formulas)
+
+
+def _turning(motion: ClaimedMotion, omega: Sequence[sympy.Expr]) -> Iterator[tuple[sympy.Expr, str]]:
+    """What is 0 where a quaternion or a matrix is the attitude: its own identities, and ξ' = ξ × Ω."""
+    if motion.turned:
+        yield from motion.turned
+        xi = motion.attitude[:3]
+        for ours, theirs in zip(map(motion.rate, xi), cross(xi, omega), strict=True):
+            yield ours - theirs, "xi' = xi x Omega, the first row of R"
+
+
+def of_quaternion(q: Sequence[sympy.Expr], rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Triple, Identities]:
+    """R row by row, Ω = 2 Im(q* q'), and |q|² = 1."""
+    w, *v = q
+    turn = cross(v, [rate(part) for part in v])
+    omega = [2 * (w * rate(part) - rate(w) * part - across) for part, across in zip(v, turn, strict=True)]
+    return (
+        tuple(part for row in matrix_of_quaternion(q) for part in row),
+        (omega[0], omega[1], omega[2]),
+        ((sum(part**2 for part in q) - 1, "|q|^2 = 1"),),
+    )
+
+
+def of_matrix(rows: Rows, rate: Derivative) -> tuple[tuple[sympy.Expr, ...], Triple, Identities]:
+    """R row by row, Ω of R' = R [Ω]×, and R⁻¹ = Rᵀ with det R = 1, by ξ, η = γ × ξ and γ."""
+    xi, eta, gamma = rows
+    one, two, three = transposed(rows)
+    rates = transposed([[rate(part) for part in row] for row in rows])
+    omega = dot(three, rates[1]), dot(one, rates[2]), dot(two, rates[0])
+    identities = [(dot(xi, xi) - 1, "|xi|^2 = 1, the first row of R"), (dot(xi, gamma), "xi.gamma = 0")]
+    identities += [(a - b, "eta = gamma x xi, the second row of R") for a, b in zip(eta, cross(gamma, xi), strict=True)]
+    return (*xi, *eta, *gamma), omega, tuple(identities)
 
 
 def _integral_statements(motion: ClaimedMotion, p: Parameters, system: System) -> Iterator[Statement]:
@@ -183,4 +227,4 @@ def determinant(motion: ClaimedMotion, p: Parameters) -> Statement:
 
 
 SYSTEMS = (HEAVY_TOP, GYROSTAT)
-"""Those of the paper, and of tops without k."""
+"""Systems of the paper, and of tops without k."""

@@ -43,10 +43,21 @@ from heavytop.features.claims.audit.context import (
     variable_of,
 )
 from heavytop.features.claims.audit.judge import ExplanationStep, StatementVerdict, judge, verdict_of
-from heavytop.features.claims.audit.statements import SYMBOLIC, ClaimedMotion, Triple, attitude, motion_statements
+from heavytop.features.claims.audit.statements import (
+    SYMBOLIC,
+    ClaimedMotion,
+    Identities,
+    Triple,
+    attitude,
+    motion_statements,
+    of_matrix,
+    of_quaternion,
+)
 from heavytop.precision import shown
 from heavytop.top.attitude import omega_from_angles
 from heavytop.top.equations import GYROSTAT, System
+
+Rate = Callable[[sympy.Expr], sympy.Expr]
 
 
 def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
@@ -125,28 +136,40 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         first, second, third = (shortest(formula, setting_of(context, clock.variable), domain) for formula in formulas)
         return first, second, third
 
-    if table.angles is None and (table.omega is None or table.gamma is None):
-        raise InputError("[motion] has neither angles nor both omega and gamma.", "Give omega and gamma, or angles.")
-    phi = rates = None
     turned: tuple[sympy.Expr, ...] = ()
-    angle_needs: frozenset[Need] = frozenset()
+    identities: Identities = ()
+    attitude_needs: frozenset[Need] = frozenset()
+    phi = rates = None
+    omega: Triple | None = None
+    gamma: Triple | None = None
+    if sum(part is not None for part in (table.angles, table.quaternion, table.matrix)) > 1:
+        raise InputError("[motion] gives the attitude twice.", "Give angles, or a quaternion, or a matrix.")
     if table.angles is not None:
         formulas = three(table.angles, names, "motion.angles")
         phi, theta, psi = reduced(_expressions(formulas))
         rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
-        angle_needs = needs_of(formulas)
-    gamma: Triple
+        gamma, attitude_needs = (turned[0], turned[1], turned[2]), needs_of(formulas)
+    elif table.quaternion is not None or table.matrix is not None:
+        turned, omega, identities, attitude_needs = _read_rotation(table, names, rate)
+        gamma = turned[6], turned[7], turned[8]
+    elif table.omega is None or table.gamma is None:
+        cause = "[motion] has neither an attitude nor both omega and gamma."
+        raise InputError(cause, "Give omega and gamma, or angles, a quaternion or a matrix.")
+    needs |= attitude_needs if table.gamma is None or table.omega is None else frozenset()
     if table.gamma is not None:
         formulas = three(table.gamma, names, "motion.gamma")
-        gamma, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
-    else:
-        gamma, needs = turned[:3], needs | angle_needs
+        own, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
+        if identities:
+            pairs = zip(own, gamma or (), strict=True)
+            identities += tuple((ours - theirs, "gamma is the third row of R") for ours, theirs in pairs)
+        gamma = own
     if table.omega is not None:
         formulas = three(table.omega, names, "motion.omega")
         omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
-    else:
-        assert rates is not None  # angles are required where Ω is not given
-        omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
+    assert gamma is not None  # what is not given follows from the attitude
+    if rates is not None and omega is None:
+        omega = omega_from_angles(gamma, phi, rates, SYMBOLIC)
+    assert omega is not None
     return ClaimedMotion(
         "smooth",
         domain,
@@ -157,9 +180,21 @@ def _read_motion(table: ClaimedMotionTable, context: Context, clock: Clock) -> C
         rates,
         needs=needs,
         attitude=turned,
-        angle_needs=angle_needs,
+        angle_needs=attitude_needs,
         clock=clock.values,
+        turned=identities,
     )
+
+
+def _read_rotation(
+    table: ClaimedMotionTable, names: dict[str, Formula], rate: Rate
+) -> tuple[tuple[sympy.Expr, ...], Triple, Identities, frozenset[Need]]:
+    """R row by row, its Ω and identities, and the needs of a quaternion or a matrix."""
+    if table.quaternion is not None:
+        q = [parse(text, names, f"motion.quaternion[{index}]") for index, text in enumerate(table.quaternion)]
+        return *of_quaternion([part.expression for part in q], rate), needs_of(q)
+    parts = [three(row, names, f"motion.matrix[{index}]") for index, row in enumerate(table.matrix or ())]
+    return *of_matrix([_expressions(row) for row in parts], rate), needs_of(part for row in parts for part in row)
 
 
 def _with_times(clock: Clock, content: ClaimFile) -> Clock:
@@ -288,7 +323,6 @@ class _Search:
 # A first integral or an invariant relation claimed in a file as statements.
 
 
-Rate = Callable[[sympy.Expr], sympy.Expr]
 _STATES = (
     ("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"),
     ("1", "2", "-1", "3/5", "0", "4/5"),
@@ -407,7 +441,7 @@ class UserIntegral(FileClaim):
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
-        """Expressions to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
+        """Expressions to be constant: F; or, of a relation other than a polynomial, its parts: |L| has no rate at 0."""
         if self.kind != "relation" or value.is_polynomial(*STATE):
             return (value,)
         return conditions_for_zero(value) or (value,)

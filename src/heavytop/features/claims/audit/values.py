@@ -73,7 +73,7 @@ class PrintedNumber:
 
     @classmethod
     def read(cls, text: str, what: str) -> PrintedNumber:
-        """Raises InputError for what is no decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
+        """Raises InputError for an invalid decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
         plain = text.strip().replace(_MINUS, "-")
         match = _DECIMAL.fullmatch(plain)
         whole, part = (match["whole"], match["part"] or "") if match is not None else ("", "")
@@ -266,7 +266,7 @@ class ValueClaim:
 
 
 def _figures(tables: Sequence[ValueTable]) -> Iterator[Figure]:
-    """The numbers of a file; raises InputError for what is none, and where one stands twice."""
+    """The numbers of a file; raises InputError for an invalid one, and where one stands twice."""
     seen: dict[tuple[Fraction, str, int], int] = {}
     for index, table in enumerate(tables, 1):
         where = f"value {index}"
@@ -298,7 +298,7 @@ def _number(text: str, what: str) -> Fraction:
 
 
 def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
-    """The body and its start; raises InputError for what is none."""
+    """The body and its start; raises InputError for an invalid one."""
     if (content.top is None) == (content.body is None):
         raise InputError(
             "A claim of kind value needs one of [top] and [body].",
@@ -444,7 +444,7 @@ class _KnownNumbers:
         require_handy(resolved.top, resolved.start, [figure.time for figure in figures])
 
     def require(self, figures: Sequence[Figure]) -> None:
-        """Raises InputError for a quantity that is none, or that γ alone does not fix."""
+        """Raises InputError for an unknown quantity, and one that γ alone does not fix."""
         for figure in figures:
             if figure.quantity not in SIZES and figure.quantity not in self._integrals:
                 known = ", ".join((*SIZES, *self._integrals))

@@ -147,7 +147,7 @@ def _worst_first(rows: Sequence[Row]) -> list[Row]:
 def _entry(row: Row) -> list[Cell]:
     """A claim of the library: its system, verdict, how many equations are proven and refuted, and its source."""
     verdict, refuted, held = _verdict(row)
-    counts = str(held or ""), str(len(refuted) or "")
+    counts = str(held), str(len(refuted))
     system, source = row.system.replace("_", " "), row.measured.removeprefix("claimed: ")
     return [clip(row.case), system, Word(verdict), *counts, source]
 

@@ -45,7 +45,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def text(self) -> str:
         """The citation in one line."""
         doi = f"doi:{self.doi}" if self.doi else ""
-        parts = (f"{', '.join(self.authors)} ({self.year})", self.title, self.journal, self.equations, doi)
+        authors = ", ".join(self.authors)
+        who = authors if authors == "unattributed" else f"{authors} ({self.year})"  # the year is the original's
+        parts = (who, self.title, self.journal, self.equations, doi)
         return ", ".join(part for part in parts if part)
 
 
@@ -115,7 +117,7 @@ def library() -> dict[str, Entry]:
 
 
 def file_of(name: str) -> Path | None:
-    """The file of the entry with that id or alias; None where there is none."""
+    """The file of the entry with that id or alias; None where absent."""
     named = (entry.id for entry in library().values() if name in (entry.id, *entry.aliases))
     return next((FOLDER / f"{name}.toml" for name in named), None)
 

@@ -20,10 +20,13 @@ SCHEME = sys.argv[1]  # discrete, or an integration scheme
 
 
 class Engine:
+    """Drake with a body on a ball joint, in fixed steps."""
+
     def __init__(self, body):
         self.given, self.simulator = body, None
 
     def build(self, step):
+        """Make plant and simulator: the step of a discrete plant is fixed when it is made."""
         config, plant = self.given, MultibodyPlant(step if SCHEME == "discrete" else 0.0)
         a, b, c, d, e, f = config.about_pivot[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / config.mass
         self.body = plant.AddRigidBody("top", SpatialInertia(config.mass, config.centre, UnitInertia(a, b, c, d, e, f)))
@@ -50,6 +53,8 @@ class Engine:
 
 
 class Adaptive(Engine):
+    """The same body, by a tolerance."""
+
     advance = None
 
     def reach(self, time, tolerance):

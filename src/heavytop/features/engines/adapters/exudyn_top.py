@@ -49,6 +49,7 @@ class Engine:
         self.time = run.endTime
 
     def output(self, name):
+        """A quantity of the node of the body."""
         return self.system.GetNodeOutput(self.node, getattr(exu.OutputVariableType, name))
 
     def read(self):

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib.metadata import version
 
 METHOD, BITS = sys.argv[1].split("-")
 os.environ["JAX_ENABLE_X64"] = str(BITS == "64")
@@ -21,11 +22,13 @@ MODEL = """
 
 
 def text(values):
+    """Numbers of an attribute of MJCF, each exactly."""
     return " ".join(repr(float(value)) for value in values)
 
 
 @jax.jit
 def steps(model, data, count):
+    """The data after so many steps."""
     return jax.lax.fori_loop(0, count, lambda _, data: mjx.step(model, data), data)
 
 
@@ -48,4 +51,4 @@ class Engine:
         return self.data.qpos, self.data.qvel
 
 
-serve(f"MJX:{sys.argv[1]} {mujoco.__version__}", Engine)
+serve(f"MJX:{sys.argv[1]} {version('mujoco-mjx')}", Engine)

@@ -16,6 +16,7 @@ mujoco.set_mju_user_warning(lambda message: None)  # else it writes MUJOCO_LOG.T
 
 
 def text(values):
+    """Numbers of an attribute of MJCF, each exactly."""
     return " ".join(repr(float(value)) for value in values)
 
 

@@ -21,9 +21,11 @@ class Engine:
         self.q, self.v = np.roll(body.quaternion, -1), body.omega.copy()  # x, y, z, w
 
     def acceleration(self, q, v):
+        """v' by the articulated-body algorithm, without a torque."""
         return pin.aba(self.model, self.data, q, v, self.torque).copy()
 
     def semi_implicit(self, h, q, v):
+        """A step of the semi-implicit Euler method."""
         v = v + h * self.acceleration(q, v)
         return pin.integrate(self.model, q, h * v), v
 

@@ -8,16 +8,18 @@ samples are judged by themselves as well, and where nothing does better a fall b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import permutations, product
+from itertools import combinations, permutations, product
+from typing import Any
 
 import numpy
 
 from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, other_axes
 from heavytop.features.score.diagnose.readings import (
+    Beginning,
     BodyData,
     Course,
     Reading,
@@ -26,6 +28,7 @@ from heavytop.features.score.diagnose.readings import (
     errors,
     nearest_rotation,
     rates_off,
+    residuals,
     simulate,
     turning,
 )
@@ -44,7 +47,7 @@ from heavytop.features.score.diagnose.samples import (
     principal,
 )
 from heavytop.measure.attitude_error import FORMS
-from heavytop.precision import decimal_text, shown
+from heavytop.precision import decimal_text, plain_decimal
 from heavytop.top.attitude import SEQUENCES
 
 WORTH_ASKING = 1e-10
@@ -61,6 +64,14 @@ _REFINED = 4
 _ANISOTROPY = 3.0
 """Factor by which M may grow more than Ω."""
 _NO_SHIFT = Fraction(0)
+_FEWEST = 4
+"""Samples to which the six numbers of a start, or one of the body, are fitted."""
+_SLIGHT = 1e-6
+"""Of a number relative to its size, in a difference quotient."""
+_START_DROP = 1e5
+"""How far the error must fall for a start, whose six numbers may also carry the errors of first steps."""
+Move = Callable[[Any], tuple[BodyData, Beginning]]
+"""A body and a start from numbers that are 0 for those of the file."""
 _MOST_OTHERS = 3
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
@@ -84,6 +95,7 @@ class _Try:
     """One supposition: how columns and start are read, and the body.  drop: how far the error must fall.
 
     shift: the file's columns are those of t + shift; of Ω alone where ``rates``.  still: the columns of Ω are 0.
+    mixed: a quantity, and the matrix by which the rows of its columns are to be multiplied.  begin: of the motion.
     """
 
     kind: str
@@ -95,6 +107,8 @@ class _Try:
     shift: Fraction = Fraction(0)
     rates: bool = False
     still: bool = False
+    mixed: tuple[str, Array] | None = None
+    begin: Beginning | None = None
 
 
 class _Courses:
@@ -105,11 +119,15 @@ class _Courses:
         self.made: dict[tuple[bytes, ...], Course | None] = {}
 
     def of(
-        self, start: Reading | None = None, body: BodyData | None = None, shift: Fraction = _NO_SHIFT
+        self,
+        start: Reading | None = None,
+        body: BodyData | None = None,
+        shift: Fraction = _NO_SHIFT,
+        begin: Beginning | None = None,
     ) -> Course | None:
         seen = self.seen
         which = body or seen.body
-        begin = seen.start.begin(start or seen.said, which.tensor)
+        begin = begin or seen.start.begin(start or seen.said, which.tensor)
         data = numpy.array([which.force])
         parts = (which.tensor, which.centre, data, begin.rotation, begin.omega)
         key = (str(shift).encode(), *(part.tobytes() for part in parts))
@@ -153,6 +171,13 @@ class Suppositions:
             best = self._best(pairs, own, looked)
         return best
 
+    def of_start(self) -> Diagnosis | None:
+        """Another start: with its six numbers it also follows what is only early or late, and is tried last."""
+        own = float(self.own.max())
+        if not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
+            return None
+        return self._best([(attempt, self._left(attempt)) for attempt in _start(self)], own, len(self.own))
+
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
         seen = self.every.at(list(range(min(_NEIGHBOURS, len(self.every.times)))))
@@ -170,7 +195,7 @@ class Suppositions:
     def _told(self, kind: str, numbers: dict[str, str], own: float, left: float, seen: Seen) -> Diagnosis:
         """The diagnosis, found in the samples that were ``seen``."""
         looked, states = len(seen.times), len(self.every.times)
-        until = None if looked == states else (looked, states, shown(seen.times[-1]))
+        until = None if looked == states else (looked, states, plain_decimal(seen.times[-1], 6))
         return Diagnosis(kind, numbers, own, left, until)
 
     @cached_property
@@ -188,7 +213,7 @@ class Suppositions:
 
     def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
-        if attempt.start is not None or attempt.body is not None or attempt.shift:
+        if attempt.start is not None or attempt.body is not None or attempt.shift or attempt.begin is not None:
             early = self._error(attempt, self.early)
             if not float(early.max()) <= self._refused:
                 return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
@@ -197,7 +222,7 @@ class Suppositions:
     @staticmethod
     def _error(attempt: _Try, courses: _Courses) -> Array:
         seen, body = courses.seen, attempt.body or courses.seen.body
-        course = courses.of(attempt.start, body, attempt.shift)
+        course = courses.of(attempt.start, body, attempt.shift, attempt.begin)
         if attempt.body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
         if attempt.rates and course is not None and (plain := courses.of()) is not None:
@@ -205,13 +230,19 @@ class Suppositions:
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
         if attempt.still:
             seen = replace(seen, columns={k: v for k, v in seen.columns.items() if not k.startswith("omega")})
+        if attempt.mixed is not None:
+            name, matrix = attempt.mixed
+            seen = replace(seen, columns={**seen.columns, name: seen.columns[name] @ matrix})
         return errors(seen, course, attempt.columns or seen.said, body)
 
     def _best(
         self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
     ) -> Diagnosis | None:
         largest = [(attempt, float(left[:looked].max())) for attempt, left in tried]
-        explained = [(attempt, left) for attempt, left in largest if left * (drop or attempt.drop) <= own]
+        least = {DROP: drop or DROP}  # with a number that was fitted nothing is merely likely
+        explained = [
+            (attempt, left) for attempt, left in largest if left * least.get(attempt.drop, attempt.drop) <= own
+        ]
         if not explained:
             return None
         best = min(max(left, FLOOR) for _, left in explained)
@@ -240,10 +271,12 @@ def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
     yield from _steps(suppositions)
     yield from _positions(seen)
     yield from _renamed(seen)
+    yield from _columns(seen)
     course = suppositions.courses.of()
     if course is not None:
         yield from _fitted(seen, course)
         yield from _early_rates(suppositions, course)
+        yield from _data(suppositions)
 
 
 def _steps(suppositions: Suppositions) -> Iterator[_Try]:
@@ -259,6 +292,114 @@ def _steps(suppositions: Suppositions) -> Iterator[_Try]:
             if rates and len(suppositions.seen.columns) > len(rates):
                 text = f"{'half a step' if part < 1 else 'one step'} {'early' if shift < 0 else 'late'}"
                 yield replace(whole, kind="omega_shifted", numbers={**whole.numbers, "steps": text}, rates=True)
+
+
+_WORDS = {
+    "omega": ("Ω1", "Ω2", "Ω3"),
+    "omega_space": ("Ω1", "Ω2", "Ω3"),
+    "gamma": ("γ1", "γ2", "γ3"),
+    "position": ("x", "y", "z"),
+    "euler": ("Angle 1", "Angle 2", "Angle 3"),
+    "quaternion": tuple(f"{part} of the quaternion" for part in "wxyz"),
+}
+"""The columns of a quantity; rotation vectors and modified Rodrigues parameters are read as quaternions."""
+_UNITS = {"−1": -1.0, "180/π": 180 / numpy.pi, "π/180": numpy.pi / 180}
+
+
+def _columns(seen: Seen) -> Iterator[_Try]:
+    """One column with the other sign or in another unit of angle, and two columns in each other's place."""
+    if seen.columns.keys() <= {"omega", "gamma"}:  # hypotheses of states read these in any order
+        return
+    for quantity, names in _WORDS.items():
+        if quantity not in seen.columns:
+            continue
+        if quantity == "quaternion" and seen.said.scalar_last:
+            names = *names[1:], names[0]
+        unit = numpy.eye(len(names))
+        for place, name in enumerate(names):
+            for factor, value in _UNITS.items():
+                if value < 0 or quantity in ("euler", "omega", "omega_space"):
+                    matrix = unit / numpy.where(numpy.arange(len(names)) == place, value, 1.0)
+                    yield _Try("column_scaled", {"column": name, "factor": factor}, mixed=(quantity, matrix))
+        for i, j in combinations(range(len(names)), 2):
+            order = [{i: j, j: i}.get(place, place) for place in range(len(names))]
+            numbers = {"columns": f"{names[i]} and {names[j]}"}
+            yield _Try("column_order", numbers, mixed=(quantity, unit[:, order]))
+
+
+def _data(suppositions: Suppositions) -> Iterator[_Try]:
+    """One number of the body that is another, or another start, by Gauss-Newton."""
+    seen, begin = suppositions.seen, suppositions.start
+    for kind, numbers, key, part in _scalable(seen.body) if len(seen.times) >= _FEWEST else ():
+
+        def body_of(x: Array, key: str = key, part: Any = part) -> tuple[BodyData, Beginning]:
+            scaled: dict[str, Any] = {key: getattr(seen.body, key) * (1.0 + part * x[0])}
+            return replace(seen.body, **scaled), begin
+
+        x, left = _refined(suppositions, body_of, 1)
+        factor = named(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
+        if notable(factor, Fraction(1)):
+            body, _ = body_of(numpy.array([float(factor) - 1]))
+            yield _Try(kind, {**numbers, "factor": decimal_text(factor, 8)}, body=body, drop=FITTED_DROP)
+
+
+def _start(suppositions: Suppositions) -> Iterator[_Try]:
+    """Another attitude and another Ω at t = 0."""
+    seen, begin = suppositions.seen, suppositions.start
+    size = float(numpy.linalg.norm(begin.omega)) or turning(seen.body, begin)
+
+    def start_of(x: Array) -> tuple[BodyData, Beginning]:
+        return seen.body, Beginning(begin.rotation @ _turn(x[:3]), begin.omega + size * x[3:])
+
+    x, _ = _refined(suppositions, start_of, 6)
+    if _SAME < (off := float(numpy.abs(x).max())) < numpy.inf:
+        elsewhere = start_of(x)[1]
+        numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(elsewhere.omega)}
+        yield _Try("start", numbers, begin=elsewhere, drop=_START_DROP * max(1.0, float(suppositions.own.max()) / off))
+
+
+def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
+    """Kind and numbers of a mistake, the field of the body that it is in, and the part of that which has a factor."""
+    if body.force and body.centre.any():
+        yield "weight", {}, "gravity", 1.0
+    if body.mass and body.about_centre:
+        yield "mass", {}, "mass", 1.0
+    if body.rotor is not None:
+        yield "top", {"number": "The rotor"}, "rotor", 1.0
+    for i, unit in enumerate(numpy.eye(3)):
+        yield "top", {"number": f"I{i + 1}{i + 1}"}, "inertia", numpy.diag(unit)
+        if body.centre[i]:
+            yield "top", {"number": f"Number {i + 1} of the centre"}, "centre", unit
+
+
+def _refined(suppositions: Suppositions, move: Move, count: int) -> tuple[Array, float]:
+    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves."""
+    x, here = numpy.zeros(count), numpy.zeros(1)
+    for courses in (suppositions.early, suppositions.courses):
+        seen = courses.seen
+
+        def off(x: Array, courses: _Courses = courses, seen: Seen = seen) -> Array:
+            body, begin = move(x)
+            course = courses.of(body=body, begin=begin)
+            return numpy.full(1, numpy.inf) if course is None else residuals(seen, course, seen.said, body)
+
+        here = off(x)
+        for _ in range(2 * _REFINED):
+            slopes = [(off(x + _SLIGHT * unit) - here) / _SLIGHT for unit in numpy.eye(count)]
+            if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
+                break
+            after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=None)[0]
+            there = off(after)
+            if not float(there @ there) < float(here @ here):
+                break
+            x, here = after, there
+    return x, float(numpy.abs(here).max())
+
+
+def _turn(vector: Array) -> Array:
+    """The rotation by a small vector, to its second order a rotation."""
+    a, b, c = vector
+    return nearest_rotation(numpy.eye(3) + numpy.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]))
 
 
 def _early_rates(suppositions: Suppositions, course: Course) -> Iterator[_Try]:
@@ -381,9 +522,18 @@ def _bodies(seen: Seen) -> Iterator[tuple[str, dict[str, str], BodyData]]:
     if body.mass and body.steiner.any():
         where = "fixed point" if body.about_centre else "centre of mass"
         yield "inertia_about", {"about": where}, replace(body, about_centre=not body.about_centre)
+        for times in (-1, 2):
+            inertia = body.inertia + times * body.steiner
+            yield "steiner", {"times": str(times)}, replace(body, inertia=inertia, about_centre=False)
     off = body.inertia - numpy.diag(numpy.diag(body.inertia))
     if off.any():
-        yield "products_of_inertia", {}, replace(body, inertia=body.inertia - 2 * off)
+        pairs = [pair for pair in combinations(range(3), 2) if off[pair]]
+        for which in (some for count in range(len(pairs), 0, -1) for some in combinations(pairs, count)):
+            signs = numpy.ones((3, 3))
+            for i, j in which:
+                signs[i, j] = signs[j, i] = -1.0
+            entries = {} if len(which) == len(pairs) else {"entries": ", ".join(f"I{i + 1}{j + 1}" for i, j in which)}
+            yield "products_of_inertia", entries, replace(body, inertia=body.inertia * signs)
         moments, axes = principal(body.inertia)
         for turn in (numpy.eye(3), *(numpy.array(matrix) for matrix, _ in _rotations())):
             named_so, again = axes @ turn, turn.T * moments @ turn

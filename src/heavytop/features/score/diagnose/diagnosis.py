@@ -52,6 +52,9 @@ VARIES, AS_AT_START = "varies", "that of the start"
 """Words for first integrals that do not keep another value."""
 _FEWEST_ROWS = 4
 _FEWEST_STILL = 3
+_WHOLE = slice(None)
+_VECTORS = {"": _WHOLE, "γ": slice(3, None), "Ω": slice(0, 3)}
+"""Parts of a state that may stand still."""
 _ALONE = 1000.0
 """States are alone in being off if they are off by so many times as much as any other, ..."""
 _RIGHT = 1e-2
@@ -59,13 +62,13 @@ _RIGHT = 1e-2
 _FEW_OF, _MOST_ALONE = 4, 8
 """... and if they are at most one in four of all, and so many."""
 _GRID = 200
-"""Of times behind the start, within one interval between samples."""
+"""Number of times behind the start, within one interval between samples."""
 _BACK, _JUMPS = 0.05, 0.3
 """A state that is so near to one of those is back at the start; one that is so far from where it should be jumps."""
 _AGAIN, _FOLLOWED = 10.0, 6
 """The error of so many samples must fall by so much where a motion is said to start again."""
 _LONG = 1.5
-"""The last interval between times is no measure of a state if it is so many times the longest other."""
+"""The last interval between times does not measure a state if it is so many times the longest other."""
 
 
 def diagnose(
@@ -137,7 +140,7 @@ def _explanation(examined: Examined | None, columns: Suppositions | None, column
         exact = _looked_at(every, _lost_row(every))
     exact = exact or next((sure for first in FIRST if (sure := told(first)) is not None), None)
     if exact is None and columns is not None:
-        exact = columns.of_rates()
+        exact = columns.of_rates() or columns.of_start()
     likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
     return exact or likely or (None if examined is None else _looked_at(examined, _integrals_off(examined)))
 
@@ -234,27 +237,33 @@ def _reset(examined: Examined | None) -> Diagnosis | None:
 def _still(
     examined: Examined | None, states: Sequence[Sequence[Fraction | None]], relative_error: float | None
 ) -> Diagnosis | None:
-    """From some time on every state is the same, which are three at least, though the motion moves there."""
-    same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
-    right = relative_error is not None and relative_error <= _WRONG
-    if examined is None or right or same < _FEWEST_STILL or not _moves(examined, len(states) - same):
+    """From some time on every state, or Ω or γ of it, is the same, in three at least, though the motion moves there."""
+    if examined is None or (relative_error is not None and relative_error <= _WRONG):
         return None
-    if same == len(states):
-        return Diagnosis("constant")
-    first = in_units(examined.all_times[-same], examined.units.time)
-    return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
+    for name, part in _VECTORS.items():
+        rows = [list(state[part]) for state in states]
+        same = next((n for n, row in enumerate(reversed(rows)) if row != rows[-1]), len(rows))
+        if same < _FEWEST_STILL or not _moves(examined, len(rows) - same, part):
+            continue
+        if same < len(rows):
+            first = in_units(examined.all_times[-same], examined.units.time)
+            of = {"vector": name} if name else {}
+            return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}", **of})
+        if not name:
+            return Diagnosis("constant")
+    return None
 
 
-def _moves(examined: Examined, row: int) -> bool:
+def _moves(examined: Examined, row: int, part: slice) -> bool:
     """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
     true, here = examined.supposed(examined.all_times[row : row + 2]), examined.all_states[row]
     pairs = [(here, examined.follows(row))] + ([] if true is None else [(true[0], true[1])])
-    return any(after is not None and _apart(examined, after, before) > _WRONG for before, after in pairs)
+    return any(after is not None and _apart(examined, after, before, part) > _WRONG for before, after in pairs)
 
 
-def _apart(examined: Examined, one: Array, other: Array) -> float:
-    """How far two states are apart, relative to the size of Ω and of γ."""
-    return float((numpy.abs(one - other) / numpy.repeat([examined.rate, 1.0], [3, len(one) - 3])).max())
+def _apart(examined: Examined, one: Array, other: Array, part: slice = _WHOLE) -> float:
+    """How far two states, or parts of them, are apart, relative to the size of Ω and of γ."""
+    return float((numpy.abs(one - other) / numpy.repeat([examined.rate, 1.0], [3, len(one) - 3]))[part].max())
 
 
 def _off_alone(examined: Examined | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:

@@ -7,12 +7,13 @@ Numbers are fitted to the first integrals, which are linear in them: with M = I�
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import permutations, product
 from math import ceil, isfinite
+from operator import add
 from typing import Any, TypeVar
 
 import numpy
@@ -27,6 +28,7 @@ from heavytop.features.score.diagnose.samples import (
     LIKELY_DROP,
     SHORT,
     SMALL,
+    WITH_ATTITUDE,
     Array,
     Examined,
     Hypothesis,
@@ -35,8 +37,8 @@ from heavytop.features.score.diagnose.samples import (
     named,
     notable,
 )
-from heavytop.precision import cross, decimal_text, dot
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System, heavy_top
+from heavytop.precision import cross, decimal_text
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 # Columns that mean something else than Ω and γ in body axes: axes renamed or reversed, γ down, M in place of Ω.
@@ -190,7 +192,7 @@ _MARGIN = 30.0
 _BIAS = 0.02
 """A number of the start that is off by less, relative to its vector, may be a method's own unless it is round."""
 _SPARSE = 0.05
-"""Of the distance between short decimals, within which a number is none by accident."""
+"""Of the distance between short decimals, within which agreement is not accidental."""
 _AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first to distinguish a start from the method's own errors."""
@@ -444,40 +446,150 @@ def _text(value: Fraction) -> str:
 # These are asked after everything simpler.
 
 
-def _turned_back(p: Parameters, y: Any) -> tuple[Any, ...]:
-    """The heavy top with γ' = Ω × γ."""
-    return (*heavy_top(p, y)[:3], *cross(y[:3], y[3:6]))
-
-
-_TURNED_BACK = System("gamma_turned_back", _turned_back, HEAVY_TOP.angular_velocity)
 _ANOTHER_MOTION = 0.03
 """Relative errors below it are not those of another field, each of which is compiled anew."""
 _STEP = 0.05
-"""Radians that the body turns in a step of that method."""
-_OMEGA_BACK = numpy.array([-1.0, -1, -1, 1, 1, 1])
+"""Radians that the body turns in a step of that method, ..."""
+_OF_STEPS = 1e-5
+"""... and about what its errors are in the first samples."""
+_EVERY = 0, 1, 2
+_NEXT = (1, 2), (2, 0), (0, 1)
+_LETTERS = "abc"
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A vector of the equations, one of whose components, or all, have another factor.
+
+    of: whose derivative it enters: 0 of Ω, 1 of M, 2 of γ.  vector: from M' without the torque, γ, n, Ω and the rates,
+    in the axes of the file.  text: of one component in an equation, from the numbers of the two other axes.
+    """
+
+    of: int
+    vector: Callable[..., Sequence[Any]]
+    text: str = ""
+
+
+def _halves(left: int, right: int, first: int) -> Callable[..., Sequence[Any]]:
+    """One of the two terms of each component of a cross product."""
+    sign = -1 if first else 1
+
+    def half(*vectors: Any) -> list[Any]:
+        one, other = vectors[left], vectors[right]
+        return [sign * one[pair[first]] * other[pair[1 - first]] for pair in _NEXT]
+
+    return half
+
+
+_RATES = {0: _Part(0, lambda *v: v[4][:3]), 2: _Part(2, lambda *v: v[4][3:6])}
+_GYROSCOPIC = _Part(1, lambda *v: v[0], "the gyroscopic term")
+_PARTS = (
+    _GYROSCOPIC,
+    _Part(1, lambda *v: cross(v[1], v[2]), "the torque of gravity"),
+    _Part(1, _halves(1, 2, 0), "γ{0} P {3}"),
+    _Part(1, _halves(1, 2, 1), "γ{1} P {2}"),
+    _Part(2, _halves(1, 3, 0), "γ{0} Ω{1}"),
+    _Part(2, _halves(1, 3, 1), "γ{1} Ω{0}"),
+)
+
+
+class _Altered(System):
+    """Equations with another factor somewhere; a rotor is a constant in them."""
+
+    def parameters(self, top: HeavyTop, start: State) -> Parameters:
+        """Those of the field: moments and n."""
+        return Parameters(top.inertia, top.moment, 0)
+
+
+@lru_cache(maxsize=64)
+def _altered(
+    system: System,
+    rotor: Any,
+    axes: tuple[tuple[float, ...], ...],
+    changes: tuple[tuple[_Part, tuple[int, ...]], ...],
+    factor: float,
+) -> _Altered:
+    """The system with those components of the parts, in the axes of the file, multiplied by the factor."""
+
+    def turned(vector: Sequence[Any]) -> list[Any]:
+        return [_combined(row, vector) for row in axes]
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        rates = list(system.field(p._replace(rotor=rotor), y))
+        gamma, n = turned(y[3:6]), turned(p.moment)
+        momentum = turned([i * rate for i, rate in zip(p.inertia, rates, strict=False)])
+        gyroscopic = [m - t for m, t in zip(momentum, cross(gamma, n), strict=True)]
+        vectors = gyroscopic, gamma, n, turned(y[:3]), [*turned(rates[:3]), *turned(rates[3:6])]
+        for part, components in changes:
+            vector = part.vector(*vectors)
+            for place in range(3):
+                more = _combined([(factor - 1) * axes[i][place] for i in components], [vector[i] for i in components])
+                rates[place + 3 * (part.of == 2)] += more / p.inertia[place] if part.of == 1 else more
+        return tuple(rates)
+
+    name = f"{system.name}_altered_{abs(hash((rotor, axes, changes, factor)))}"
+    return _Altered(name, field, HEAVY_TOP.angular_velocity)
+
+
+def _combined(weights: Sequence[float], values: Sequence[Any]) -> Any:
+    """The sum of the values times the weights that are not 0."""
+    parts = [value if weight == 1 else weight * value for weight, value in zip(weights, values, strict=True) if weight]
+    return reduce(add, parts) if parts else 0.0 * values[0]
+
+
+_SIGNS = {
+    "kinematic_sign": ((_RATES[2], _EVERY),),
+    "gyroscopic_sign": ((_GYROSCOPIC, _EVERY),),
+    "both_signs": ((_GYROSCOPIC, _EVERY), (_RATES[2], _EVERY)),
+}
 
 
 def of_equations(run: Examined, truth: Array | None) -> Iterator[Hypothesis]:
-    """Other equations, axes and orders; one equation with the other sign only where nothing else fits."""
-    hypotheses: list[Hypothesis] = []
-    if truth is not None:
-        hypotheses += constant_column(run, truth)
-        hypotheses += [_any_order(run, truth), *_axes_of_space(run, truth)] if len(run.frame.columns) == 6 else []
-    if run.system is HEAVY_TOP and run.is_whole:
-        hypotheses += _signs(run)
+    """Other equations, axes and orders; one equation or one term that is wrong only where nothing else fits."""
+    if truth is None:
+        return
+    hypotheses = [*constant_column(run, truth)]
+    if len(run.frame.columns) == 6:
+        hypotheses += [_any_order(run, truth), *_axes_of_space(run, truth)]
+    error, early = run.error(truth), run.at(run.rows[: FIRST[0]]).error(truth[: FIRST[0]])
+    if run.system not in WITH_ATTITUDE:
+        yield from hypotheses
+        return
+    hypotheses += [_of_field(run, early, kind, {}, changes) for kind, changes in _SIGNS.items()]
     yield from hypotheses
-    error = run.error(truth)
-    if (
-        run.is_whole
-        and error > _ANOTHER_MOTION
-        and all(hypothesis.left * FITTED_DROP > error for hypothesis in hypotheses)
-    ):
-        for index, name in enumerate(NAMES):
-            system = _negated(run.system, index, tuple(map(tuple, run.frame.axes.tolist())))
-            other = replace(run, system=system)
-            if _begins_so(other, error / LIKELY_DROP):
-                left = run.error(other.supposed(run.times))
-                yield Hypothesis("component_sign", {"column": name}, left, FITTED_DROP)
+    if error > _ANOTHER_MOTION and all(hypothesis.left * FITTED_DROP > error for hypothesis in hypotheses):
+        yield from _terms(run, early)
+
+
+def _terms(run: Examined, early: float) -> Iterator[Hypothesis]:
+    """One equation with the other sign; one term of an equation with the other sign, or left out."""
+    for index, name in enumerate(NAMES):
+        rates = _RATES[0 if index < 3 else 2]
+        yield _of_field(run, early, "component_sign", {"column": name}, ((rates, (index % 3,)),))
+    for part, i in product(_PARTS, range(3)):
+        j, k = _NEXT[i]
+        text = part.text.format(j + 1, k + 1, _LETTERS[j], _LETTERS[k])
+        numbers = {"column": f"{'γ' if part.of == 2 else 'M'}{i + 1}", "term": text}
+        for kind, factor in (("term_missing", 0.0), ("term_sign", -1.0)):
+            yield _of_field(run, early, kind, numbers, ((part, (i,)),), factor)
+
+
+def _of_field(
+    run: Examined,
+    early: float,
+    kind: str,
+    numbers: dict[str, str],
+    changes: tuple[tuple[_Part, tuple[int, ...]], ...],
+    factor: float = -1.0,
+) -> Hypothesis:
+    """The error that a change of the field leaves; infinite where that of the first samples does not fall with it."""
+    rotor = run.system.parameters(run.top, run.start).mapped(float).rotor
+    axes = tuple(map(tuple, run.frame.axes.tolist()))
+    other = replace(run, system=_altered(run.system, rotor, axes, changes, factor))
+    left = (
+        run.error(other.supposed(run.times)) if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
+    )
+    return Hypothesis(kind, numbers, left, FITTED_DROP)
 
 
 def _begins_so(given: Examined, allowed: float) -> bool:
@@ -501,38 +613,6 @@ def _begins_so(given: Examined, allowed: float) -> bool:
         time = end
         states.append(y)
     return early.error((numpy.array(states).reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)) <= allowed
-
-
-@lru_cache(maxsize=18)
-def _negated(system: System, index: int, axes: tuple[tuple[float, ...], ...]) -> System:
-    """The equations with the derivative of one component, in the axes of the file, negated."""
-    along, block = axes[index % 3], slice(index - index % 3, index - index % 3 + 3)
-
-    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
-        rates = list(system.field(p, y))
-        twice = 2.0 * dot(along, rates[block])
-        rates[block] = [
-            value - part * twice if part else value for value, part in zip(rates[block], along, strict=True)
-        ]
-        return tuple(rates)
-
-    name = f"{system.name}_{NAMES[index]}_negated" + "_".join(map(float.hex, along))
-    return replace(system, name=name, field=field)
-
-
-def _signs(run: Examined) -> Iterator[Hypothesis]:
-    """A sign in the equations turned over.
-
-    With −Ω in the place of Ω, M' = Ω × M + P γ × r is M' = M × Ω − P γ × r, and γ' = γ × Ω is γ' = Ω × γ.
-    """
-    top, start = run.top, run.start
-    lifted, reversed_start = replace(top, weight=-top.weight), State([-w for w in start.omega], start.gamma)
-    other = replace(run, system=_TURNED_BACK)
-    yield Hypothesis("kinematic_sign", {}, run.error(other.supposed(run.times)), FITTED_DROP)
-    for kind, system in (("gyroscopic_sign", _TURNED_BACK), ("both_signs", HEAVY_TOP)):
-        states = replace(run, system=system).supposed(run.times, lifted, reversed_start)
-        error = run.error(None if states is None else states[:, :6] * _OMEGA_BACK)
-        yield Hypothesis(kind, {}, error, FITTED_DROP)
 
 
 def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:
@@ -576,7 +656,7 @@ _REFINED = 6
 _FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
-"""The samples must spread over so much of their time: an integrator's own lag grows with time and is no shift."""
+"""The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
 _NEAR_ONE = 0.05
 """A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
 _SHORT = 3

@@ -91,7 +91,7 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
-    """The motion at ``times``; None for what is no body, or cannot be computed."""
+    """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
         return None
@@ -301,22 +301,26 @@ def errors(seen: Seen, course: Course | None, reading: Reading, body: BodyData) 
     """The error of each sample, read so, relative to the size of each quantity; infinite without a motion."""
     if course is None:
         return numpy.full(len(seen.times), numpy.inf)
-    parts = [_error(seen, course, reading, body, name, values) for name, values in seen.columns.items()]
-    largest: Array = numpy.nan_to_num(numpy.max(parts, axis=0), nan=numpy.inf, posinf=numpy.inf)
+    off = numpy.abs(residuals(seen, course, reading, body)).reshape(len(seen.times), -1).max(axis=1)
+    largest: Array = numpy.nan_to_num(off, nan=numpy.inf, posinf=numpy.inf)
     return largest
 
 
-def _error(seen: Seen, course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
+def residuals(seen: Seen, course: Course, reading: Reading, body: BodyData) -> Array:
+    """What the columns, read so, have more than the motion, relative to the size of each quantity, sample by sample."""
+    parts = [_residual(seen, course, reading, body, name, values) for name, values in seen.columns.items()]
+    return numpy.concatenate(parts, axis=1).reshape(-1)
+
+
+def _residual(seen: Seen, course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:
     if name == "position":
-        off = _position_error(seen, course, reading, values)
-    elif name == "gamma":
-        off = reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]
-    elif name in ("omega", "omega_space"):
-        off = _omega_error(course, reading, body, name, values)
-    else:
-        off = (reading.rotation(name, values) - course.rotation).reshape(len(values), 9)
-    largest: Array = numpy.abs(off).max(axis=1)
-    return largest
+        return _position_error(seen, course, reading, values)
+    if name == "gamma":
+        gamma: Array = reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]
+        return gamma
+    if name in ("omega", "omega_space"):
+        return _omega_error(course, reading, body, name, values)
+    return (reading.rotation(name, values) - course.rotation).reshape(len(values), 9)
 
 
 def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> Array:

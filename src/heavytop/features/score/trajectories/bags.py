@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, quoted
+from heavytop.extras import require_extra
 
 SUFFIXES = (".mcap", ".bag", ".db3")
 _NAMES = ("orientation.w", "rotation.w", "angular_velocity.x", "angular.x", "quaternion.w")
@@ -55,13 +56,12 @@ def of_bag(path: Path) -> str:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.rosbag1 import ReaderError as FirstReaderError
-        from rosbags.rosbag2 import ReaderError as SecondReaderError
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise InputError("ROS bags and MCAP need rosbags.", "Install it with: pip install 'heavytop[logs]'") from None
+    require_extra("logs")
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.rosbag1 import ReaderError as FirstReaderError
+    from rosbags.rosbag2 import ReaderError as SecondReaderError
+    from rosbags.typesys import Stores, get_typestore
+
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             yield reader

@@ -65,7 +65,7 @@ _TIME = ("t", "time", "timestamp", "stamp")
 _TOGETHER = (tuple("wxyz"), tuple("xyzw"), ("e0", "e1", "e2", "e3"))
 """Names of four columns beside each other that are a quaternion, and alone are something else or nothing."""
 _SAID = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$|^[^\[(/]*/\s*(.+)$")
-"""What stands in the last brackets of a name, or behind its first slash."""
+"""Unit in the last brackets of a name, or behind its first slash."""
 _A_SECOND = ("/s", "/sec", "/second", "s-1")
 _SECOND = {
     "ms": Fraction(1, 10**3),
@@ -94,7 +94,7 @@ class Unit:
     turning: bool = False
 
     def factor(self, digits: int) -> Fraction:
-        """What numbers of so many digits are multiplied by; π to many more."""
+        """Factor of the unit for numbers of so many digits; π to many more."""
         with working_precision(4 * digits + 64):
             return self.size * midpoint(arb.pi()) if self.turning else self.size
 
@@ -103,7 +103,7 @@ class Unit:
 class Header:
     """The quantities in the columns of a table.
 
-    time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
+    time: the place of t; None where absent.  places: by the name of the quantity, those of its components, by
     their names, in the order in which they stand.  angles: degrees or radians, where it says so.  others: not read.
     units: of t and of quantities, where they are not those of the data.
     """
@@ -226,7 +226,7 @@ def _in_one_unit(units: Mapping[str, set[Unit]]) -> dict[str, Unit]:
 
 
 def _with_index(name: str) -> str:
-    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``: what is in brackets is no unit but a component."""
+    """omega1 of ``omega[1]`` and R11 of ``R[1][1]`` or ``R(1, 1)``: what is in brackets is a component, not a unit."""
     match = _INDEXED.fullmatch(name)
     base = _plain(match[1]) if match else ""
     if match is None or base in _TIME or (base not in _CLASSIC and _meaning(base) is not None):
@@ -416,9 +416,7 @@ def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
             if isinstance(value, list)
             else "is not a list"
         )
-        raise InputError(
-            f"{what} {has}.", f"Give {count} numbers, each with a decimal point." if count else "Give a list."
-        )
+        raise InputError(f"{what} {has}.", f"Give {count} numbers, such as 2.5 (not 2,5)." if count else "Give a list.")
     return value
 
 
@@ -635,9 +633,10 @@ def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...]
     for name in ("omega", "omega_space"):
         if first.get(name):
             return vector(list(first[name] or ()), name), name == "omega_space"
+    plural = " (omegas are the columns of JSON)" if "omegas" in document else ""
     raise InputError(
         "The key omega is missing, and no row t = 0 gives it.",
-        "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
+        f"Give omega (in body axes) or omega_space at t = 0{plural}, or the row t = 0, or --case NAME.",
     )
 
 

@@ -49,7 +49,7 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
-"""What stands behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+"""Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
 _ALL_COLUMNS = "Give every row all of its columns."
@@ -119,7 +119,7 @@ class TextTable:
         else:
             places = meaning.of_state()
             if missing := [name for name in COLUMNS if name not in places]:
-                raise _no_header(missing)
+                raise _no_header(missing, names)
             self.rows = [[row[places[name]] for name in COLUMNS] for row in self.cells]
             others = [name for index, name in enumerate(names) if index not in places.values()]
         self.notes += unread(others, names)
@@ -154,7 +154,7 @@ class TextTable:
         if text := next((text for text in first if not _is_number(text)), None):
             raise InputError(f"There is no header, and {quoted(text)} of the first row is not a number.", logs.NAMES)
         if width == len(logs.TUM) and logs.is_unit(first[-4:]):
-            self.notes.append(f"there is no header; the columns are taken as {' '.join(logs.TUM)}")
+            self.notes.append(f"without a header the columns are taken as {' '.join(logs.TUM)}")
             return logs.TUM
         if width == len(logs.KITTI):
             raise InputError(
@@ -167,7 +167,7 @@ class TextTable:
                 f"not {len(COLUMNS)}.",
                 "Give a header that names the columns.",
             )
-        self.notes.append(f"there is no header; the columns are taken as {' '.join(COLUMNS)}")
+        self.notes.append(f"without a header the columns are taken as {' '.join(COLUMNS)}")
         return COLUMNS
 
 
@@ -179,8 +179,9 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     return [f"columns that are not read: {', '.join(name[:20] for name in more[:6])}"] if more else []
 
 
-def _no_header(missing: list[str]) -> InputError:
-    said = f": {', '.join(missing)} not found" if missing else ""
+def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
+    among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
+    said = f": {', '.join(missing)} not found{among}" if missing else ""
     return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
 
 
@@ -194,7 +195,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
         separator = _separator(line)
     line = _REMARK.sub("", line).rstrip()
     cells = _COMMA.split(line) if separator == "," and "[" in line else line.split(separator)
-    # a separator behind the last column is no column
+    # a separator behind the last column is not a column
     if separator and len(cells) > 1 and not cells[-1].strip():
         cells = cells[:-1]
     return [cell.strip().strip("\"'").strip() for cell in cells]
@@ -213,7 +214,7 @@ def _is_header(names: list[str], width: int) -> bool:
 
 
 def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
-    """The cells of every row; raises InputError that names the line of one that has not as many as the header."""
+    """The cells of every row; raises InputError that names the line of one with another number than the header."""
     rows = []
     for number, line in zip(lines, body, strict=True):
         cells = _cells(line, separator)
@@ -287,7 +288,7 @@ _NOT_READ |= {
     "pivot",
     *map(key_of, SHAPES),
 }
-"""What else `heavytop propagate --json` writes."""
+"""Further keys of `heavytop propagate --json`."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 _ROW_SLACK = Fraction(1, 100)
@@ -422,7 +423,7 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
 
 
 def _times(document: dict[str, Any]) -> list[Fraction]:
-    """The times, exact and in order; raises InputError where there is none but 0."""
+    """The times, exact and in order; raises InputError where all are 0."""
     if "lines" in document:
         texts = observed_columns.times(document)
     else:
@@ -434,7 +435,7 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
 
 
 def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
-    """What a file says of itself: name, integrator, outcome, steps, flags, and whether its format was guessed."""
+    """Metadata of a file: name, integrator, outcome, steps, flags, and whether its format was guessed."""
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")

@@ -63,7 +63,7 @@ _EPOCH_UNITS = ((10**17, "ns"), (10**14, "us"), (10**11, "ms"))
 
 
 def canonical(name: str, joint: str = "") -> str:
-    """The name of a column as this program writes it; the name itself where it is no alias.
+    """The name of a column as this program writes it; the name itself unless it is an alias.
 
     joint: "free" or "ball", of the columns qpos and qvel of MuJoCo.
     """
@@ -254,7 +254,7 @@ def is_ephemeris(text: str) -> bool:
 def of_ephemeris(text: str) -> str:
     """An attitude ephemeris message of quaternions as a table; its COMMENT lines are comments.
 
-    Raises InputError for several segments, another kind of attitude, and an epoch that is none.
+    Raises InputError for several segments, another kind of attitude, and an invalid epoch.
     """
     if text.count("META_START") != 1:
         raise InputError(f"The message has {text.count('META_START')} segments.", "Give one.")

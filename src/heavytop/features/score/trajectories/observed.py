@@ -109,7 +109,7 @@ def body_data(body: AnyBody) -> BodyData:
 _SLACK = 8
 """A quaternion or a matrix may be off by so many bits of rounding."""
 _ROW_SLACK = Fraction(1, 100)
-"""What is read from a row t = 0 is written with the digits of the other rows."""
+"""A start read from a row t = 0 is written with the digits of the other rows."""
 _FAR = Fraction(1, 10)
 """A row whose quaternion or matrix is off by more is refused."""
 _IRRATIONAL_BITS = 1200
@@ -149,7 +149,7 @@ def rotation(raw: RawStart, said: Convention, precision: Precision, normalize: b
     """R in canonical axes of space, exactly orthogonal: three rows ξ, η, γ of exact numbers.
 
     normalize: take the rotation nearest to what is given, however far off it is.
-    Raises InputError for a quaternion that has not length 1, a matrix that is not a rotation, and a γ beside it that is
+    Raises InputError for a quaternion off length 1, a matrix that is not a rotation, and a γ beside it that is
     not its third row.
     """
     slack = _ROW_SLACK if raw.from_row else 2**_SLACK * precision.eps
@@ -211,7 +211,7 @@ def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
 
 
 def require_direction(values: Sequence[Fraction], what: str) -> None:
-    """Raises InputError for a quaternion 0, which is no attitude."""
+    """Raises InputError for a zero quaternion."""
     if not any(values):
         raise InputError(f"{what} must not be zero.", "Give a quaternion of length 1.")
 
@@ -280,7 +280,7 @@ def raw_start(start: State) -> RawStart:
 
 LONGEST_NAME = 200
 _ODD_GAMMA = Fraction(1, 10)
-"""A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
+"""A state whose |γ|² is off 1 by more is not rounding, and seldom a method."""
 _FITS_ANYWHERE = 1 << 1023
 """Every format holds numbers below that."""
 _SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
@@ -315,7 +315,7 @@ class GivenTrajectory:
     observed: Observed | None = None
 
     def warnings(self) -> list[str]:
-        """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
+        """Data that no rigid body can have, and γ so far off the unit sphere that columns may be in another order."""
         if self.observed is not None:
             return [*self.notes, *self.observed.body.warnings()]
         sentences = [*self.notes, *self.top.warnings()]
@@ -482,7 +482,7 @@ def observed(
     precision: Precision,
     normalize: bool = False,
 ) -> tuple[Observed, list[tuple[Fraction, ...] | None]]:
-    """What is scored, and for each row all of its numbers, None where one is not finite.
+    """Scored columns, and for each row all of its numbers, None where one is not finite.
 
     normalize: take quaternions and matrices of any length for their rotations, at the start and in the rows.
     Raises InputError for quaternions and matrices that are none, with their place.
