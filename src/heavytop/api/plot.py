@@ -602,7 +602,7 @@ def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
         drawn.plot(times, largest, dashes, color=COLOURS[index % len(COLOURS)], lw=_WIDTH, label=fault.name)
     drawn.axhline(test.tolerance, color=_GREY, lw=_WIDTH, ls="--")
     drawn.set(xlabel=_TIME, ylabel="largest error so far", yscale="log")
-    drawn.legend(fontsize="x-small")
+    drawn.legend(fontsize="x-small", loc="best", framealpha=0.6)
     return drawn
 
 
@@ -622,5 +622,5 @@ def between(samples: Sequence[SpacedErrors], axes: Axes | None = None) -> Axes:
         if points:
             drawn.plot(*zip(*points, strict=True), "o-", color=colour, lw=_WIDTH, ms=3, label=name)
     drawn.set(xlabel="time between samples", ylabel="largest error", xscale="log", yscale="log")
-    drawn.legend(fontsize="x-small")
+    drawn.legend(fontsize="x-small", loc="best", framealpha=0.6)
     return drawn

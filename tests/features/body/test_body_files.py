@@ -182,6 +182,16 @@ def test_a_plate_in_printed_digits_is_a_body(tmp_path: Path) -> None:
     assert (code, document["realisable"]) == (1, False)
 
 
+def test_free_rotations_are_said_to_be_stable_or_not(tmp_path: Path) -> None:
+    """About the middle axis of moments 3, 2, 4 the rate is √((4 − 3)(3 − 2)/(4·2)) of the angular velocity."""
+    _, document = judged(tmp_path / "a.urdf", urdf(["3", "2", "4", "0", "0", "0"], mass="9", centre="0 0 0"))
+    rotations = document["rotations"]
+    assert [rotation["verdict"] for rotation in rotations] == ["unstable", "stable", "stable"]  # type: ignore[attr-defined]
+    assert rotations[0]["rate"] == pytest.approx(8**-0.5)  # type: ignore[index]
+    shown = heavytop("body", tmp_path / "a.urdf").stdout
+    assert "about axis 1: unstable, rate 0.3536 of the angular velocity" in shown
+
+
 def test_usd_and_the_ball_joint_of_mjcf(tmp_path: Path) -> None:
     text = """#usda 1.0
 (

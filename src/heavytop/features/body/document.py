@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
 from heavytop.precision import Vector, decimal_text
 from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
 from heavytop.top.body_files import BodyInFile
+from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.inertia_slips import MassProperties, Slip, realisable, six_of, slips
+from heavytop.top.stability import Stability, stability
 
 GRAVITY = "9.81"
 _NAMES = ("I11", "I22", "I33", "I12", "I13", "I23")
 _DIGITS, _PRINTED = 17, 6
 _BITS = 64
+_EQUAL = Fraction(1, 10**9)
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,19 @@ class BodyAssessment:
     def principal(self) -> PrincipalAxes:
         """Principal axes and moments about the centre of mass, to 64 bits."""
         return principal_axes(self.given.central, _BITS)
+
+    @property
+    def rotations(self) -> list[Stability]:
+        """Stability of the free rotation about each principal axis, in the order of the moments, at Ω = 1.
+
+        Moments that differ by the rounding of printed digits are taken as equal.
+        """
+        moments = self.principal.moments
+        apart = max(4 * self.given.slack, _EQUAL * max(moments))
+        alike = [next(value for value in moments if abs(value - moment) <= apart) for moment in moments]
+        parameters = Parameters(alike, (Fraction(0),) * 3, Fraction(0))
+        rows = [[Fraction(k == axis) for k in range(6)] for axis in range(3)]
+        return [steady for row in rows if (steady := stability(HEAVY_TOP, parameters, row)) is not None]
 
     @property
     def sound(self) -> bool:
@@ -81,6 +97,7 @@ class BodyAssessment:
             "slips": [
                 {"name": slip.name, "sentence": slip.sentence, "inertia": _mended(slip.inertia)} for slip in self.slips
             ],
+            "rotations": [asdict(rotation) for rotation in self.rotations] if self.realisable else [],
             "toml": self.toml,
         }
 
@@ -110,6 +127,9 @@ class BodyAssessment:
             label = "principal axes" if not axis else ""
             yield f"{label:<20}{', '.join(decimal_text(value, _PRINTED) for value in direction)}"
         if self.realisable:
+            for axis, rotation in enumerate(self.rotations):
+                rate = f", rate {rotation.rate:.4g} of the angular velocity" if rotation.rate else ""
+                yield f"{'' if axis else 'free rotation':<20}about axis {axis + 1}: {rotation.verdict}{rate}"
             yield from ("", self.toml, f"Its free tumble:\n  {self.command}")
 
 

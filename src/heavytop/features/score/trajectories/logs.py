@@ -242,6 +242,7 @@ def _ordered(q: tuple[Fraction, ...], scalar_last: bool) -> tuple[Fraction, ...]
     return (*q[1:], q[0]) if scalar_last else q
 
 
+_KINDS = ("QUATERNION", "QUATERNION/RATE", "QUATERNION/ANGVEL")
 _SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYRO|IMU|STARTRACKER", re.IGNORECASE)
 """Frames of a message that turn with the spacecraft."""
 
@@ -260,13 +261,13 @@ def of_ephemeris(text: str) -> str:
         raise InputError(f"The message has {text.count('META_START')} segments.", "Give one.")
     meta = dict(re.findall(r"^\s*([A-Z_]+)\s*=\s*(.*?)\s*$", text, re.MULTILINE))
     kind = meta.get("ATTITUDE_TYPE", "").upper()
-    if not kind.startswith("QUATERNION"):
-        raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not read.", "Write the message with QUATERNION.")
+    if kind not in _KINDS:
+        raise InputError(f"ATTITUDE_TYPE = {quoted(kind)} is not read.", f"Write it with one of {', '.join(_KINDS)}.")
     first = meta.get("QUATERNION_TYPE", "LAST").upper() == "FIRST"
     order = ["qw", "qx", "qy", "qz"] if first else ["qx", "qy", "qz", "qw"]
     of_spacecraft = {letter: bool(_SPACECRAFT.match(meta.get(f"REF_FRAME_{letter}", ""))) for letter in "AB"}
     body_first = of_spacecraft["A"] and not of_spacecraft["B"]
-    if kind in ("QUATERNION/RATE", "QUATERNION/ANGVEL"):
+    if kind in _KINDS[1:]:
         frame = (meta.get("RATE_FRAME") or meta.get("ANGVEL_FRAME") or "").upper()
         of_a = frame.endswith("FRAME_A") or (frame and frame == meta.get("REF_FRAME_A", "").upper())
         axes = "omega_space" if frame and bool(of_a) != body_first else "omega"
