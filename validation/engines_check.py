@@ -30,6 +30,8 @@ LEAST, MOST = 1e-10, 1.0
 """Errors that are compared: smaller ones are near those of this integration."""
 APART = 0.1
 """Digits by which the two may differ."""
+SINGLE = "-single"
+"""The end of the name of an integrator in single precision, whose roundings are those of one request."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ def compared(rows: list[ht.Row], name: str, run: Callable[[str], Any]) -> Iterat
     """Each figure of an integrator: what it is, the digits of the report, those from here, and in the plan's axes."""
     for row in rows:
         body, metric = BODIES.get(row.key.case), row.metrics.get("solution_error_relative_max")
-        own = row.key.kind == "work_precision" and row.key.subject.name == name
+        own = row.key.kind == "work_precision" and row.key.subject.name == name and not name.endswith(SINGLE)
         if not own or body is None or metric is None or not LEAST < float(metric) < MOST:
             continue
         control = ht.precision.exact(row.key.subject.step or row.key.subject.tolerance)

@@ -32,7 +32,7 @@ _ALIASES = tuple(
         (r"(?:position|translation|pos)[./_]([xyz])|t([xyz])", "p{}"),
         (rf"(?:angular_?velocity|angular|angvel|ang_vel|gyro(?:scope)?){_OF_BODY}[./_]([xyz])", "w{}"),
         (rf"w{_OF_BODY}[./_]?([xyz])", "w{}"),
-        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:_?s(?:ec(?:ond)?s?)?)?)", "t"),
+        (r"(?:sim_?time|time_?s(?:ec(?:onds?)?)?|t_s(?:ec)?|seconds|elapsed(?:_?(?:s|secs?|seconds?))?)", "t"),
         (r"(?:timestamp|stamp|__time)", "timestamp"),
         (r"(?:receive|publish|log|record)_?time", "epoch"),
         (r"(?:timestamp|stamp)_?(ns|us|ms)", "timestamp [{}]"),
