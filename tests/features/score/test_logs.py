@@ -259,6 +259,16 @@ def test_half_a_file_is_never_scored(names: str, says: str, tmp_path: Path) -> N
     assert says in refused.stderr
 
 
+@pytest.mark.parametrize(("unit", "code"), [("", 2), (" [us]", 0)])
+def test_times_in_whole_numbers_far_apart_need_a_unit(unit: str, code: int, tmp_path: Path) -> None:
+    """As those of PX4, in microseconds since the start."""
+    path = tmp_path / "log.csv"
+    ticks = [12_345_678 + int(time * 1_000_000) for time in TIMES]
+    path.write_text(HEAD + f"timestamp{unit},qw,qx,qy,qz\n" + rows(ticks, quaternions()))
+    done = heavytop("score", path)
+    assert (done.returncode, "Name the column timestamp [us]" in done.stderr) == (code, code == 2)
+
+
 def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path: Path) -> None:
     body = ht.Body("2", "0", (0, 0, 0), ("1.2", "0.9", "0.6"))
     start = ht.State(omega=(1, 2, 6), attitude=ht.Attitude.quaternion("0.8", 0, "0.6", 0))

@@ -110,6 +110,10 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             )
 
 
+_LONG = 500
+"""Whole numbers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
+
+
 def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]], list[str]]:
     """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row."""
     names = list(names)
@@ -132,6 +136,10 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         return names, cells, []
     if names[index] == "t":
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
+    second = number(cells[1][index]) if len(cells) > 1 else None
+    if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
+        apart = f"The first {plain[index]}s are whole numbers, {decimal_text(second - first, 12)} apart, of no unit."
+        raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
     for row in cells:
         if (value := number(row[index])) is not None:
             row[index] = exact_text(value - first)
