@@ -33,6 +33,8 @@ _SHOWN_BITS = 64
 _ATTITUDE_BITS = 256
 _NEAR_BITS = 10
 """Bits of the unit vector that an error suggests: enough to show which one was meant."""
+_NO_DIRECTION = "gamma is the zero vector, which has no direction."
+_UPWARDS = "Give the direction that points vertically up."
 _NORMALIZE = (
     "Give rational components such as 3/5,0,4/5, or move gamma onto the sphere: --normalize on the command line, "
     "State.normalized() in Python."
@@ -199,6 +201,8 @@ class State:
     def require_unit_gamma(self, slack: Fraction = Fraction(0), remedy: str = _NORMALIZE) -> State:
         """This state; raises InputError with that remedy unless | |γ|² − 1 | ≤ ``slack``."""
         off = dot(self.gamma, self.gamma) - 1
+        if not any(self.gamma):
+            raise InputError(_NO_DIRECTION, _UPWARDS)
         if abs(off) > slack:
             size = decimal_text(round_to(off, _SHOWN_BITS), 6)  # of a million digits else
             raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}.", remedy)
@@ -215,9 +219,7 @@ class State:
         """The state with γ at a rational point of the unit sphere within 2^(2-bits) of γ/|γ| (stereographic)."""
         square = dot(self.gamma, self.gamma)
         if square == 0:
-            raise InputError(
-                "gamma is the zero vector, which has no direction.", "Give the direction that points vertically up."
-            )
+            raise InputError(_NO_DIRECTION, _UPWARDS)
         if square == 1:
             return self
         largest = max(abs(g) for g in self.gamma)

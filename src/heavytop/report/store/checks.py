@@ -247,7 +247,7 @@ def interval_of(law: Law) -> Interval:
     return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
-REMEDY = "Make it again with `heavytop run`."
+REMEDY = "Make it again with `heavytop run`, or of a trajectory with `heavytop score FILE --out FOLDER`."
 
 
 def check_keys(file: Path | str, rows: Iterable[Row]) -> None:

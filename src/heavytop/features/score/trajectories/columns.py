@@ -661,4 +661,6 @@ def times(document: Mapping[str, Any]) -> list[Fraction]:
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
         instants.append(value if unit is None else unit.size * value)
+    if not instants:
+        raise InputError("The table has no row below its header.", "Give a row for each time.")
     return instants
