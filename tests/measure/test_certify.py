@@ -219,7 +219,7 @@ def test_digits_of_a_gap_are_exact_at_powers_of_ten():
 class Wide:
     """A solution that gives fewer digits than it was asked for: balls of ``radius`` around (1, 0, ...)."""
 
-    method, system = "too wide", KNOWN[0].system
+    method, source, system = "too wide", "", KNOWN[0].system
 
     def __init__(self, middle, radius):
         self.middle, self.radius = middle, radius

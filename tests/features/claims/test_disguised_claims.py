@@ -71,7 +71,7 @@ def test_a_sign_follows_from_a_chain_and_from_nothing_less(x, assume, holds):
     assert (said(x, parameters=values, assume=assume) == "holds") is holds
 
 
-@pytest.mark.parametrize("text", ["a > b < c", "a >", "a >= b", "a > b >", "a", "a > b = c"])
+@pytest.mark.parametrize("text", ["a > b < c", "a >", "a > b >", "a", "a > b = c"])
 def test_a_chain_has_one_direction(text):
     with pytest.raises(InputError, match="is not understood"):
         said("1", parameters={"a": "3", "b": "2", "c": "1"}, assume=[text])

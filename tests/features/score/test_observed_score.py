@@ -271,6 +271,6 @@ def test_a_tensor_about_the_other_point_is_told(about: str, tmp_path: Path) -> N
     lines = [f"# {key}: {value}" for key, value in (keys | {"omega": "0,150,-4.61538"}).items()]
     file = tmp_path / "motion.csv"
     file.write_text("\n".join([*lines, "t,qw,qx,qy,qz", "0,1,0,0,0", "0.01,0.73,0,0.68,0"]) + "\n", "utf-8")
-    told = [text for text in read(file, None, True).warnings() if "no rigid body's" in text]
+    told = [text for text in read(file, None, True).warnings() if "not a rigid body's" in text]
     assert len(told) == (about == "pivot")
     assert all("is about the centre of mass, and was read as about the pivot" in text for text in told)
