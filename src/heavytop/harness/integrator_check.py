@@ -430,7 +430,7 @@ class _Contract:
     def _huge(self) -> str:
         across = (0, _HUGE, 0) if self.axis[0] else (_HUGE, 0, 0)
         start = State(across, self.axis)
-        top = HeavyTop((3, 2, 1), 1, [-part / 2 for part in self.axis])  # hanging: upright, it amplifies noise
+        top = HeavyTop((3, 2, 1), 1, [part / 2 for part in self.axis])
         try:
             if self.program is None:
                 self._run([1], start, top, system=HEAVY_TOP)

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heavytop.features.score.diagnose import hypotheses
 from heavytop.features.score.measurement import assess
 from heavytop.features.score.trajectories.files import read
 from heavytop.top.bodies import Body
+from heavytop.top.equations import HEAVY_GYROSTAT
 
 CENTRAL = np.array([[0.9, 0.05, -0.1], [0.05, 0.7, 0.08], [-0.1, 0.08, 0.6]])
 CENTRE, ROTOR, START = np.array([0.2, -0.3, 0.5]), np.array([0.4, -0.2, 0.3]), np.array([0.8, -0.2, 0.4, 0.4])
@@ -69,6 +71,10 @@ FAULTS: Mapping[str, tuple[Callable[[], np.ndarray], Mapping[str, str]]] = {
     "gyroscopic_sign": (lambda: motion(gyroscopic=-KEEP, rotor=ROTOR), {}),
     "term_missing": (lambda: motion(gyroscopic=changed(1, 0.0)), {"column": "M2", "term": "the gyroscopic term"}),
     "steiner": (lambda: motion(CENTRAL + 2 * STEINER), {"times": "2"}),
+    "products_of_inertia": (
+        lambda: motion(CENTRAL * [[1, -1, 1], [-1, 1, 1], [1, 1, 1]] + STEINER),
+        {"entries": "I12"},
+    ),
     "mass": (lambda: motion(CENTRAL + 1.3 * STEINER, 1.3), {"factor": "1.3"}),
     "start": (lambda: motion(begin=TURNED), {}),
     "times_shifted": (lambda: motion(shift=0.07), {"shift": "0.07"}),
@@ -116,3 +122,13 @@ def test_a_plate_in_seven_digits_is_a_body(off: float) -> None:
     plate = {"mass": 1, "gravity": 1, "centre": (0, 0, 1), "about": "centre of mass"}
     assert not Body(inertia=(0.1, 0.2, 0.3 + off), **plate).warnings()
     assert Body(inertia=(0.1, 0.2, 0.3001), **plate).warnings()
+
+
+def test_two_rotors_of_one_hash_are_two_systems() -> None:
+    """Compiled equations are kept by their name; -1.0 and -2.0 hash alike."""
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    part = hypotheses._PARTS[0], (0,)
+    one, two = (hypotheses._altered(HEAVY_GYROSTAT, (k, 0.0, 0.0), axes, (part,), -1.0) for k in (-1.0, -2.0))
+    assert hash(-1.0) == hash(-2.0)
+    assert one.name != two.name
+    assert one is hypotheses._altered(HEAVY_GYROSTAT, (-1.0, 0.0, 0.0), axes, (part,), -1.0)

@@ -62,7 +62,7 @@ _RIGHT = 1e-2
 _FEW_OF, _MOST_ALONE = 4, 8
 """... and if they are at most one in four of all, and so many."""
 _GRID = 200
-"""Number of times behind the start, within one interval between samples."""
+"""Number of times at which the motion is looked at within one interval between samples."""
 _BACK, _JUMPS = 0.05, 0.3
 """A state that is so near to one of those is back at the start; one that is so far from where it should be jumps."""
 _AGAIN, _FOLLOWED = 10.0, 6

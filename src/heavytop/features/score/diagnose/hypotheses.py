@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, reduce
+from itertools import count as serial
 from itertools import permutations, product
 from math import ceil, isfinite
 from operator import add
@@ -455,6 +456,7 @@ _OF_STEPS = 1e-5
 _EVERY = 0, 1, 2
 _NEXT = (1, 2), (2, 0), (0, 1)
 _LETTERS = "abc"
+_NUMBERS = serial()
 
 
 @dataclass(frozen=True, slots=True)
@@ -527,8 +529,8 @@ def _altered(
                 rates[place + 3 * (part.of == 2)] += more / p.inertia[place] if part.of == 1 else more
         return tuple(rates)
 
-    name = f"{system.name}_altered_{abs(hash((rotor, axes, changes, factor)))}"
-    return _Altered(name, field, HEAVY_TOP.angular_velocity)
+    # compiled code is kept by the name: a hash would do but for -1.0 and -2.0, which have the same
+    return _Altered(f"{system.name}_altered_{next(_NUMBERS)}", field, HEAVY_TOP.angular_velocity)
 
 
 def _combined(weights: Sequence[float], values: Sequence[Any]) -> Any:

@@ -33,7 +33,7 @@ _TURNS = 60.0
 _FEW = 6
 _FEWEST = 3
 _STEPS = 50_000
-"""Seconds of heyoka for one supposed motion: a tenth of a second."""
+"""Steps of heyoka in one supposed motion: they take a tenth of a second."""
 FARTHEST = 3000.0
 """Radians that the body may turn until the last supposed time."""
 _OTHER_UNIT = Fraction(11, 10)

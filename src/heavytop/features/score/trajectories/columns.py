@@ -427,8 +427,8 @@ def _numbers(values: Any, what: str, count: int) -> list[Fraction]:
 def columns(document: Mapping[str, Any], said: Convention) -> ColumnTable:
     """The columns of a document, of a text table or of JSON.
 
-    Raises InputError for columns that are not complete, for a sequence that is not said, and for a cell that is none,
-    by its line and column.
+    Raises InputError for incomplete columns, Euler angles without a sequence, and an unreadable cell, by its line and
+    column.
     """
     table = _of_table(document, said) if "header" in document else _of_lists(document, said)
     if not table.values:

@@ -111,7 +111,7 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
 
 
 _LONG = 500
-"""Whole numbers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
+"""Integers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
 
 
 def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]], list[str]]:
@@ -138,7 +138,7 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
     second = number(cells[1][index]) if len(cells) > 1 else None
     if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
-        apart = f"The first {plain[index]}s are whole numbers, {decimal_text(second - first, 12)} apart, of no unit."
+        apart = f"The first {plain[index]}s are integers {decimal_text(second - first, 12)} apart, without a unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
     for row in cells:
         if (value := number(row[index])) is not None:
