@@ -107,9 +107,11 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     candidate.rows[5].metrics["solution_error_relative_max"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
     read = {name: store.read(RESULTS / name) for name in ("default", "growth", "long", "peers")}
-    html.write_report(read["default"], folder / "results.html")
-    read |= {"peers": few(read["peers"]), "long": replace(read["long"], rows=read["long"].rows[::3])}
+    read["peers"] = few(read["peers"])
     read |= {"gate": gate(read["default"], read["growth"], read["peers"])}
+    for name, each in (("default", 2), ("growth", 2), ("long", 3)):
+        read[name] = replace(read[name], rows=read[name].rows[::each])
+    html.write_report(read["default"], folder / "results.html")
     for name in BUILT_IN:
         html.write_report(read[name], folder / f"{name}.html")
     (folder / "score.html").write_text(html.report_page(score_report(scored(), {"commit": "0" * 40})), "utf-8")
