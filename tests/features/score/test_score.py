@@ -140,7 +140,7 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"times": ["1", "2"]}, "2 times and 3 states"),
         ({"times": ["2", "1", "3"]}, "does not come after"),
         ({"times": ["1", "-2", "3"]}, "different signs"),
-        ({"times": ["1", "nan", "3"]}, "a time is nan"),
+        ({"times": ["1", "nan", "3"]}, "the time in row 2 is nan"),
         ({"times": "1,2,3"}, "times is not a list"),
         ({"states": [["1"] * 5] * 3}, "state has 5 numbers"),
         ({"states": [["1"] * 6, "x", ["1"] * 6]}, "state is not a list"),
