@@ -15,11 +15,9 @@ from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.features.score.measurement import score
 from heavytop.features.score.trajectories.files import read
-from heavytop.integrate.heyoka.motions import propagate
 from heavytop.measure.motion import compute
 from heavytop.measure.scalar import digits_kept
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
-from heavytop.top.equations import HEAVY_TOP
 from support import in_process
 
 DOCS = Path(__file__).parents[3] / "docs"
