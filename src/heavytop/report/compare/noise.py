@@ -383,7 +383,9 @@ def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: 
     if new.kind == "duration":
         ends = [-math.inf if m.log10 is None else m.log10 - (m.band or 0.0) for m in (old, new)]
         return ends[1] < ends[0]
-    before, after = (max(_size(m), floor) for m, floor in zip((old, new), least, strict=True))
+    before, after = (
+        max(floor if m.log10 is None else m.log10, floor) for m, floor in zip((old, new), least, strict=True)
+    )
     spared = min(loss, max(0.0, before - after))
     return after + (new.band or 0.0) > before + (old.band or 0.0) + spared
 
@@ -400,10 +402,6 @@ def noisier(kind: ReportedKind, old: Metric, new: Metric, lost: bool = False) ->
         return new.band > factor * max(old.band, _LEAST_LOST if lost else _LEAST)
     # in decades such noise is as much wider as the number is smaller
     return _added(new) > _added(old) + math.log10(factor)
-
-
-def _size(metric: Metric) -> float:
-    return -math.inf if metric.log10 is None else metric.log10
 
 
 def _added(metric: Metric) -> float:

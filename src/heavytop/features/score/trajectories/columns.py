@@ -254,11 +254,8 @@ def is_more_than_states(header: Header) -> bool:
     """Whether there are other columns than Ω and γ, or one of these vectors alone."""
     names = set(header.places)
     quantities = {"omega" if name == "framed" else name for name in names}
-    return bool(quantities - {"omega", "gamma"}) or (len(quantities) == 1 and _complete(header))
-
-
-def _complete(header: Header) -> bool:
-    return all(len(components) == 3 for components in header.places.values())
+    complete = all(len(components) == 3 for components in header.places.values())
+    return bool(quantities - {"omega", "gamma"}) or (len(quantities) == 1 and complete)
 
 
 def ordered_places(

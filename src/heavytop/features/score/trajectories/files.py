@@ -247,7 +247,7 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
         rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
         said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
     for what, new, old in said:
-        if new != old and (isinstance(new, str) or not _rounded_alike(new, old)):
+        if new != old and (isinstance(new, str) or abs(new - old) > max(abs(old), Fraction(1)) / 1000):  # three digits
             texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
             raise InputError(
                 f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
@@ -257,11 +257,6 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
 
 def _briefly(value: Fraction) -> str:
     return str(value) if value.denominator < 1000 else decimal_text(value, 6)
-
-
-def _rounded_alike(new: Fraction, old: Fraction) -> bool:
-    """Whether a number is the other one, rounded to three digits or more."""
-    return abs(new - old) <= max(abs(old), Fraction(1)) * Fraction(1, 1000)
 
 
 _FLAGS = ("language", "tolerance", "step")
