@@ -47,10 +47,10 @@ def gate(
 
     require_apart((markdown, junit, html), baseline, out, policy)
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
-    if not bless:
-        require_baseline(trusted)
     clear(fresh)
     planned = prepare(plan, fresh, integrator=integrator, workers=workers)
+    if not bless:
+        require_baseline(trusted)
     say_former({integrator} | former(plan))
     for warning in planned.warnings:
         say(f"warning: {warning}")

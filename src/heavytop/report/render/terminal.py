@@ -64,7 +64,7 @@ class _Sentence:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         word = "" if self._word is None else self._word.text
-        whole = printable(f"{word} {self._text}".lstrip())
+        whole = printable(f"{word}: {self._text}" if word else self._text)
         lines = wrapped(whole, self._indent + "  ", self._indent, options.max_width)
         for number, line in enumerate(lines):
             said = Text(line, style=_STYLES.get(self._style, ""))

@@ -412,11 +412,12 @@ def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
     """A list of so many members; raises InputError for anything else."""
     if not isinstance(value, list) or (count is not None and len(value) != count):
         has = (
-            f"has {len(value)} numbers: {quoted(' '.join(map(str, value)))}"
+            f"has {len(value)} numbers: {quoted(', '.join(map(str, value)))}"
             if isinstance(value, list)
             else "is not a list"
         )
-        raise InputError(f"{what} {has}.", f"Give {count} numbers, such as 2.5 (not 2,5)." if count else "Give a list.")
+        commas = " Write 2.5, not 2,5." if isinstance(value, list) and len(value) == 2 * (count or -1) else ""
+        raise InputError(f"{what} {has}.", f"Give {count} numbers.{commas}" if count else "Give a list.")
     return value
 
 
@@ -661,6 +662,4 @@ def times(document: Mapping[str, Any]) -> list[Fraction]:
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
         instants.append(value if unit is None else unit.size * value)
-    if not instants:
-        raise InputError("The table has no row below its header.", "Give a row for each time.")
     return instants

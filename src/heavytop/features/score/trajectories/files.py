@@ -16,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, why
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -52,7 +52,7 @@ _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
-_ALL_COLUMNS = "Give every row all of its columns."
+_ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
 
@@ -102,6 +102,8 @@ class TextTable:
         if not _is_number(first[0]):
             header, body, self.lines = first, body[1:], self.lines[1:]
         names = self._without_header(first) if header is None else header
+        if not body:
+            raise InputError("The table has no row below its header.", "Give a row for each time.")
         self.cells = _split(body, self.lines, separator, len(names))
         names, self.cells, notes = logs.with_one_time(names, self.cells)
         self.notes += notes
@@ -315,7 +317,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         if logs.is_ephemeris(text):
             text = logs.of_ephemeris(text)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", REMEDY) from None
+        raise InputError(f"The trajectory {shown_path} cannot be read: {why(error)}.", REMEDY) from None
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
         document, notes = (_json(text), []) if is_json else _table(text)
@@ -369,6 +371,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
         return table.keys | more, table.notes
     columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
+    columns["numbers"] = [f"line {number}" for number in table.lines]
     return table.keys | columns, table.notes
 
 
@@ -390,7 +393,7 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
     if normalize:
         start = start.normalized()
-    start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
+    start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
     about = _about(document, stem, case, None in states)
@@ -427,7 +430,9 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
     if "lines" in document:
         texts = observed_columns.times(document)
     else:
-        texts = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+        written = _list(document, "times")
+        where = document.get("numbers") or [f"row {number}" for number in range(1, len(written) + 1)]
+        texts = [written_numbers.finite(time, f"the time in {row}") for time, row in zip(written, where, strict=True)]
     times = list(check_times(texts))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")

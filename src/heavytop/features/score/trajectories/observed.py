@@ -182,7 +182,7 @@ def _list(values: Sequence[Fraction]) -> str:
 def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
     state = State(raw.omega, raw.values)
     if not normalize:
-        state.require_unit_gamma(slack, "Give it in full, or use --normalize.")
+        state.require_unit_gamma(slack, "Write all its digits, or use --normalize.")
     gamma = state.normalized(_SPARE_BITS + 64).gamma
     xi = perpendicular(gamma)
     a, b, c = cross(gamma, xi)
@@ -242,7 +242,7 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
     if abs(off) > 2 * slack:
         raise InputError(
             f"{what} is not orthogonal: R R^T is off the unit matrix by {decimal_text(off, 6)}.",
-            "Give it in full, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
+            "Write all its digits, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
         )
 
 
