@@ -284,6 +284,20 @@ def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path:
         assert scored(path)["digits_right"] > 13  # type: ignore[operator]
 
 
+def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> None:
+    """The first row of a log is later than the attitude at t = 0 of its comments; an epoch is the first row's."""
+    said = HEAD + f"# start_quaternion: {', '.join(map(str, quaternions()[0]))}\nstamp.sec,stamp.nanosec,qw,qx,qy,qz\n"
+    lines = rows(quaternions()).splitlines()
+    path = tmp_path / "log.csv"
+    for first, begin in ((0, 1), (15 * 10**8, 0)):
+        stamps = [f"{first + int(time)},{round(time % 1 * 10**9)}" for time in TIMES]
+        path.write_text(said + "\n".join(map(",".join, [*zip(stamps, lines, strict=True)][begin:])))
+        shown = heavytop("score", path, "--json")
+        assert json.loads(shown.stdout)["digits_right"] > 13
+        assert ("counted from the first row" in shown.stderr) == (begin == 0)
+        assert "nanosec" not in shown.stderr
+
+
 def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:
     path = tmp_path / "poses.txt"
     path.write_text(HEAD + "1 0 0 0 0 1 0 0 0 0 1 0\n")

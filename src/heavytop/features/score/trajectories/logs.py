@@ -110,12 +110,18 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             )
 
 
+_TEN_DAYS = 864_000
 _LONG = 500
 """Integers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
 
 
-def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]], list[str]]:
-    """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row."""
+def with_one_time(
+    names: Sequence[str], cells: list[list[str]], started: bool
+) -> tuple[list[str], list[list[str]], list[str]]:
+    """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row.
+
+    started: the attitude at t = 0 is given, from which stamps of less than ten days are counted.
+    """
     names = list(names)
     parts = {
         match[1].lower()[0]: index for index, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
@@ -124,7 +130,9 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
             row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
-        names[seconds], names[nano] = "timestamp", "nanosec"
+            del row[nano]
+        names[seconds] = "timestamp"
+        del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0] for name in plain]
     index = next((words.index(word) for word in _EPOCHS if word in words), None)
@@ -132,7 +140,7 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         return names, cells, []
     names[index] = re.sub(r"^\w+", "t", plain[index])
     first = number(cells[0][index])
-    if not first:
+    if not first or (started and names[index] == "t" and abs(first) < _TEN_DAYS):
         return names, cells, []
     if names[index] == "t":
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
