@@ -72,8 +72,8 @@ def unknown(key: str, known: Sequence[str]) -> InputError:
 class TextTable:
     """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
 
-    known: the keys that a comment may have.  started: the attitude at t = 0 is known without them.  Raises InputError for a header or a row that cannot be understood, for a
-    misspelt key and a key that stands twice.
+    known: the keys that a comment may have.  started: the attitude at t = 0 is known without them.
+    Raises InputError for a header or a row that cannot be understood, for a misspelt key and one that stands twice.
     """
 
     def __init__(self, text: str, known: Sequence[str], started: bool = False) -> None:
@@ -479,6 +479,8 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
             raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
+    if not written_numbers.finite(gravity, "gravity"):
+        document = {"centre": ["0", "0", "0"], **document}
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")

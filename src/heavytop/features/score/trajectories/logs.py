@@ -294,8 +294,8 @@ def of_ephemeris(text: str) -> str:
         lines.append("# quaternion: space_to_body")
     data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
     rows = [line.split() for line in data if line.strip() and not line.strip().startswith("COMMENT")]
-    start = _epoch(rows[0][0]) if rows else Fraction(0)
-    lines.append(",".join(["t", *order]))
+    start = _epoch(meta.get("START_TIME") or rows[0][0]) if rows else Fraction(0)
+    lines.append(",".join(["timestamp", *order]))
     lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
     return "\n".join(lines)
 
@@ -321,6 +321,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
     columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
     lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
     count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
+    last = str(columns.get("quaternion_order", "")) == "xyzw"
     names: list[str] = []
     parts: list[Any] = []
     comments = []
@@ -329,7 +330,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
         elif array.ndim <= 3 and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
-            names += _names_of(name, parts[-1].shape[1])
+            names += _names_of(name, parts[-1].shape[1], last)
     if not parts or len({len(part) for part in parts}) != 1:
         counts = ", ".join(str(len(part)) for part in parts) or "none"
         raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
@@ -389,9 +390,11 @@ _ARRAYS = {
 """Names of arrays, in lower case, for those of :data:`_WIDE`."""
 
 
-def _names_of(name: str, width: int) -> list[str]:
+def _names_of(name: str, width: int, scalar_last: bool) -> list[str]:
     """The names of the columns of one array."""
     base = _ARRAYS.get(name.lower(), name)
+    if base == "quaternion" and width == 4 and scalar_last:
+        return ["qx", "qy", "qz", "qw"]
     if len(_WIDE.get(base, ())) == width:
         return list(_WIDE[base])
     if width == 1:
