@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted, why
 from heavytop.extras import extra_of, missing
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
@@ -143,8 +143,8 @@ class Integrator:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever another package's module does when it is imported
-            why = f"{type(error).__name__}: {said(error)}"
-            raise InputError(f"The integrator {self.name} is broken: {why}.", entry.remedy) from error
+            reason = f"{type(error).__name__}: {said(error)}"
+            raise InputError(f"The integrator {self.name} is broken: {reason}.", entry.remedy) from error
         if not callable(found):
             cause = f"is broken: {entry.function} is not callable."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
@@ -408,8 +408,7 @@ def commands_in(path: Path) -> list[Command]:
         text = path.read_text("utf-8")
         document = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, RecursionError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"{path} cannot be read: {why}.", "Give a readable TOML file.") from None
+        raise InputError(f"{path} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")

@@ -143,11 +143,9 @@ class _Swing:
                 raise Undecided
             far = acb(0, far.imag) if rest / lead > 0 else acb(far.real)
             roots, scale = [*roots, (far, 2), (-far, 2)], scale * lead * lead
-        gap = Gap(*self._stops(), Roots.of(scale, roots), count=2, most=_TERMS)
+        stops = self.gap.middle - self.gap.reach, self.gap.middle + self.gap.reach
+        gap = Gap(*stops, Roots.of(scale, roots), count=2, most=_TERMS)
         return Azimuth(gap, (arb(0), self.side * sign_of(lead * self.gap.middle**2 + rest) * c.size / c.b))
-
-    def _stops(self) -> tuple[arb, arb]:
-        return self.gap.middle - self.gap.reach, self.gap.middle + self.gap.reach
 
 
 def sign_of(value: arb) -> int:

@@ -23,7 +23,7 @@ def body(
 ) -> int:
     """Check the inertia tensor in a URDF, MJCF or SDF.
 
-    Says whether a body has it, and if not, which slip makes it one.
+    Says whether a rigid body can have it, and if not, which mistake explains it.
 
     Exit 0 for a body, 1 where none has this tensor or it is implausible, 2 for a file that cannot be
     read.  Prints the body as a table for a plan.

@@ -201,7 +201,10 @@ def changed(one: Motion, other: Motion, seed: str, family: Family, horizon: Frac
     dice = Dice(seed)
     motion = one
     for _ in range(1 + dice.below(3)):
-        motion = _crossed(motion, other, dice) if dice.below(8) == 0 else dice.pick(_CHANGES)(motion, dice)
+        if dice.below(8) == 0:
+            motion = (motion[0], other[1]) if dice.below(2) else (other[0], motion[1])
+        else:
+            motion = dice.pick(_CHANGES)(motion, dice)
     if motion[0].rotor is not None and dice.below(3) == 0:
         motion = _rotored(motion, dice)
     return possible(motion, family, horizon) or one
@@ -375,10 +378,6 @@ def _turned(motion: Motion, dice: Dice) -> Motion:
         rotor = None if top.rotor is None else cycled(top.rotor)
         return HeavyTop(cycled(top.inertia), top.weight, cycled(top.centre), rotor), start
     return top, State(cycled(start.omega), cycled(start.gamma))
-
-
-def _crossed(one: Motion, other: Motion, dice: Dice) -> Motion:
-    return (one[0], other[1]) if dice.below(2) else (other[0], one[1])
 
 
 def _rotored(motion: Motion, dice: Dice) -> Motion:

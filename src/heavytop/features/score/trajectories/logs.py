@@ -179,7 +179,7 @@ def without_repeats(
             if not all(map(_agree, rows[index], rows[kept[-1]])):
                 raise InputError(
                     f"Lines {lines[kept[-1]]} and {lines[index]} are of one time and differ.",
-                    "Give one row for each time: before an event, or behind it.",
+                    "Keep one of them; at an impact, the state before it or the one after.",
                 )
             repeated += 1
             kept[-1] = max(kept[-1], index, key=lambda row: sum(map(len, rows[row])))  # more digits
