@@ -13,7 +13,7 @@ from heavytop.errors import ExitCode
 
 @command
 def body(
-    file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD as text, or TOML with a body.")],
+    file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD, or TOML with a body.")],
     link: Annotated[str | None, typer.Option(help="Which link or body, where the file has several.")] = None,
     pivot: Annotated[
         str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; without it a ball joint, or 0,0,0.")

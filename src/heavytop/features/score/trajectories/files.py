@@ -50,6 +50,7 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+_STARTS = ("gamma", "start_quaternion", "start_matrix", "start_euler")
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
 _ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
@@ -71,11 +72,11 @@ def unknown(key: str, known: Sequence[str]) -> InputError:
 class TextTable:
     """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
 
-    known: the keys that a comment may have.  Raises InputError for a header or a row that cannot be understood, for a
-    misspelt key and a key that stands twice.
+    known: the keys that a comment may have.  started: the attitude at t = 0 is known without them.
+    Raises InputError for a header or a row that cannot be understood, for a misspelt key and one that stands twice.
     """
 
-    def __init__(self, text: str, known: Sequence[str]) -> None:
+    def __init__(self, text: str, known: Sequence[str], started: bool = False) -> None:
         self.keys: dict[str, str | list[str]] = {}
         self.rows: list[list[str]] = []
         self.notes: list[str] = []
@@ -105,7 +106,9 @@ class TextTable:
         if not body:
             raise InputError("The table has no row below its header.", "Give a row for each time.")
         self.cells = _split(body, self.lines, separator, len(names))
-        names, self.cells, notes = logs.with_one_time(names, self.cells)
+        names, self.cells, notes = logs.with_one_time(
+            names, self.cells, started or not self.keys.keys().isdisjoint(_STARTS)
+        )
         self.notes += notes
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
@@ -315,7 +318,7 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         raise InputError(f"The trajectory {shown_path} cannot be read: {why(error)}.", REMEDY) from None
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
-        document, notes = (_json(text), []) if is_json else _table(text)
+        document, notes = (_json(text), []) if is_json else _table(text, case is not None)
         name = "given" if piped else path.stem
         reader = _observed if observed_columns.is_observed(document) else _given
         trajectory = reader(document, name, case, normalize)
@@ -354,13 +357,13 @@ def _json(text: str) -> dict[str, Any]:
     return document
 
 
-def _table(text: str) -> tuple[dict[str, Any], list[str]]:
+def _table(text: str, started: bool) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
         raise InputError("A table must be text; this holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
-    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}))
+    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}), started)
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
@@ -476,6 +479,8 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
             raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
+    if not written_numbers.finite(gravity, "gravity"):
+        document = {"centre": ["0", "0", "0"], **document}
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
