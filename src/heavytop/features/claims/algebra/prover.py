@@ -410,7 +410,7 @@ _DIVISORS = "the algebra divides by nothing that is 0"
 _ALGEBRA = "the algebra can carry the formulas"
 _REMOVABLE = "removable: the formulas are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
-Key = tuple[int | bool | str, ...]
+Key = tuple[object, ...]
 
 
 class Prover:
@@ -439,10 +439,9 @@ class Prover:
             parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
             self._fields[key] = self._make(alike, sign, strict, parts)
         if self._fields[key] is None:
-            alone: Key = (*key, as_text(statement.residual))
-            if alone not in self._fields:
-                self._fields[alone] = self._make([statement], sign, strict, [])
-            return self._fields[alone]
+            key = (*key, statement.residual)
+            if key not in self._fields:
+                self._fields[key] = self._make([statement], sign, strict, [])
         return self._fields[key]
 
     def _make(
