@@ -22,7 +22,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, prefixed, quoted
+from heavytop.errors import InputError, invalid, prefixed, quoted, why
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole
 from heavytop.harness import BUILT_IN, OF_FEATURES
@@ -143,7 +143,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         try:
             text = read_whole(Path(name)).decode("utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"The plan {name} cannot be read: {error}.", "Give a readable TOML file.") from None
+            raise InputError(f"The plan {name} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
     else:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
@@ -425,7 +425,7 @@ def log_spaced(count: int) -> list[int]:
 
 def positive(texts: list[str], what: str) -> list[Fraction]:
     """Exact numbers; raises InputError unless they are positive and grow."""
-    values = [physical(exact(text), what) for text in texts]
+    values = [physical(text, what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
         raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
     return values
@@ -434,7 +434,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 def samples(count: int) -> int:
     """The count; raises InputError where it cannot be."""
     if not 1 <= count <= _MAX_SAMPLES:
-        raise InputError(f"{count} samples cannot be taken.", f"Give a number from 1 to {_MAX_SAMPLES}.")
+        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give such as 100.")
     return count
 
 
