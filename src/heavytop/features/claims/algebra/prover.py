@@ -410,7 +410,6 @@ _DIVISORS = "the algebra divides by nothing that is 0"
 _ALGEBRA = "the algebra can carry the formulas"
 _REMOVABLE = "removable: the formulas are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
-Key = tuple[object, ...]
 
 
 class Prover:
@@ -419,7 +418,7 @@ class Prover:
     def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
         self._statements = statements
         self._setting = setting
-        self._fields: dict[Key, Field | None] = {}
+        self._fields: dict[tuple[object, ...], Field | None] = {}
         self._regions: dict[int, Region] = {}
         self._conditions: dict[object, tuple[Condition, ...]] = {}
         self._places: dict[tuple[str, str], list[Place]] = {}
@@ -429,7 +428,7 @@ class Prover:
 
     def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
         """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
-        key: Key = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
+        key: tuple[object, ...] = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
         if key not in self._fields:
             alike = [
                 other
