@@ -253,7 +253,7 @@ def exact_text(value: Fraction) -> str:
 
 
 def physical(number: Any, what: str) -> Fraction:
-    """The exact value; raises InputError, which names it, for what is no number and for more than 10^150."""
+    """The exact value; raises InputError, which names it, for what is not a number and for more than 10^150."""
     try:
         value = exact(number)
     except InputError as error:
