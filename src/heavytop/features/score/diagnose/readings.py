@@ -416,7 +416,8 @@ def of_states(
     reading = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
     split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
     if xi is not None:
-        products = numpy.array(quaternion_products(rows_of(columns[:, 3:6].T, columns[:, 6:9].T)))
+        up, first = ([*columns[:, part].T] for part in (slice(3, 6), slice(6, 9)))
+        products: Array = numpy.array(quaternion_products(rows_of(up, first)))
         largest = numpy.einsum("iin->ni", products).argmax(axis=1)
         split = {"omega": columns[:, :3], "quaternion": products[largest, :, range(len(columns))]}
     return Seen(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
@@ -424,7 +425,7 @@ def of_states(
 
 def _data_of(top: HeavyTop) -> BodyData:
     """The body of a top; with a mass its tensor is about the centre of mass, as a program is given it."""
-    rotor = floats(top.rotor or (0, 0, 0))
+    rotor = numpy.zeros(3) if top.rotor is None else floats(top.rotor)
     body = None if top.mass is None else Body.realising(top)
     if body is None:
         return BodyData(numpy.diag(floats(top.inertia)), floats(top.centre), None, float(top.weight), False, rotor)
