@@ -12,8 +12,8 @@ RULES = [
     if not line.startswith("#")
 ]
 REFUSED = re.compile("|".join(rf"\b(?:{phrase})\b" for phrase, _ in RULES), re.IGNORECASE)
-QUOTED = ("one might suspect", '"arithmetic": "whole numbers"', "and no digit is left from t = {self.until} on")
-"""What a source says in its own words, and two texts in the rows of reports, which stay readable."""
+QUOTED = ("one might suspect", '"arithmetic") == "whole numbers"', ", and no digit is left from t = ")
+"""What a source says in its own words, and two texts in the rows of former reports, which stay readable."""
 TEXTS = [
     *(
         path

@@ -4,7 +4,7 @@
 random boxes, in URDF, MJCF, SDF, USD and TOML; it prints each slip that `heavytop body` does not name, and each right
 file that it refuses or reads as another tensor.  ``python validation/bodies_and_logs.py logs [seed]`` writes 40 logs of
 random motions, integrated here by Runge-Kutta in double: each must be read to ten digits, or be refused with the line
-that would help.  ``packages`` compares 72 MJCF and USD files with what MuJoCo and usd-core read, where installed.
+that would help.  ``packages`` compares 88 MJCF and USD files with what MuJoCo and usd-core read, where installed.
 Exit code 1 where one is not.
 """
 
@@ -276,13 +276,25 @@ def frames(given: Box) -> dict[str, str]:
     }
 
 
+def by_usd(path: Path, suffix: str) -> Path:
+    """The file as usd-core writes it: as text, in binary, as a package."""
+    from pxr import Usd, UsdUtils
+
+    binary, package = path.with_name("binary.usdc"), path.with_name("package.usdz")
+    Usd.Stage.Open(str(path)).Export(str(binary if suffix != "usda" else path.with_name("text.usda")))
+    if suffix == "usdz":
+        UsdUtils.CreateNewUsdzPackage(str(binary), str(package))
+    return {"usda": path.with_name("text.usda"), "usdc": binary, "usdz": package}[suffix]
+
+
 def packages(seed: int) -> int:
     """Prints each right MJCF and USD file, and each frame, that MuJoCo or usd-core reads as another tensor."""
     draw, wrong, count = random.Random(seed), 0, 0
     written: list[tuple[str, str]] = []
     for _ in range(8):
         given = box(draw)
-        written += [("xml", mjcf(given)), ("xml", mjcf(given, geometry=True, turned=True)), ("usda", usd(given))]
+        written += [("xml", mjcf(given)), ("xml", mjcf(given, geometry=True, turned=True))]
+        written += [(suffix, usd(given)) for suffix in ("usda", "usdc", "usdz")]
         inertial = f'pos="{text(given.centre)}" mass="{text(given.mass)}" diaginertia="{text(given.moments)}"'
         written += [
             (
@@ -294,15 +306,13 @@ def packages(seed: int) -> int:
         ]
     with tempfile.TemporaryDirectory() as folder:
         for suffix, content in written:
-            (path := Path(folder) / f"arm.{suffix}").write_text(content)
+            (path := Path(folder) / f"arm.{'xml' if suffix == 'xml' else 'usda'}").write_text(content)
             own = read_body(path)
-            other = (
-                body_files.by_mujoco(path, "arm", 0) if suffix == "xml" else next(body_files.composed_usd(path))[1]()
-            )
+            other = body_files.by_mujoco(path, "arm", 0) if suffix == "xml" else read_body(by_usd(path, suffix))
             count += 1
             pairs = zip((own.mass, *own.centre, *own.six), (other.mass, *other.centre, *other.six), strict=True)
             error = max(abs(float(a - b)) for a, b in pairs) / max(map(float, own.six))
-            if error > (1e-5 if suffix == "usda" else 1e-12) or own.joint != other.joint:
+            if error > (1e-12 if suffix == "xml" else 1e-5) or own.joint != other.joint:
                 wrong += 1
                 print(f"{error:.1e}, {own.joint}, {other.joint}: {content}")
     print(f"packages: {wrong} of {count} files read as another body")

@@ -68,7 +68,7 @@ class Case:
 
 def _partial(ratio: int) -> Case:
     known = ErshkovPartial(Fraction(1), Fraction(ratio), Fraction(1))
-    about = f"the paper's partial case (4.1)-(4.6), alpha = 1, I1/I3 = {ratio}"
+    about = f"Ershkov's partial case (4.1)-(4.6), alpha = 1, I1/I3 = {ratio}"
     return Case(f"ershkov-partial-{ratio}", about, GYROSTAT, known.top, known.start, known)
 
 
@@ -98,7 +98,7 @@ def _asymptotic() -> Case:
 
 def _near(name: str, who: str, known: AlgebraicMotion) -> Case:
     """Rational data within 2^-253 of a motion whose start is algebraic; their truth is the enclosure."""
-    return Case(name, f"rational data beside {who}'s motion", HEAVY_TOP, *known.rounded())
+    return Case(name, f"rational data near {who}'s motion", HEAVY_TOP, *known.rounded())
 
 
 CASES: dict[str, Case] = {
@@ -123,7 +123,7 @@ CASES: dict[str, Case] = {
         ),
         Case(
             "kovalevskaya",
-            "I1 = I2 = 2 I3, centre of mass across the axis",
+            "I1 = I2 = 2 I3, centre of mass in the equatorial plane",
             HEAVY_TOP,
             HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0)),
             State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5")),
@@ -145,14 +145,14 @@ CASES: dict[str, Case] = {
         ),
         Case(
             "goryachev-chaplygin",
-            "I1 = I2 = 4 I3, centre of mass across the axis, M·gamma = 0",
+            "I1 = I2 = 4 I3, centre of mass in the equatorial plane, M·gamma = 0",
             HEAVY_TOP,
             HeavyTop((4, 4, 1), 1, (1, 0, 0)),
             State(("3/4", "1/2", 0), (0, 0, 1)),
         ),
         Case(
             "hess",
-            "Hess' top, M·gamma = 3: a hyperbolic linear system with the period of an elliptic height",
+            "Hess' top, M·gamma = 3: a hyperbolic linear system with elliptic coefficients",
             HEAVY_TOP,
             HeavyTop((8, 6, 3), 1, (1, 0, 2)),
             State(("3/4", "1/2", -1), (0, 1, 0)),

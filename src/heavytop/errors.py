@@ -56,6 +56,11 @@ def invalid(error: Exception) -> str:
     return str(error)
 
 
+def why(error: Exception) -> str:
+    """The reason that a file could not be read or written, without its path and the number of the error."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 class HeavyTopError(Exception):
     """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
 

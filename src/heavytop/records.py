@@ -274,6 +274,10 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return f"{self.starts} of {self.of_starts} starts certified at t = {self.time} {at_least}"
 
 
+_LOST = ", and all significant digits are lost from t = "
+_FORMER_LOST = ", and no digit is left from t = "
+
+
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """The reference that a row was compared with.
 
@@ -299,7 +303,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             return self.method
         if self.how == "computed":
             agreed = f" agree within {self.radius}" if self.radius else ""
-            ends = f", and no digit is left from t = {self.until} on" if self.until else ""
+            ends = f"{_LOST}{self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
         said = ", for the first start; ".join(certificate.text for certificate in self.certificates)
@@ -443,7 +447,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
         derived = key.system, key.precision, key.horizon, key.kind, against
         if identity != derived:
             for name, old, new in zip(_DERIVED, identity, derived, strict=True):
-                if old not in ("", new):
+                if old.replace(_FORMER_LOST, _LOST) not in ("", new):
                     raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
                 msgspec.structs.force_setattr(self, name, new)
 
@@ -568,7 +572,9 @@ def of_identity(identity: dict[str, str]) -> dict[str, str]:
 
 
 def of_row(row: Row) -> Row:
-    """The row with the name of now of the integrator that computed it; itself where it is that already."""
+    """The row with the names of now of its integrator and its arithmetic; itself where it has these already."""
+    if row.flags.get("arithmetic") == "whole numbers":
+        row = msgspec.structs.replace(row, flags=row.flags | {"arithmetic": "integers"})
     subject = row.key.subject
     if subject.name not in INTEGRATORS or subject.what != "computed":
         return row

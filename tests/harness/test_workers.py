@@ -103,7 +103,7 @@ def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Pat
     assert digits_kept(lost) == 0
     assert list(contradictions(lost, KINDS["drift"])) == []
     assert str(ends) in summary_of([lost])
-    assert f"lost at {ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
+    assert f"–{ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
 
 
 class Poison:

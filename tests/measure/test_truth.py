@@ -137,7 +137,7 @@ def test_the_truth_of_a_chaotic_row_ends_where_its_format_has_no_digit_left() ->
     assert answer.ends is not None
     assert Fraction(200) <= answer.ends <= Fraction(600)
     assert answer.against.until == str(answer.ends)
-    assert f"no digit is left from t = {answer.ends} on" in answer.against.text
+    assert f"all significant digits are lost from t = {answer.ends} on" in answer.against.text
     assert not answer.covers(answer.ends)
     assert answer.covers(answer.ends / 2)
     # a run in the format itself is lost there, and was not long before

@@ -53,7 +53,7 @@ def test_more_bits_than_words_have_are_met_to_the_last() -> None:
     times = [Fraction(1, 3), Fraction(5, 4)]
     run = propagate_multiword(TOP, START, times, MANY)
     assert run.outcome is Outcome.SUCCESS
-    assert run.flags["arithmetic"] == "whole numbers"
+    assert run.flags["arithmetic"] == "integers"
     proven = Validated(run.problem.top, run.problem.start)
     for time, state in zip(run.times, run.states, strict=True):
         for ball, value in zip(proven.state(time, MANY.bits + 8), state, strict=True):

@@ -42,7 +42,7 @@ def test_json_has_numbers_and_verdicts_and_no_words_to_take_apart() -> None:
 def test_markdown_is_escaped_and_every_row_has_all_cells() -> None:
     text = to_markdown(MADE, KINDS)
     assert text.startswith("### Plan p\\|q: ")
-    assert "- **refuted** Ershkov's published solution of the heavy top" in text
+    assert "- **refuted** Ershkov's motion of the heavy top" in text
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     place = rows.index(next(line for line in rows if "largest" in line))
     assert "3.25e-997" in rows[place + 2]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def gate(
     plan: Annotated[str, typer.Option(help="A TOML file, or a name of `heavytop list` such as gate.")] = "gate.toml",
     integrator: Annotated[str, typer.Option(help="As of `run`: a name, mine.toml, mine.py:solve.")] = "",
-    baseline: Annotated[Path, typer.Option(help="Folder of the report that is trusted.")] = Path(".heavytop/baseline"),
+    baseline: Annotated[Path, typer.Option(help="Folder of the trusted report.")] = Path(".heavytop/baseline"),
     policy: Annotated[Path | None, typer.Option(help="As of `compare`; policy.toml beside the plan if any.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the new report; a former one there is replaced.")] = Path(
         ".heavytop/new"
@@ -47,10 +47,10 @@ def gate(
 
     require_apart((markdown, junit, html), baseline, out, policy)
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
-    if not bless:
-        require_baseline(trusted)
     clear(fresh)
     planned = prepare(plan, fresh, integrator=integrator, workers=workers)
+    if not bless:
+        require_baseline(trusted)
     say_former({integrator} | former(plan))
     for warning in planned.warnings:
         say(f"warning: {warning}")

@@ -21,9 +21,9 @@ def check_integrator(
     integrator: Annotated[str, typer.Argument(help="A name of `heavytop list`, mine.toml or mine.py:solve.")],
     json: Json = False,
 ) -> int:
-    """Go through the contract of an integrator.
+    """Check an integrator against its contract.
 
-    It says in plain sentences what is wrong.  Exit code 0 if nothing is violated, 1 if something is, 2 if there is no
+    Prints each requirement, kept or violated.  Exit code 0 if nothing is violated, 1 if something is, 2 if there is no
     such integrator or file.
     """
     from dataclasses import asdict
@@ -60,7 +60,7 @@ def new(
     engine: Annotated[str, typer.Option(help="An adapter of that engine: mujoco, drake, ...; '?' lists all.")] = "",
     into: Annotated[Path | None, typer.Option(help="A repository: it gets the workflow, and DIR lies in it.")] = None,
 ) -> int:
-    """Begin an integrator and its gate in a new folder.
+    """Make a new folder with an integrator and its gate.
 
     It holds a program that integrates the heavy top, in the language asked for: by RK4 in fixed steps, by the pair of
     Dormand and Prince to a tolerance, or by Adams-Bashforth 4; or the adapter of an engine of rigid bodies.  It works

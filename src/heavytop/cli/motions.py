@@ -94,9 +94,7 @@ Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0,
 Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
 AxisAngle = Annotated[str | None, typer.Option(help="Attitude as x,y,z:angle; radians, or 30deg.")]
 Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
-Times = Annotated[
-    str, typer.Option(help="Times t1,t2,..., each farther from 0 than the last, on one side of it; the first may be 0.")
-]
+Times = Annotated[str, typer.Option(help="Times t1,t2,..., increasing or decreasing from 0; the first may be 0.")]
 Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
 SystemName = Annotated[
     str | None,
@@ -106,7 +104,7 @@ Show = Annotated[
     str | None,
     typer.Option(metavar="WHAT", help="Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space."),
 ]
-Point = Annotated[str | None, typer.Option(help="Point x,y,z of the body, in place of the centre of mass.")]
+Point = Annotated[str | None, typer.Option(help="Body point x,y,z of --show position, in place of the centre of mass.")]
 Pivot = Annotated[str | None, typer.Option(help="Place x,y,z of the fixed point in space, 0,0,0 without it.")]
 Csv = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table as CSV, which `score` reads.")]
 Latex = Annotated[
@@ -306,7 +304,7 @@ def propagate(
 def reference(
     asked: _Asked,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
-    attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
+    attitude: Annotated[bool, typer.Option("--attitude", help="Also xi, horizontal and fixed in space.")] = False,
     derivatives: Annotated[
         str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,

@@ -242,7 +242,7 @@ class Bar:
         """Parts done of all, per cent, time left."""
         counted = f"{self.finished}/{self.count} {self.unit}" if self.count else ""
         percent, left = 100 * self.estimator.fraction, self.estimator.seconds_left()
-        if not percent and not left:
+        if not percent:  # the seconds expected of a row say nothing of what nobody has measured
             return counted or "how far is not known"
         percent_text = f"{percent:.1g} %" if 0 < percent < 1 else f"{percent:.0f} %"
         time_left = f"about {duration(left)} left" if left or percent == 100 else "longer than expected"

@@ -85,7 +85,7 @@ def history(
     metric: Annotated[str, typer.Option(help="Only metrics that match this pattern, changed or not.")] = "",
     case: Annotated[str, typer.Option(help="Only cases that match this pattern.")] = "*",
     policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as a step.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page with a small chart a metric.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page with a small chart per metric.")] = None,
     json: Json = False,
 ) -> int:
     """Show metrics over reports, with every step marked."""
@@ -209,11 +209,11 @@ def run(
     ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the run that --out holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
-    seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the roundings of the same motions, 0 to 1000.")] = 0,
     row_timeout: Annotated[
         str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
     ] = None,

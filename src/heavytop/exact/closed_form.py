@@ -66,6 +66,19 @@ def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
     return look_up
 
 
+def once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """``make(motion)`` once for each motion: of what is exact, and needs no working precision."""
+
+    @wraps(make)
+    def look_up(motion: Any) -> Made:
+        if make not in motion.made:
+            motion.made[make] = make(motion)
+        value: Made = motion.made[make]
+        return value
+
+    return look_up
+
+
 def taylor(
     field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
 ) -> list[list[Fraction]]:
@@ -230,7 +243,7 @@ class ClosedForm(Evaluated):
     """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
-    made: what :func:`heavytop.exact.closed_form.cached_per_precision` keeps.
+    made: what :func:`once` and :func:`cached_per_precision` keep.
     """
 
     top: HeavyTop

@@ -22,7 +22,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, prefixed, quoted
+from heavytop.errors import InputError, invalid, prefixed, quoted, why
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole
 from heavytop.harness import BUILT_IN, OF_FEATURES
@@ -143,7 +143,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         try:
             text = read_whole(Path(name)).decode("utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"The plan {name} cannot be read: {error}.", "Give a readable TOML file.") from None
+            raise InputError(f"The plan {name} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
     else:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted, why
 from heavytop.extras import extra_of, missing
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
@@ -143,8 +143,8 @@ class Integrator:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever another package's module does when it is imported
-            why = f"{type(error).__name__}: {said(error)}"
-            raise InputError(f"The integrator {self.name} is broken: {why}.", entry.remedy) from error
+            reason = f"{type(error).__name__}: {said(error)}"
+            raise InputError(f"The integrator {self.name} is broken: {reason}.", entry.remedy) from error
         if not callable(found):
             cause = f"is broken: {entry.function} is not callable."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
@@ -270,7 +270,7 @@ class Integrator:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
         runs = []
         for index, problem in enumerate(problems):
-            watch = None if observer is None else _watching(observer, index)
+            watch = None if observer is None else partial(observer, index)
             first = index == 0
             arguments = *_given(problem), times, problem.precision, problem.system, watch
             runs.append(self.propagate(*arguments, xi=problem.xi, again=first))
@@ -286,13 +286,6 @@ def _given(problem: Problem) -> tuple[HeavyTop, State]:
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
         raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
     return problem.given
-
-
-def _watching(observer: EnsembleObserver, index: int) -> Callable[[Fraction, Any], None]:
-    def watch(time: Fraction, state: Any) -> None:
-        observer(index, time, state)
-
-    return watch
 
 
 def foreign(name: str, function: str = "", source: IntegratorSource | None = None) -> Integrator:
@@ -408,8 +401,7 @@ def commands_in(path: Path) -> list[Command]:
         text = path.read_text("utf-8")
         document = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, RecursionError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"{path} cannot be read: {why}.", "Give a readable TOML file.") from None
+        raise InputError(f"{path} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid: {error}.", _SHOWN) from None
     tables = document.get("integrator")

@@ -83,7 +83,10 @@ def as_texts(run: Trajectory, output: Output) -> list[Any]:
     if output.name == "quaternion" and lines:
         turns = signs(_start(run), numpy.array([[float(value) for value in line] for line in lines]))
         lines = [[value * int(turn) for value in line] for line, turn in zip(lines, turns, strict=True)]
-    return [shaped([_text(value, digits) for value in line], output.shape) for line in lines]
+    return [
+        shaped(["nan" if value != value else decimal_text(exact(value), digits) for value in line], output.shape)
+        for line in lines
+    ]
 
 
 def attitude_of(run: Trajectory) -> Any:
@@ -168,10 +171,6 @@ def _functions(bits: int) -> SimpleNamespace:
         return exact(own.atan2(number(y), number(x)))
 
     return SimpleNamespace(sqrt=lambda value: exact(own.sqrt(number(value))), atan2=atan2)
-
-
-def _text(value: Any, digits: int) -> str:
-    return "nan" if value != value else decimal_text(exact(value), digits)
 
 
 _FEW_DIGITS = 3.0
@@ -314,15 +313,8 @@ class ResumePoint:
             # a zero keeps its sign
             return ["-0" if v == 0 and str(v).startswith("-") else native_text(v, precision) for v in values]
 
-        return {
-            "samples": self.samples,
-            "state": texts(self.state),
-            "time": texts(self.time),
-            "steps": self.steps,
-            "seconds": self.seconds,
-            "flags": self.flags,
-            "words": list(self.words),
-        }
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return fields | {"state": texts(self.state), "time": texts(self.time), "words": list(self.words)}
 
     @classmethod
     def of(cls, content: dict[str, Any], precision: Precision) -> ResumePoint:

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia tensor out of files of robots: URDF, MJCF, SDF, USD (text), and TOML.
+"""Mass, centre of mass and inertia tensor out of files of robots: URDF, MJCF, SDF, USD, and TOML.
 
 Numbers are exact, to the digits in the file.  A rotation of the inertial axes with irrational entries is rounded to
 2^-64.  Units are kg and metres, as these formats have it.
@@ -595,15 +595,19 @@ def composed_usd(path: Path) -> Iterator[Link]:
         ) from None
     try:
         stage = Usd.Stage.Open(str(path))
+        faults = [str(fault).rstrip(".") for fault in stage.GetCompositionErrors()]
     except Tf.ErrorException as error:
-        raise InputError(f"USD refuses {path}: {' '.join(str(error).split())[:200]}.", "Mend the file.") from None
+        faults = [part.commentary for part in error.args]
+    if faults:
+        raise InputError(f"USD refuses {path}: {'; '.join(faults)[:200]}.", "Mend the file, or its layers.")
     units = {
         "metersPerUnit": exact(repr(UsdGeom.GetStageMetersPerUnit(stage))),
         "kilogramsPerUnit": exact(repr(UsdPhysics.GetStageKilogramsPerUnit(stage))),
     }
-    for prim in stage.Traverse():
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         attributes = {name: prim.GetAttribute(f"physics:{name}") for name in _USD_NAMES}
-        values = {name: _printed(part.Get()) for name, part in attributes.items() if part.HasAuthoredValue()}
+        first = {name: part.Get(Usd.TimeCode.EarliestTime()) for name, part in attributes.items()}
+        values = {name: _printed(value) for name, value in first.items() if attributes[name].HasAuthoredValue()}
         if {"mass", "diagonalInertia"} <= values.keys():
             yield prim.GetName(), partial(_prim, prim.GetName(), values, units)
 

@@ -205,7 +205,8 @@ class State:
             raise InputError(_NO_DIRECTION, _UPWARDS)
         if abs(off) > slack:
             size = decimal_text(round_to(off, _SHOWN_BITS), 6)  # of a million digits else
-            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}.", remedy)
+            most = f", where {decimal_text(round_to(slack, _SHOWN_BITS), 2)} is allowed" if slack else ""
+            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}{most}.", remedy)
         return self
 
     def unit_gamma_nearby(self) -> str:

@@ -152,12 +152,9 @@ def _definite(p: Parameters, y: Sequence[Fraction]) -> bool:
         kinetic = sum((u * v / i for u, v, i in zip(a[:3], b[:3], p.inertia, strict=True)), Fraction(0))
         return kinetic - turning * (_inner(a[:3], b[3:]) + _inner(a[3:], b[:3])) - kappa * _inner(a[3:], b[3:])
 
-    minors = [_determinant([[form(u, v) for v in basis[:n]] for u in basis[:n]]) for n in range(1, 5)]
+    hessians = [[[form(u, v) for v in basis[:n]] for u in basis[:n]] for n in range(1, 5)]
+    minors = [_characteristic(hessian)[-1] * (-1) ** len(hessian) for hessian in hessians]
     return all(minor > 0 for minor in minors)  # kinetic energy is positive: it is never negative definite
-
-
-def _determinant(matrix: Matrix) -> Fraction:
-    return _characteristic(matrix)[-1] * (-1 if len(matrix) % 2 else 1)
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:

@@ -214,6 +214,41 @@ def Xform "arm" (prepend apiSchemas = ["PhysicsMassAPI"])
     assert document["centre"] == ["0", "0", "0.1"]
 
 
+def test_usd_in_binary_in_packages_and_in_instances(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdUtils
+
+    def stage(name: str) -> Usd.Stage:
+        made = Usd.Stage.CreateNew(str(tmp_path / name))
+        UsdGeom.SetStageMetersPerUnit(made, 0.01)
+        return made
+
+    layer = stage("a.usdc")
+    layer.SetDefaultPrim(layer.DefinePrim("/r", "Xform"))
+    mass = UsdPhysics.MassAPI.Apply(layer.DefinePrim("/r/arm", "Xform"))
+    mass.CreateMassAttr().Set(2.5, 1.0)  # a time sample
+    mass.CreateCenterOfMassAttr(Gf.Vec3f(10, 0, 20))
+    mass.CreateDiagonalInertiaAttr(Gf.Vec3f(3100, 2800, 1900))
+    mass.CreatePrincipalAxesAttr(Gf.Quatf(0.8, 0, 0.6, 0))
+    layer.Save()
+    UsdUtils.CreateNewUsdzPackage(str(tmp_path / "a.usdc"), str(tmp_path / "b.usdz"))
+    for name, target in (("c.usdc", "a.usdc"), ("d.usda", "gone.usdc")):
+        layer = stage(name)
+        robot = layer.DefinePrim("/robot")
+        robot.GetReferences().AddReference(target)
+        robot.SetInstanceable(True)
+        layer.Save()
+    (tmp_path / "e.usdc").write_bytes((tmp_path / "a.usdc").read_bytes()[:200])
+    for name in ("a.usdc", "b.usdz", "c.usdc"):
+        body = read_body(tmp_path / name, "arm")
+        assert (body.mass, body.centre) == (Fraction("2.5"), (Fraction("0.1"), 0, Fraction("0.2")))
+        assert body.six == tuple(map(Fraction, ("0.199408", "0.28", "0.300592", "0", "-0.032256", "0")))
+    for name, says in (("d.usda", "Could not open asset @gone.usdc@"), ("e.usdc", "possibly truncated")):
+        run = heavytop("body", tmp_path / name)
+        assert run.returncode == 2
+        assert says in run.stderr and "Error in '" not in run.stderr  # noqa: PT018
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [

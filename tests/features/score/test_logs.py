@@ -88,6 +88,14 @@ def ephemeris() -> str:
     return "\n".join(parts)
 
 
+def later_ephemeris() -> str:
+    """An ephemeris whose first row is behind its START_TIME, of which the comments give the attitude."""
+    q = ", ".join(map(str, quaternions()[0]))
+    begin = f"START_TIME = 2026-01-01T00:00:00.0\nMETA_STOP\nCOMMENT start_quaternion: {q}"
+    lines = ephemeris().replace("META_STOP", begin).splitlines()
+    return "\n".join(line for line in lines if not line.startswith("2026-001T00:00:00.0"))
+
+
 FORMS: dict[str, tuple[str, Callable[[], str]]] = {
     "modified Rodrigues parameters": ("csv", lambda: HEAD + "t,sigma1,sigma2,sigma3\n" + rows(TIMES, mrp())),
     "rotation vector": (
@@ -100,6 +108,7 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
     "TUM": ("txt", lambda: tum(True)),
     "TUM without a header": ("tum", lambda: tum(False)),
     "ephemeris": ("aem", ephemeris),
+    "ephemeris of a later row": ("aem", later_ephemeris),
     "underscores": (
         "csv",
         lambda: (
@@ -163,6 +172,8 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     lists = {"centre": [0.3, -0.2, 0.4], "inertia": [1.2, 0.9, 0.6], "omega": [1, 2, 6]}
     texts = {key: numpy.array(", ".join(map(str, value))) for key, value in lists.items()}
     numpy.savez(path, t=TIMES, quaternions=quaternions(), **comments, **texts)  # type: ignore[arg-type]
+    assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+    numpy.savez(path, t=TIMES, q=quaternions()[:, [1, 2, 3, 0]], quaternion_order="xyzw", **comments, **texts)  # type: ignore[arg-type]
     assert scored(path)["digits_right"] > 13  # type: ignore[operator]
     whole = {"mass": 2, "gravity": 9.81, "about": "centre of mass", **lists, "inertia": numpy.diag(lists["inertia"])}
     numpy.savez(path, time=TIMES, R=run().matrices(), **whole)  # type: ignore[arg-type]
@@ -273,7 +284,7 @@ def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path:
     body = ht.Body("2", "0", (0, 0, 0), ("1.2", "0.9", "0.6"))
     start = ht.State(omega=(1, 2, 6), attitude=ht.Attitude.quaternion("0.8", 0, "0.6", 0))
     free = ht.propagate(body, start, [str(time) for time in TIMES], ht.DOUBLE)
-    head = HEAD.replace("9.81", "0").replace("0.3, -0.2, 0.4", "0, 0, 0")
+    head = HEAD.replace("9.81", "0").replace("# centre: 0.3, -0.2, 0.4\n", "")
     falling = numpy.outer(TIMES, (1, 2, 3))
     path = tmp_path / "log.csv"
     for text in (
@@ -282,6 +293,20 @@ def test_of_a_free_body_omega_alone_is_scored_and_its_fall_is_left_out(tmp_path:
     ):
         path.write_text(head + text)
         assert scored(path)["digits_right"] > 13  # type: ignore[operator]
+
+
+def test_stamps_of_a_start_that_is_given_are_counted_from_it(tmp_path: Path) -> None:
+    """The first row of a log is later than the attitude at t = 0 of its comments; an epoch is the first row's."""
+    said = HEAD + f"# start_quaternion: {', '.join(map(str, quaternions()[0]))}\nstamp.sec,stamp.nanosec,qw,qx,qy,qz\n"
+    lines = rows(quaternions()).splitlines()
+    path = tmp_path / "log.csv"
+    for first, begin in ((0, 1), (15 * 10**8, 0)):
+        stamps = [f"{first + int(time)},{round(time % 1 * 10**9)}" for time in TIMES]
+        path.write_text(said + "\n".join(map(",".join, [*zip(stamps, lines, strict=True)][begin:])))
+        shown = heavytop("score", path, "--json")
+        assert json.loads(shown.stdout)["digits_right"] > 13
+        assert ("counted from the first row" in shown.stderr) == (begin == 0)
+        assert "nanosec" not in shown.stderr
 
 
 def test_rows_of_kitti_are_refused_with_the_line_that_names_them(tmp_path: Path) -> None:

@@ -73,8 +73,9 @@ class AlgebraicMotion(WithBearing, Algebraic):
         squares = self.curve.squares(self.place)
         if min(squares) < 0 or max(squares) == 0:
             allowed = " and ".join(f"[{low:.6g}, {high:.6g}]" for low, high in gaps(self.curve))
+            second, third = (decimal_text(square, 4) for square in squares)
             raise InputError(
-                f"No motion at {shown(self.place)}: Omega2^2 and Omega3^2 would be {_signs(squares)}.",
+                f"No motion at {shown(self.place)}: Omega2^2 and Omega3^2 would be {second} and {third}.",
                 f"Real motions have it in {allowed}." if allowed else "No such motion of this top is real.",
             )
 
@@ -124,10 +125,6 @@ def _azimuth(motion: AlgebraicMotion) -> Azimuth:
 def _motion(motion: AlgebraicMotion) -> OneGapMotion:
     q, r = motion.curve.squares(motion.place)
     return OneGapMotion.of(motion.curve, motion.place, (motion.signs[0] * (q > 0), motion.signs[1] * (r > 0)))
-
-
-def _signs(squares: tuple[Fraction, Fraction]) -> str:
-    return " and ".join(decimal_text(square, 4) for square in squares)
 
 
 def algebraic_motion(

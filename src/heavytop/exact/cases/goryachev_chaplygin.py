@@ -157,7 +157,9 @@ def gap_ends(level: GoryachevLevel, curve: Sequence[Root], places: Sequence[arb]
     Raises Undecided where the balls do not tell.
     """
     resting = _resting(level, curve)
-    real = sorted((i for i, root in enumerate(curve) if root.value.imag.is_zero()), key=lambda i: _place(curve[i]))
+    real = sorted(
+        (i for i, root in enumerate(curve) if root.value.imag.is_zero()), key=lambda i: midpoint(curve[i].value.real)
+    )
     if any(curve[low].value.overlaps(curve[high].value) for low, high in pairwise(real)):
         raise Undecided
     allowed, inside = [], False
@@ -187,10 +189,6 @@ def _resting(level: GoryachevLevel, curve: Sequence[Root]) -> dict[int, int]:
     if len(coinciding) != 1:
         raise Undecided
     return {0 if double_root > 0 else 1: coinciding[0]}
-
-
-def _place(root: Root) -> Fraction:
-    return midpoint(root.value.real)
 
 
 # Goryachev and Chaplygin's top, and Sretensky's gyrostat, by real Abel inversion: the state from two phases.

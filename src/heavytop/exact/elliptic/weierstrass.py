@@ -72,7 +72,7 @@ class Theta:
         With a shift v, θ1(v − z) over 2q^(1/4) is C(c) cos x − S(c) sin x, with S times i where ``hyperbolic``.
         """
         if shift is None:
-            return self._sum(self.square, 1, _signs(-1), 1, 1), self._sum(self.square, 1, repeat(1), -1, 1)
+            return self._sum(self.square, 1, cycle((1, -1)), 1, 1), self._sum(self.square, 1, repeat(1), -1, 1)
         angle = shift * arb.pi()
         wide, turn = (2 * abs(angle.imag)).exp().upper(), -2 * (2 * angle).cos()
         sine, cosine = angle.sin_cos()
@@ -111,10 +111,6 @@ class Theta:
                 if not term.is_finite():
                     break
         return 1, arb(0, "inf")
-
-
-def _signs(sign: int) -> Iterator[int]:
-    return cycle((1, sign))
 
 
 def _doubled(sign: int) -> Iterator[int]:

@@ -13,7 +13,7 @@ from heavytop.errors import ExitCode
 
 @command
 def body(
-    file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD as text, or TOML with a body.")],
+    file: Annotated[Path, typer.Argument(help="A URDF, MJCF or SDF file, USD, or TOML with a body.")],
     link: Annotated[str | None, typer.Option(help="Which link or body, where the file has several.")] = None,
     pivot: Annotated[
         str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; without it a ball joint, or 0,0,0.")
@@ -23,7 +23,7 @@ def body(
 ) -> int:
     """Check the inertia tensor in a URDF, MJCF or SDF.
 
-    Says whether a body has it, and if not, which slip makes it one.
+    Says whether a rigid body can have it, and if not, which mistake explains it.
 
     Exit 0 for a body, 1 where none has this tensor or it is implausible, 2 for a file that cannot be
     read.  Prints the body as a table for a plan.

@@ -114,7 +114,7 @@ class BodyAssessment:
         for slip in self.slips:
             yield f"  {slip.name}: {slip.sentence}"
             if slip.inertia != self.given.six:
-                yield f"    mended: inertia = {json.dumps(_mended(slip.inertia))}"
+                yield f"    corrected: inertia = {json.dumps(_mended(slip.inertia))}"
         yield ""
         yield f"mass                {_decimal(self.given.mass)}"
         yield f"centre of mass      {', '.join(map(_decimal, self.given.centre))}   from the pivot"

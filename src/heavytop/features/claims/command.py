@@ -24,7 +24,7 @@ def audit(
         str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it that of the file.")
     ] = None,
     branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
-    library: Annotated[bool, typer.Option("--library", help="Every claim of `heavytop claims`, anew.")] = False,
+    library: Annotated[bool, typer.Option("--library", help="All of `heavytop claims`, three minutes.")] = False,
     json: Json = False,
 ) -> int:
     """Prove or refute a claimed motion, by equation.
@@ -79,7 +79,7 @@ def claims(
 ) -> int:
     """List published claims and usual misprints, by verdict.
 
-    Proven or refuted by `heavytop audit NAME`; verdicts that are not known from before take a second each.
+    Proven or refuted by `heavytop audit NAME`; each verdict that is not cached takes a second.
     """
     listed = _listed(tag, anew=False)
     if json:

@@ -22,7 +22,7 @@ from heavytop.records import HEYOKA, NOISE, NOT_CARRIED, NOT_MEASURED, Beside, M
 from heavytop.report.document.document import Block, Chart
 from heavytop.report.render.page import attitude_columns, digits_columns, digits_headline, motions
 from heavytop.report.render.plots import digits, growth
-from heavytop.report.render.text import DIGITS, NOISE_BAND, largest_over
+from heavytop.report.render.text import COMPUTED, DIGITS, NOISE_BAND, largest_over
 
 NAME = "drift"
 
@@ -130,6 +130,7 @@ class DriftKind(Kind):
             [
                 f"Both absolute, {largest_over(rows)}: a conserved integral does not prove the trajectory correct.",
                 DIGITS,
+                COMPUTED + " Errors are those to a.",
                 NOISE_BAND,
             ],
         )

@@ -19,7 +19,6 @@ from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantit
 from heavytop.report.document.document import (
     DASHED,
     Block,
-    Cell,
     Chart,
     Headline,
     Key,
@@ -215,7 +214,9 @@ class BreakAwayLaw(Kind):
         yield Table(
             "Escape time gained per bit of the format",
             ("case", "measured", "ln 2 / rate", "off by"),
-            both((row, _cells(*values)) for row in rows if (values := _numbers(row))),
+            both(
+                (row, [*map(Value, values[:2]), f"{float(values[2]):.1%}"]) for row in rows if (values := _numbers(row))
+            ),
         )
         yield Chart(escape_times)
 
@@ -223,7 +224,3 @@ class BreakAwayLaw(Kind):
 def _numbers(row: Row) -> list[Metric]:
     """The slope, the expected one and by how much it is off."""
     return [row.metrics[metric.text] for metric in (SLOPE, EXPECTED, OFF_BY) if metric.text in row.metrics]
-
-
-def _cells(slope: Metric, expected: Metric, off_by: Metric) -> list[Cell]:
-    return [Value(slope), Value(expected), f"{float(off_by):.1%}"]

@@ -131,11 +131,15 @@ class Homoclinic(Kind):
             yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
-        """Until when they stay; the escape times, and what these do not show; a line for each case and format."""
+        """Until when they stay; the earlier escape of both directions, and what it hides; a line for each case."""
         known = [row for row in rows if row.outcome == Outcome.SUCCESS.value and ESCAPE.text in row.metrics]
         if known:
             yield _headline(known)
-        shown = [row for row in rows if row.key.direction != "backward" and ESCAPE.text in row.metrics]
+        earlier: dict[tuple[str, str, str], Row] = {}
+        for row in (row for row in rows if ESCAPE.text in row.metrics):
+            motion = row.key.case, row.key.subject.name, row.precision
+            earlier[motion] = min(earlier.get(motion, row), row, key=_stayed)
+        shown = list(earlier.values())
         title = "Escape from a homoclinic motion at |t|"
         yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
         yield from (Note(said, shown=In.SHORT) for said in _hidden(shown))

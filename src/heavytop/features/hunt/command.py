@@ -21,15 +21,15 @@ def hunt(
     limit: Annotated[
         str | None, typer.Option(help="Report errors above LIMIT eps T^1.5; with --against, above that ratio.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Search otherwise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 1,
     json: Json = False,
 ) -> int:
-    """Search for the motion that breaks an integrator.
+    """Search for the motion on which an integrator fails.
 
-    Bodies and starts are tried that are random, then ever worse.  What is found is shrunk to the simplest data that
-    still show it, and proven.  Found is a run that fails, or an error two decades beyond what the integrator's own law
-    and the motion's amplification explain.  5000 motions of heyoka take three minutes.  Exit code 1 if anything is
-    found, else 0.
+    Bodies and starts are drawn at random, then varied towards larger errors.  A finding is a run that fails, or an
+    error two decades beyond what the integrator's own law and the motion's amplification explain; it is reduced to the
+    simplest data that still show it, and proven.  5000 motions of heyoka take three minutes.  Exit code 1 if anything
+    is found, else 0.
     """
     from heavytop.cli.output import say_former
     from heavytop.features.hunt.api import hunt as search

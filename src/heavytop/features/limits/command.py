@@ -19,7 +19,7 @@ def power(
     until: Annotated[str, typer.Option(help="Where the test ends.")],
     tolerance: Annotated[str, typer.Option(help="Largest error that passes: absolute below 1, relative above.")],
     case: Annotated[str | None, typer.Option(help="A case of `heavytop list`.", autocompletion=cases)] = None,
-    file: Annotated[str | None, typer.Option(help="In its place the file of a robot, with --omega.")] = None,
+    file: Annotated[str | None, typer.Option(help="In place of --case a robot's file, with --omega.")] = None,
     link: Annotated[str | None, typer.Option(help="Link of the file.")] = None,
     gravity: Annotated[str, typer.Option(help="With --file: the acceleration of gravity.")] = "9.81",
     omega: Annotated[str | None, typer.Option(help="With --file: angular velocity x,y,z at t = 0.")] = None,

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 from heavytop import arguments
@@ -19,12 +20,13 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint, radius, whole_evaluation, working_precision
+from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, real
 from heavytop.top.bodies import Body
-from heavytop.top.equations import GYROSTAT, NAMES, System
+from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _TIMES, _EACH = 64, 4
@@ -134,10 +136,7 @@ def digits_end(
     ]
     of_digits = form.bits * math.log10(2)
     reached = [max(error for error, _ in worst[: k + 1]) for k in range(_TIMES)]
-    ends = []
-    for least in (10 ** (1 - of_digits), _ALL):
-        index = next((k for k in range(_TIMES) if worst[k][0] >= least), None)
-        ends.append(None if index is None else _loss(problem, times, index + 1, worst[index], least))
+    ends = _losses(problem, times, worst, (10 ** (1 - of_digits), _ALL))
     left = tuple(_digits(error, of_digits) for error in reached)
     return DigitsEnd(form.name, of_digits, times[1:], left, *ends)
 
@@ -149,21 +148,22 @@ def _digits(error: float, most: float = math.inf) -> float:
 def _errors(problem: Problem, times: Sequence[Fraction]) -> dict[int, dict[int, float]]:
     """By the place of the rounding and the place of the time: the largest relative error of a component.
 
-    Beyond the time at which one rounding has lost all digits no other is followed.
+    Beyond the time at which one rounding has lost all digits no other is followed.  What is rounded is 2^-p off at
+    once, so that half the bits of the true motion follow it as far.
     """
-    form = real(2 * problem.precision.bits + _SPARE_BITS)
-    run = propagator("multiword", {})
+    run, bits = propagator("multiword", {}), problem.precision.bits
 
-    def states(start: State, instants: Sequence[Fraction]) -> list[list[Fraction]]:
-        states = run(problem.top, start, instants, form, system=problem.system)
+    def states(start: State, instants: Sequence[Fraction], bits: int) -> list[list[Fraction]]:
+        states = run(problem.top, start, instants, real(bits), system=problem.system)
         return [[exact(value) for value in state[:6]] for state in states.states]
 
-    known = [list(problem.start.flat), *states(problem.start, times[1:])]
+    known = [list(problem.start.flat), *states(problem.start, times[1:], 2 * bits + _SPARE_BITS)]
     errors, end = {}, len(known)
     for i in range(0, len(known) - 1, _EACH):
         if i + 1 >= end:
             break
-        after = states(_rounded(known[i], problem.precision), [time - times[i] for time in times[i + 1 : end]])
+        start = _rounded(known[i], problem.precision)
+        after = states(start, [time - times[i] for time in times[i + 1 : end]], bits + _SPARE_BITS // 2)
         errors[i] = {
             i + 1 + k: max(float(_relative(a, b)) for a, b in zip(state, known[i + 1 + k], strict=True))
             for k, state in enumerate(after)
@@ -181,26 +181,38 @@ def _rounded(state: Sequence[Fraction], form: Precision) -> State:
     return State(values[:3], values[3:])
 
 
-def _loss(problem: Problem, times: Sequence[Fraction], index: int, worst: tuple[float, int], least: float) -> Loss:
-    """The loss of one rounding, proven where enclosures reach."""
-    error, rounded = worst
-    time, at = times[index], times[rounded]
-    try:
-        apart = _apart(problem, at, time, _SPARE_BITS - math.floor(math.log2(least)))
-    except OutOfReach:
-        apart = 0.0
-    return Loss(time, at, _digits(max(apart, error)), apart >= least * (1 - 2**-20))
+def _losses(
+    problem: Problem, times: Sequence[Fraction], worst: Sequence[tuple[float, int]], levels: Sequence[float]
+) -> list[Loss | None]:
+    """The first time of each level of error, proven where enclosures reach; None where it is not reached."""
+    known, bits = find(problem.top, problem.start, problem.system), problem.precision.bits + _SPARE_BITS
+
+    @cache
+    @whole_evaluation
+    def rounded_at(at: Fraction) -> ExactSolution:
+        state = [midpoint(ball) for ball in known.state(at, bits)] if at else problem.start.flat
+        return find(problem.top, _rounded(state, problem.precision), problem.system)
+
+    losses: list[Loss | None] = []
+    for least in levels:
+        index = next((k for k, (error, _) in enumerate(worst) if error >= least), None)
+        if index is None:
+            losses.append(None)
+            continue
+        error, time, at = worst[index][0], times[index + 1], times[worst[index][1]]
+        proven = least * (1 - 2**-20)
+        try:
+            apart = _apart(known, rounded_at(at), time, time - at, _SPARE_BITS - math.floor(math.log2(least)))
+        except OutOfReach:
+            apart = 0.0
+        losses.append(Loss(time, at, _digits(max(apart, error)), apart >= proven))
+    return losses
 
 
 @whole_evaluation
-def _apart(problem: Problem, at: Fraction, time: Fraction, bits: int) -> float:
-    """A lower bound, less 2^-bits, of the relative error at ``time`` of the motion that was rounded at ``at``."""
-    known = find(problem.top, problem.start, problem.system)
-    fine = 2 * problem.precision.bits + _SPARE_BITS  # of small components too
-    state = [midpoint(ball) for ball in known.state(at, fine)] if at else list(problem.start.flat)
-    other = find(problem.top, _rounded(state, problem.precision), problem.system)
+def _apart(known: ExactSolution, other: ExactSolution, time: Fraction, after: Fraction, bits: int) -> float:
+    """A lower bound, less 2^-bits, of the relative error of ``other`` at ``after`` against ``known`` at ``time``."""
     with working_precision(bits):
-        pairs = zip(known.state(time, bits), other.state(time - at, bits), strict=True)
+        pairs = zip(known.state(time, bits), other.state(after, bits), strict=True)
         gaps = [_relative(midpoint(b), midpoint(a)) - radius(a) - radius(b) for a, b in pairs]
-    assert len(gaps) == len(NAMES)
     return float(max(Fraction(0), *gaps))

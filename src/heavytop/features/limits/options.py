@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 Ends = Annotated[
     bool,
-    typer.Option("--digits-end", help="Also when one rounding of the state has cost the first digit, and all digits."),
+    typer.Option("--digits-end", help="Also the times by which one rounding costs the first digit, and all digits."),
 ]
 Between = Annotated[
     str | None, typer.Option(metavar="DT", help="Also the error of interpolation between samples DT apart.")

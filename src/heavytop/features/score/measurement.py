@@ -86,10 +86,6 @@ class Scored:
     errors: list[float]
 
 
-def _count(observed: Observed) -> int:
-    return min(map(len, observed.columns.values()), default=0)
-
-
 def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
     """Explanations of the error: the digits written, lengths off 1, a convention, or another mistake."""
     about: dict[str, Any] = {"step": _step(trajectory)}
@@ -334,7 +330,7 @@ def _measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) ->
         else ObservedScorer(problem, known, observed.posed, observed.said, observed.names, keep)
     )
     if observed is not None:
-        samples = map(observed.sample, range(_count(observed)))
+        samples = map(observed.sample, range(min(map(len, observed.columns.values()), default=0)))
     errors: list[float] = []
     for time, sample in zip(times, samples, strict=False):
         scorer(time, sample)

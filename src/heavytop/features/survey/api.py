@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from heavytop import arguments
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, why
 from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import COLUMNS, FILE
 from heavytop.precision import ordered
@@ -56,4 +56,4 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
     try:
         return pandas.read_parquet(file, columns=wanted, engine="pyarrow")
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{file} cannot be read: {error}.", "Give the folder of a finished run.") from None
+        raise InputError(f"{file} cannot be read: {why(error)}.", "Give the folder of a finished run.") from None

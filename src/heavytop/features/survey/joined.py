@@ -16,7 +16,7 @@ from typing import Any
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import InputError
+from heavytop.errors import InputError, why
 from heavytop.extras import require_extra
 from heavytop.features.survey.gathered import DATA, command
 from heavytop.harness.plan import uniform
@@ -70,7 +70,7 @@ def _records(file: Path, row: Row) -> dict[str, Any]:
     try:
         table = read_table(file, columns=columns, filters=[(name, "=", text) for name, text in same.items()])
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{file} cannot be read: {error}.", "Give the folder of a finished run.") from None
+        raise InputError(f"{file} cannot be read: {why(error)}.", "Give the folder of a finished run.") from None
     records = {name: table[name].to_numpy() for name in columns if name != "outcome"}
     return records | {"outcome": table["outcome"].cast("string").to_numpy()}
 

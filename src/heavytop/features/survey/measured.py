@@ -330,7 +330,7 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
     """The largest |I(t) - I(0)| over the samples, of each integral from the rounded start."""
     groups: dict[Any, list[int]] = defaultdict(list)
     for index, integrals in enumerate(drawn.integrals):
-        groups[tuple((i.name, _axes(i)) for i in integrals)].append(index)
+        groups[tuple((i.name, getattr(i.value, "keywords", {}).get("axes")) for i in integrals)].append(index)
     drifts = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
     parameters, start = drawn.parameters, drawn.start
     for places in groups.values():
@@ -346,10 +346,6 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
             else:
                 drifts["drift_further"][places] = numpy.fmax(drifts["drift_further"][places], size)
     return drifts
-
-
-def _axes(integral: Any) -> Any:
-    return getattr(integral.value, "keywords", {}).get("axes")
 
 
 def _require_agreement(problem: Problem, times: Sequence[Fraction], truth: Pairs, apart: float) -> None:

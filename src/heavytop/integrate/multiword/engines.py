@@ -186,7 +186,7 @@ class WholeNumbers(Arithmetic):
     @property
     def flags(self) -> dict[str, str]:
         return {
-            "arithmetic": "whole numbers",
+            "arithmetic": "integers",
             "bits": str(self.bits),
             "tolerance": decimal_text(self.tolerance, 6),
             "step_rule": "powers of two, by the number of orders",

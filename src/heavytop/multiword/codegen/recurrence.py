@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 from gmpy2 import mpq
@@ -388,15 +388,12 @@ class Recurrence:
 
         def order(n: Operand, words: list[Operand]) -> list[Operand]:
             y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
-            sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
+            sums = code.loop(1, n, lambda m, sums: self._accumulate_pairs(m, n - m, sums), zeros)
             sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
             return self._stored_pairs(n, sums, y)
 
         words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
         return code.loop(1, low_order, order, words)
-
-    def _inner_pairs(self, n: Operand, m: Operand, sums: list[Operand]) -> list[Operand]:
-        return self._accumulate_pairs(m, n - m, sums)
 
     def _stored_pairs(self, n: Index, sums: list[Operand], y: list[Pair]) -> list[Operand]:
         following = [self._next_pair(n, v, (sums[2 * v], sums[2 * v + 1]), y[v]) for v in self.vectors]

@@ -258,7 +258,14 @@ def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[s
     rest = [change for change in changes.rows if change.identity not in named]
     end = f"{plural(len(rest), 'other row')} changed." if rest else "No other row changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
-        end = "The two have no row in common. Were they made with the same plan?"
+        keys = {msgspec.structs.replace(change.identity.key, case="") for change in changes.rows}
+        names = " and ".join(_case(change.identity) for change in changes.rows)
+        asked = (
+            f"Only the names differ: {names}."
+            if (len(keys), len(changes.rows)) == (1, 2)
+            else "Were they made with the same plan?"
+        )
+        end = f"The two have no row in common. {asked}"
     return [clip(text, _LONGEST) for text in (*(group.text for group in ranked), *still, end, *beside)]
 
 
@@ -294,8 +301,8 @@ def line(change: Change) -> str:
     )
     if not worst.metric:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
-    digits, count = change.digits, len(list(folded(change)))
-    more = f"; {plural(count, 'quantity', 'quantities')} changed" if count > 1 else ""
+    digits, count = change.digits, len(change.findings)
+    more = f"; {count} metrics changed" if count > 1 else ""
     better = change.verdict is Verdict.BETTER
     if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"

@@ -21,7 +21,7 @@ from typing import Literal
 
 import msgspec
 
-from heavytop.errors import InputError, invalid
+from heavytop.errors import InputError, invalid, prefixed, why
 from heavytop.files import read_whole
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
@@ -160,8 +160,7 @@ def load(path: Path) -> Policy:
     try:
         return msgspec.convert(tomllib.loads(read_whole(path).decode("utf-8")), Policy)
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"The policy {str(path)[:200]} cannot be read: {reason}.", "Give a TOML file.") from None
+        raise InputError(f"The policy {str(path)[:200]} cannot be read: {why(error)}.", "Give a TOML file.") from None
     except InputError as error:
         raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:
@@ -206,7 +205,9 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
 
 
 def _not_negative(name: str, value: str | float) -> None:
-    if physical(exact(value), name) < 0:
+    with prefixed(name):
+        number = exact(value)
+    if physical(number, name) < 0:
         shown = f"{value:g}" if isinstance(value, float) else value
         raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
 
@@ -382,7 +383,9 @@ def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: 
     if new.kind == "duration":
         ends = [-math.inf if m.log10 is None else m.log10 - (m.band or 0.0) for m in (old, new)]
         return ends[1] < ends[0]
-    before, after = (max(_size(m), floor) for m, floor in zip((old, new), least, strict=True))
+    before, after = (
+        max(floor if m.log10 is None else m.log10, floor) for m, floor in zip((old, new), least, strict=True)
+    )
     spared = min(loss, max(0.0, before - after))
     return after + (new.band or 0.0) > before + (old.band or 0.0) + spared
 
@@ -399,10 +402,6 @@ def noisier(kind: ReportedKind, old: Metric, new: Metric, lost: bool = False) ->
         return new.band > factor * max(old.band, _LEAST_LOST if lost else _LEAST)
     # in decades such noise is as much wider as the number is smaller
     return _added(new) > _added(old) + math.log10(factor)
-
-
-def _size(metric: Metric) -> float:
-    return -math.inf if metric.log10 is None else metric.log10
 
 
 def _added(metric: Metric) -> float:

@@ -461,7 +461,7 @@ class RowComparison:
             if limits.ignore or match == series:
                 continue
             if match is None:
-                before = f"{len(series.values)} samples"
+                before = f"{len(series.values)} samples kept"
                 yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
                 continue
             exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
@@ -472,7 +472,7 @@ class RowComparison:
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
-                counts = [f"{len(samples.values)} samples" for samples in (series, match)]
+                counts = [f"{len(samples.values)} samples kept" for samples in (series, match)]
                 yield Finding(key, name, judged[0], counts[0], counts[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:

@@ -233,7 +233,7 @@ class Value:
         if self.metric is None:
             return "-"
         band = self.metric.band if self.noise else None
-        return short(self.metric.value, self.digits) + (f" ± {band:.2f}" if band else "")
+        return short(self.metric.value, self.digits) + (f" ± {band:.2f}" if band and band >= 0.005 else "")
 
 
 @dataclass(frozen=True, slots=True)

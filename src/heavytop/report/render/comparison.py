@@ -12,7 +12,7 @@ from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import line
 from heavytop.report.compare.rows import Finding
 from heavytop.report.compare.verdicts import Verdict
-from heavytop.report.document.document import row_name, short
+from heavytop.report.document.document import clip, row_name, short
 from heavytop.report.document.motions import WorseMotions
 from heavytop.report.render.text import table, wrapped
 
@@ -34,7 +34,7 @@ def comparison(result: Differences, full: bool = False) -> RenderableType:
         parts += _motions(motions)
     if result.environment:
         parts += [Text(), Text("Inputs or environments differ:", style="bold")]
-        changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
+        changes = (printable(f"{name}: {clip(old, 24)} -> {clip(new, 24)}") for name, old, new in result.environment)
         parts += [Text(line) for change in changes for line in wrapped(change, "    ", "  ")]
     return Group(*parts)
 
@@ -50,7 +50,7 @@ def _rows(result: Differences) -> Iterator[RenderableType]:
             yield shown
     if len(result.rows) > _MOST:
         yield Text(f"and {len(result.rows) - _MOST} more: --json lists all, --html FILE draws them")
-    yield Text("Every metric: --full", style="dim")
+    yield Text("Every metric that changed: --full", style="dim")
 
 
 def _motions(motions: WorseMotions) -> Iterator[RenderableType]:

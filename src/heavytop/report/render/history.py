@@ -185,7 +185,10 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
         section = Section(f"row-{number}", clip(name, 120), [])
         section.columns = ["metric", *(str(index) for index in range(1, len(ticks) + 1))]
         section.rows = [[clip(track.metric or "whole row"), *_page_cells(track)] for track in own]
-        drawable = sorted((track for track in own if len(_points(track)) > 1), key=_interest)
+        drawable = sorted(
+            (track for track in own if len(_points(track)) > 1),
+            key=lambda track: (not track.steps, track.metric.endswith(("_rms", "_final"))),
+        )
         if drawable and name in drawn:
             section.pictures.append(_picture(section, drawable[:MOST_CURVES], ticks, f"h{number}"))
         missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
@@ -193,11 +196,6 @@ def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Secti
             section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
         parts[not any(track.steps for track in own)].append(section)
     return parts
-
-
-def _interest(track: Track) -> tuple[bool, bool]:
-    """Tracks with steps first, and of a quantity the largest over the samples."""
-    return not track.steps, track.metric.endswith(("_rms", "_final"))
 
 
 def _page_cells(track: Track) -> list[str]:

@@ -250,8 +250,8 @@ def _one_line(text: str) -> str:
 def _caption(facts: dict[str, str]) -> str:
     """Caption that makes the table readable alone."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, facts[key]) for key in ("name", *_DATA, *made) if key in facts]
-    said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
+    known = [(key, _escaped(facts[key])) for key in ("name", *_DATA, *made) if key in facts]
+    said = "; ".join(f"{_escaped(_one_line(key))} " + text.replace("/", r"/\allowbreak ") for key, text in known)
     return f"{said}. heavytop {_escaped(facts['version'])}."
 
 
@@ -286,10 +286,6 @@ def _bibtex(text: str) -> str:
         else:
             parts.append(letter if letter.isascii() else r"$\cdot$" if letter == "·" else "?")
     return "".join(parts)
-
-
-def _breakable(text: str) -> str:
-    return _escaped(text).replace("/", r"/\allowbreak ")
 
 
 def _tex_number(text: str) -> str:

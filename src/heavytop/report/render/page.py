@@ -48,7 +48,7 @@ from heavytop.report.document.document import (
 )
 from heavytop.report.document.kind import Kinds, document, headlines, kind_of
 from heavytop.report.document.svg import quiet_style
-from heavytop.report.render.text import drifts, failed, unsupported
+from heavytop.report.render.text import COMPUTED, drifts, failed, unsupported
 
 MOST_ROWS = 500
 MOST_WORST = 50
@@ -335,7 +335,9 @@ def named(rows: Sequence[Row]) -> Callable[[Row], str]:
     return lambda row: row.key.case + (f",{name}" if several and (name := computed_by(row)) else "")
 
 
-def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT) -> list[Table]:
+def in_columns(
+    title: str, cell: Callable[[Row], str], rows: Sequence[Row], shown: In = In.SHORT, notes: Sequence[str] = ()
+) -> list[Table]:
     """A line a motion, a column a format, or an integrator where all are in one format; of two rows in one place the
     later.  No table without rows.
     """
@@ -354,7 +356,7 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row], show
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
     room = min(max(room, 16), 39)
     named_cells = [line for name, parts in zip(lines, cells, strict=True) for line in _in_lines(name, parts, room)]
-    return [Table(title, ["", *columns], named_cells, shown=shown)]
+    return [Table(title, ["", *columns], named_cells, notes, shown=shown)]
 
 
 def _in_lines(name: str, cells: list[str], room: int) -> list[list[str]]:
@@ -374,7 +376,8 @@ def digits_columns(rows: Sequence[Row]) -> list[Table]:
             known[column] = row
     columns = list(known.values())
     more = "; of the attitude" if any(map(_attitude_asked, columns)) else ""
-    return in_columns(f"Digits right, to |t|{more}", digits_until, columns)
+    notes = [COMPUTED] if any(row.reference.how == "computed" for row in columns) else []
+    return in_columns(f"Digits right, to |t|{more}", digits_until, columns, notes=notes)
 
 
 def attitude_columns(rows: Sequence[Row]) -> list[Table]:
@@ -405,13 +408,23 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``lost at 700`` where the format has lost all significant digits by then."""
+    """``9.2 to 1e5``; ``lost 600–700`` where all are lost between these samples; * where no reference is proven."""
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
     time = f"{10**end:.3g}" if exponent < 3 else f"{10 ** (end - exponent):.2g}e{exponent}"
-    digits = f"lost at {time}" if row.reference.until else f"{digits_text(kept)} to {time}"
+    digits = _lost(row) if row.reference.until else f"{digits_text(kept)} to {time}{_unproven(row)}"
     return digits + _digits_of_attitude(row)
+
+
+def _unproven(row: Row) -> str:
+    return "*" if row.reference.how == "computed" else ""
+
+
+def _lost(row: Row) -> str:
+    """``lost 600–700``: the last sample with significant digits that the row keeps, and the first without."""
+    errors = [series.times[-1] for series in row.series.values() if series.quantity == _ALONG and series.times]
+    return f"lost {'–'.join(short(time.removeprefix('-')) for time in (*errors[:1], row.reference.until))}"
 
 
 def _digits_of_attitude(row: Row) -> str:
@@ -440,7 +453,7 @@ def _motion(row: Row) -> list[Cell]:
         row.horizon,
         str(row.steps),
         row.outcome,
-        f"lost at {row.reference.until}" if row.reference.until else digits,
+        _lost(row) if row.reference.until else digits + _unproven(row),
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),
         "  ".join(f"{integral_text(name)} {Value(metric, 2, noise=True)}" for name, metric in drifts(row)),
     ]

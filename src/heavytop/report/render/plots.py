@@ -356,13 +356,9 @@ def _legend(picture: Picture, keys: Sequence[Key]) -> None:
 
     if not keys:
         return
-    handles = [
-        Line2D([], [], color=COLOURS[key.colour], marker=key.marker, ms=5, ls=_dash(key), label=key.label)
-        for key in keys
-    ]
+    handles = []
+    for key in keys:
+        line = "--" if key.dash else "-" if key.line else ""
+        handles += [Line2D([], [], color=COLOURS[key.colour], marker=key.marker, ms=5, ls=line, label=key.label)]
     legend = {"loc": "upper left", "bbox_to_anchor": (0, 0), "borderaxespad": 0}
     picture.axes.figure.legend(handles=handles, ncols=2, fontsize=8.5, frameon=False, **legend)
-
-
-def _dash(key: Key) -> str:
-    return "--" if key.dash else "-" if key.line else ""

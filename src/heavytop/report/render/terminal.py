@@ -64,7 +64,7 @@ class _Sentence:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         word = "" if self._word is None else self._word.text
-        whole = printable(f"{word} {self._text}".lstrip())
+        whole = printable(f"{word}: {self._text}" if word else self._text)
         lines = wrapped(whole, self._indent + "  ", self._indent, options.max_width)
         for number, line in enumerate(lines):
             said = Text(line, style=_STYLES.get(self._style, ""))
@@ -137,12 +137,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     lines = [head, *(line for failure in failures for line in wrapped(f"  {failure}", "    ")[:_MOST_OF_ONE])]
     if answers and not bad:  # what was measured and how good it is comes first, unless something failed
         parts.insert(1, [lines.pop()])
-    return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
-
-
-def _cut(line: str) -> str:
-    """A number that is cut says so."""
-    return line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…"
+    shown = map(printable, [*lines, *fitted(parts, LINES - len(lines))])
+    return "\n".join(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…" for line in shown)
 
 
 def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:

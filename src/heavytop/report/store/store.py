@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import replace as replace_struct
 
 from heavytop import records
-from heavytop.errors import InputError
+from heavytop.errors import InputError, why
 from heavytop.extras import import_heyoka
 from heavytop.files import read_whole, replace, without_repeats
 from heavytop.precision import available
@@ -152,8 +152,9 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         if file.suffix == ".gz":
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
-        cause = (error.strerror if isinstance(error, OSError) else "") or error
-        raise InputError(f"{str(file)[:_NAME]} holds no report: {cause}.", REMEDY) from None
+        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", REMEDY) from None
+    if not content.lstrip().startswith(b"{"):
+        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", REMEDY)
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

@@ -38,7 +38,7 @@ from heavytop.precision import shown
 # denominator is removable where the values are continuous across it, and two halves of the time axis join.
 
 
-_EVERYWHERE = "proven all over the domain"
+_EVERYWHERE = "proven on the whole domain"
 KEPT = "kept by the flow: where it is so at first, it stays so"
 # rational, with |γ| = 1, on no surface of low degree with small coefficients
 _SOME_STATE = {
@@ -403,7 +403,7 @@ class Region:
         )
 
 
-_CONTINUOUS = "the formulas are real and continuous all over the domain"
+_CONTINUOUS = "the formulas are real and continuous on the whole domain"
 _ATTITUDE = "the attitude of the angles is continuous inside the domain"
 _SAMPLE = "every formula is defined and real at a sample in the domain"
 _DIVISORS = "the algebra divides by nothing that is 0"

@@ -53,7 +53,10 @@ def read_claim(path: Path) -> Auditable | ValueClaim:
         with path.open("rb") as stream:
             raw = stream.read(_MAX_BYTES + 1)
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.", "Give the path of a claim in TOML.") from None
+        raise InputError(
+            f"{path} cannot be read: {error.strerror}.",
+            "Give a TOML file that is there, or an id that `heavytop claims` lists.",
+        ) from None
     if len(raw) > _MAX_BYTES:
         raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
     try:

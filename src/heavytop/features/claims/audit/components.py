@@ -294,7 +294,11 @@ def _through(
     """
     if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
         return None
-    near = set().union(*(e.free_symbols for e in (q, *parts))).union(*(z.free_symbols for z in zeros if _alone(z)))
+    near = (
+        set()
+        .union(*(e.free_symbols for e in (q, *parts)))
+        .union(*(z.free_symbols for z in zeros if len(z.free_symbols & frozenset(STATE)) == 1))
+    )
     zeros = [z for z in zeros if z.free_symbols & frozenset(STATE)]
     close = [z for z in zeros if z.free_symbols & frozenset(STATE) <= near]
     for chosen in (close, zeros) if len(close) < len(zeros) else (zeros,):
@@ -302,11 +306,6 @@ def _through(
         if audits is not None:
             return audits
     return None
-
-
-def _alone(zero: sympy.Expr) -> bool:
-    """Whether it holds one component of the state."""
-    return len(zero.free_symbols & frozenset(STATE)) == 1
 
 
 def _found(

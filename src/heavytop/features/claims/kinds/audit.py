@@ -119,7 +119,7 @@ class AuditKind(Kind):
             yield Card("Equation by equation (heavytop audit)", lines, shown=In.FULL | In.PAGE)
 
 
-_CLAIM = "Ershkov's published solution of the heavy top, in which γ stays parallel to M, "
+_CLAIM = "Ershkov's motion of the heavy top (γ ∥ M)"
 _COLUMNS = ("claim", "of", "verdict", "equations proven", "refuted", "source")
 
 
@@ -129,11 +129,11 @@ def _of_paper(rows: Sequence[Row]) -> Headline:
     others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
     solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
     if "refuted" in verdicts:
-        said = _CLAIM + ("is not a motion of it" if verdicts == {"refuted"} else "is not a motion of it in every case")
-        return Headline(said + (f": it solves {solved} instead." if others else "."), Word("refuted"), _EVERYWHERE)
+        some = "" if verdicts == {"refuted"} else ", in some cases"
+        return Headline(_CLAIM + some + (f"; it is one of {solved}." if others else "."), Word("refuted"), _EVERYWHERE)
     if verdicts == {"holds"}:
-        return Headline(_CLAIM + "solves every equation.", Word("holds"), _EVERYWHERE)
-    return Headline(_CLAIM + "is not refuted, but not every equation is proven.", Word("undecided"), _EVERYWHERE)
+        return Headline(_CLAIM + ": every equation is proven.", Word("holds"), _EVERYWHERE)
+    return Headline(_CLAIM + ": not refuted, but not every equation is proven.", Word("undecided"), _EVERYWHERE)
 
 
 _EVERYWHERE = In.SHORT | In.FULL | In.PAGE

@@ -133,7 +133,7 @@ class ClaimEvaluation(Kind):
             yield Headline(f"In {next(iter(forms.values()))[0].precision} {said}.")
         yield Cells(
             "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
-            ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"],
+            ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω NaN/inf from |t|"],
             both((row, _cells(row)) for row in rows),
             [f"Errors are the {largest_over(rows)}."],
         )

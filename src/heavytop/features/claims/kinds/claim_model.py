@@ -57,6 +57,8 @@ from heavytop.report.render.text import both
 from heavytop.top.attitude import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP
 
+BRANCHES = "smooth: roots continued through t = 0; printed: all roots positive; -2, -6: I1/I3."
+
 # What the kinds about the formulas of a claim share.
 
 
@@ -280,15 +282,15 @@ class ClaimModel(Kind):
         forward = [row for row in parted if row.key.direction != "backward"]
         yield from _parting_times(forward)
         times = [time for time in _SHOWN if any(_at(row, "omega", time) for row in rows)]
-        heads = (*(f"Ω at |t|={t}" for t in times), *(f"γ at |t|={t}" for t in times[:2]))
+        heads = (*(f"ΔΩ at |t|={t}" for t in times), *(f"Δγ at |t|={t}" for t in times[:2]))
         yield Cells(
             "Claim compared with the true motion: (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0",
             ["case", "branch", *heads, "Ω off 1 % of α at |t|"],
             both((row, _cells(row, times)) for row in rows),
             [
-                "Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers.",
-                "Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α = Ω3(0) I3/I1, proven, "
-                "not a sample.",
+                "ΔΩ, Δγ: largest component of claim minus truth, exactly evaluated: no rounding is in these numbers.",
+                "Off 1 %: the first |t| at which |ΔΩ| is 1 % of α = Ω3(0) I3/I1, proven by bisection.",
+                BRANCHES,
             ],
         )
         truths = {row.key.case: row.against for row in rows}
@@ -320,8 +322,9 @@ def _parting_times(rows: Sequence[Row]) -> Iterator[Cells]:
         by_branch.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
     branches = list(dict.fromkeys(branch for times in by_branch.values() for branch in times))
     cells = [[case, *(times.get(branch, "-") for branch in branches)] for case, times in by_branch.items()]
+    heads = [{"printed": "as printed"}.get(branch, f"{branch} branch") for branch in branches]
     if cells:
-        yield Cells("Ω off by 1 % of α = Ω3(0) I3/I1 at |t|", ["", *branches], cells, shown=In.SHORT)
+        yield Cells("Ω off by 1 % of α = Ω3(0) I3/I1 at |t|", ["", *heads], cells, shown=In.SHORT)
 
 
 def _cells(row: Row, times: Sequence[str]) -> list[Cell]:

@@ -254,11 +254,8 @@ def is_more_than_states(header: Header) -> bool:
     """Whether there are other columns than Ω and γ, or one of these vectors alone."""
     names = set(header.places)
     quantities = {"omega" if name == "framed" else name for name in names}
-    return bool(quantities - {"omega", "gamma"}) or (len(quantities) == 1 and _complete(header))
-
-
-def _complete(header: Header) -> bool:
-    return all(len(components) == 3 for components in header.places.values())
+    complete = all(len(components) == 3 for components in header.places.values())
+    return bool(quantities - {"omega", "gamma"}) or (len(quantities) == 1 and complete)
 
 
 def ordered_places(
@@ -412,11 +409,12 @@ def listed(value: Any, what: str, count: int | None = None) -> list[Any]:
     """A list of so many members; raises InputError for anything else."""
     if not isinstance(value, list) or (count is not None and len(value) != count):
         has = (
-            f"has {len(value)} numbers: {quoted(' '.join(map(str, value)))}"
+            f"has {len(value)} numbers: {quoted(', '.join(map(str, value)))}"
             if isinstance(value, list)
             else "is not a list"
         )
-        raise InputError(f"{what} {has}.", f"Give {count} numbers, such as 2.5 (not 2,5)." if count else "Give a list.")
+        commas = " Write 2.5, not 2,5." if isinstance(value, list) and len(value) == 2 * (count or -1) else ""
+        raise InputError(f"{what} {has}.", f"Give {count} numbers.{commas}" if count else "Give a list.")
     return value
 
 
@@ -661,6 +659,4 @@ def times(document: Mapping[str, Any]) -> list[Fraction]:
         if value is None:
             raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
         instants.append(value if unit is None else unit.size * value)
-    if not instants:
-        raise InputError("The table has no row below its header.", "Give a row for each time.")
     return instants

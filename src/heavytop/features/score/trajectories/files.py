@@ -16,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, quoted, why
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -50,9 +50,10 @@ LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_m
 _COMMENT = ("#", "%", "!", "//")
 _REMARK = re.compile(r"((?<!1\.)#|#(?!inf|ind|qnan|snan)).*", re.IGNORECASE)
 """Remarks behind the numbers of a line: 1.#INF and 1.#QNAN are how an older C library writes infinity and NaN."""
+_STARTS = ("gamma", "start_quaternion", "start_matrix", "start_euler")
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
-_ALL_COLUMNS = "Give every row all of its columns."
+_ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
 
@@ -71,11 +72,11 @@ def unknown(key: str, known: Sequence[str]) -> InputError:
 class TextTable:
     """A text table: the keys of its comments, its rows in the order t Ω1 Ω2 Ω3 γ1 γ2 γ3, and what was noticed.
 
-    known: the keys that a comment may have.  Raises InputError for a header or a row that cannot be understood, for a
-    misspelt key and a key that stands twice.
+    known: the keys that a comment may have.  started: the attitude at t = 0 is known without them.
+    Raises InputError for a header or a row that cannot be understood, for a misspelt key and one that stands twice.
     """
 
-    def __init__(self, text: str, known: Sequence[str]) -> None:
+    def __init__(self, text: str, known: Sequence[str], started: bool = False) -> None:
         self.keys: dict[str, str | list[str]] = {}
         self.rows: list[list[str]] = []
         self.notes: list[str] = []
@@ -102,8 +103,12 @@ class TextTable:
         if not _is_number(first[0]):
             header, body, self.lines = first, body[1:], self.lines[1:]
         names = self._without_header(first) if header is None else header
+        if not body:
+            raise InputError("The table has no row below its header.", "Give a row for each time.")
         self.cells = _split(body, self.lines, separator, len(names))
-        names, self.cells, notes = logs.with_one_time(names, self.cells)
+        names, self.cells, notes = logs.with_one_time(
+            names, self.cells, started or not self.keys.keys().isdisjoint(_STARTS)
+        )
         self.notes += notes
         if self.keys.get("attitude") == "rotation vector":
             names = [re.sub(r"^r_?([xyz])$", r"rotvec\1", name.strip()) for name in names]
@@ -245,7 +250,7 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
         rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
         said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
     for what, new, old in said:
-        if new != old and (isinstance(new, str) or not _rounded_alike(new, old)):
+        if new != old and (isinstance(new, str) or abs(new - old) > max(abs(old), Fraction(1)) / 1000):  # three digits
             texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
             raise InputError(
                 f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
@@ -255,11 +260,6 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
 
 def _briefly(value: Fraction) -> str:
     return str(value) if value.denominator < 1000 else decimal_text(value, 6)
-
-
-def _rounded_alike(new: Fraction, old: Fraction) -> bool:
-    """Whether a number is the other one, rounded to three digits or more."""
-    return abs(new - old) <= max(abs(old), Fraction(1)) * Fraction(1, 1000)
 
 
 _FLAGS = ("language", "tolerance", "step")
@@ -315,10 +315,10 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
         if logs.is_ephemeris(text):
             text = logs.of_ephemeris(text)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", REMEDY) from None
+        raise InputError(f"The trajectory {shown_path} cannot be read: {why(error)}.", REMEDY) from None
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
-        document, notes = (_json(text), []) if is_json else _table(text)
+        document, notes = (_json(text), []) if is_json else _table(text, case is not None)
         name = "given" if piped else path.stem
         reader = _observed if observed_columns.is_observed(document) else _given
         trajectory = reader(document, name, case, normalize)
@@ -357,18 +357,19 @@ def _json(text: str) -> dict[str, Any]:
     return document
 
 
-def _table(text: str) -> tuple[dict[str, Any], list[str]]:
+def _table(text: str, started: bool) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
         raise InputError("A table must be text; this holds a byte 0.", REMEDY)
     if text.count("\n") > 2 * MOST_STATES:
         raise too_many(text.count("\n"))
-    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}))
+    table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}), started)
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
         return table.keys | more, table.notes
     columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
+    columns["numbers"] = [f"line {number}" for number in table.lines]
     return table.keys | columns, table.notes
 
 
@@ -390,7 +391,7 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
     if normalize:
         start = start.normalized()
-    start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
+    start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
     about = _about(document, stem, case, None in states)
@@ -427,7 +428,9 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
     if "lines" in document:
         texts = observed_columns.times(document)
     else:
-        texts = [written_numbers.finite(value, "a time") for value in _list(document, "times")]
+        written = _list(document, "times")
+        where = document.get("numbers") or [f"row {number}" for number in range(1, len(written) + 1)]
+        texts = [written_numbers.finite(time, f"the time in {row}") for time, row in zip(written, where, strict=True)]
     times = list(check_times(texts))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
@@ -476,6 +479,8 @@ def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not value:
             raise InputError(f"The key {key} is missing.", "Give mass and gravity; either may be 0.")
+    if not written_numbers.finite(gravity, "gravity"):
+        document = {"centre": ["0", "0", "0"], **document}
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [entry for row in inertia for entry in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")

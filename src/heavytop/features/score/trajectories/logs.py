@@ -110,12 +110,18 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
             )
 
 
+_TEN_DAYS = 864_000
 _LONG = 500
 """Integers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
 
 
-def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]], list[str]]:
-    """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row."""
+def with_one_time(
+    names: Sequence[str], cells: list[list[str]], started: bool
+) -> tuple[list[str], list[list[str]], list[str]]:
+    """Names, cells and a note: stamps of seconds and nanoseconds are one column t; epochs begin at their first row.
+
+    started: the attitude at t = 0 is given, from which stamps of less than ten days are counted.
+    """
     names = list(names)
     parts = {
         match[1].lower()[0]: index for index, name in enumerate(names) if (match := _STAMP.fullmatch(name.strip()))
@@ -124,7 +130,9 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         seconds, nano = parts["s"], parts["n"]
         for row in cells:
             row[seconds] = f"{row[seconds]}.{row[nano].strip():0>9}"
-        names[seconds], names[nano] = "timestamp", "nanosec"
+            del row[nano]
+        names[seconds] = "timestamp"
+        del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0] for name in plain]
     index = next((words.index(word) for word in _EPOCHS if word in words), None)
@@ -132,7 +140,7 @@ def with_one_time(names: Sequence[str], cells: list[list[str]]) -> tuple[list[st
         return names, cells, []
     names[index] = re.sub(r"^\w+", "t", plain[index])
     first = number(cells[0][index])
-    if not first:
+    if not first or (started and names[index] == "t" and abs(first) < _TEN_DAYS):
         return names, cells, []
     if names[index] == "t":
         names[index] += next((f" [{unit}]" for least, unit in _EPOCH_UNITS if first >= least), "")
@@ -171,7 +179,7 @@ def without_repeats(
             if not all(map(_agree, rows[index], rows[kept[-1]])):
                 raise InputError(
                     f"Lines {lines[kept[-1]]} and {lines[index]} are of one time and differ.",
-                    "Give one row for each time: before an event, or behind it.",
+                    "Keep one of them; at an impact, the state before it or the one after.",
                 )
             repeated += 1
             kept[-1] = max(kept[-1], index, key=lambda row: sum(map(len, rows[row])))  # more digits
@@ -286,8 +294,8 @@ def of_ephemeris(text: str) -> str:
         lines.append("# quaternion: space_to_body")
     data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
     rows = [line.split() for line in data if line.strip() and not line.strip().startswith("COMMENT")]
-    start = _epoch(rows[0][0]) if rows else Fraction(0)
-    lines.append(",".join(["t", *order]))
+    start = _epoch(meta.get("START_TIME") or rows[0][0]) if rows else Fraction(0)
+    lines.append(",".join(["timestamp", *order]))
     lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
     return "\n".join(lines)
 
@@ -313,6 +321,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
     columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
     lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
     count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
+    last = str(columns.get("quaternion_order", "")) == "xyzw"
     names: list[str] = []
     parts: list[Any] = []
     comments = []
@@ -321,7 +330,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
         elif array.ndim <= 3 and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
-            names += _names_of(name, parts[-1].shape[1])
+            names += _names_of(name, parts[-1].shape[1], last)
     if not parts or len({len(part) for part in parts}) != 1:
         counts = ", ".join(str(len(part)) for part in parts) or "none"
         raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
@@ -381,9 +390,11 @@ _ARRAYS = {
 """Names of arrays, in lower case, for those of :data:`_WIDE`."""
 
 
-def _names_of(name: str, width: int) -> list[str]:
+def _names_of(name: str, width: int, scalar_last: bool) -> list[str]:
     """The names of the columns of one array."""
     base = _ARRAYS.get(name.lower(), name)
+    if base == "quaternion" and width == 4 and scalar_last:
+        return ["qx", "qy", "qz", "qw"]
     if len(_WIDE.get(base, ())) == width:
         return list(_WIDE[base])
     if width == 1:

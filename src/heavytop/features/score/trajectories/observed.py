@@ -182,7 +182,7 @@ def _list(values: Sequence[Fraction]) -> str:
 def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
     state = State(raw.omega, raw.values)
     if not normalize:
-        state.require_unit_gamma(slack, "Give it in full, or use --normalize.")
+        state.require_unit_gamma(slack, "Write all its digits, or use --normalize.")
     gamma = state.normalized(_SPARE_BITS + 64).gamma
     xi = perpendicular(gamma)
     a, b, c = cross(gamma, xi)
@@ -242,7 +242,7 @@ def require_matrix(rows: Sequence[Sequence[Fraction]], slack: Fraction, what: st
     if abs(off) > 2 * slack:
         raise InputError(
             f"{what} is not orthogonal: R R^T is off the unit matrix by {decimal_text(off, 6)}.",
-            "Give it in full, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
+            "Write all its digits, or use --normalize (normalize=True in Python), which takes the rotation next to it.",
         )
 
 
@@ -487,7 +487,7 @@ def observed(
     normalize: take quaternions and matrices of any length for their rotations, at the start and in the rows.
     Raises InputError for quaternions and matrices that are none, with their place.
     """
-    rounded = {name: [_rounded(row, precision) for row in rows] for name, rows in values.items()}
+    rounded = {name: [row and rounded_state(list(row), precision) for row in rows] for name, rows in values.items()}
     for form in ("quaternion", "matrix"):
         if form in rounded:
             require_rows(form, rounded[form], places, normalize)
@@ -518,10 +518,6 @@ def unit(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     square, scale = sum(value * value for value in scaled), 1 << 128
     length = Fraction(isqrt(int(square * scale * scale)), scale)
     return tuple(Fraction(round(value / length * scale), scale) for value in scaled)
-
-
-def _rounded(row: tuple[Fraction, ...] | None, precision: Precision) -> tuple[Fraction, ...] | None:
-    return None if row is None else rounded_state(list(row), precision)
 
 
 def _joined(parts: Sequence[tuple[Fraction, ...] | None]) -> tuple[Fraction, ...] | None:
