@@ -369,6 +369,24 @@ class Turned:
         return rotation
 
 
+def starting_at(xi: Vector, gamma: Vector, whole: Attitude) -> Attitude:
+    """Ω, γ, ξ with ξ(0) = ``xi`` out of those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
+
+    Turned about γ by the constant angle between the two, whose cosine and sine are rational.
+    """
+    began = perpendicular(gamma)
+    if xi == began:
+        return whole
+    cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
+
+    def turned(working: int, time: Fraction) -> list[arb]:
+        values = whole(time, working)
+        across = cross(values[3:6], values[6:])
+        return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(values[6:], across, strict=True))]
+
+    return lambda time, bits: to_bits(lambda working: turned(working, time), bits)
+
+
 # Renaming of the principal axes, once for all cases.
 #
 # With Q a permutation of the axes and d = det Q = ±1, Q (u × v) = d Qu × Qv.  So if (Ω, γ) solves the equations of

@@ -39,6 +39,7 @@ from heavytop.precision import (
     exact,
     log10,
     parse,
+    physical,
 )
 from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
@@ -455,7 +456,7 @@ def _require_possible(command: Command) -> None:
 
 def seconds_of(value: Any, what: str) -> float:
     """A time limit in seconds; raises InputError unless it is above 0."""
-    seconds: Fraction = exact(value)
+    seconds = physical(value, what)
     if not 0 < seconds <= _MOST_SECONDS:
         raise InputError(f"{what} = {quoted(value)} is not a time limit.", f"Give seconds, up to {_MOST_SECONDS}.")
     return float(seconds)

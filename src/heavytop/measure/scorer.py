@@ -273,7 +273,7 @@ class SolutionError(Statistics):
         with working_precision(self.bits):
             return self.errors(to_balls(state[:6]), truth)
 
-    def known(self, time: Fraction) -> list[arb] | None:
+    def known(self, time: Fraction) -> Sequence[arb] | None:
         """The true state; None where absent."""
         return self.truth.state(time, self.bits) if self.truth.covers(time) else None
 

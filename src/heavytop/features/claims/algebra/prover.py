@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import sympy
-from flint import arb, fmpq_mpoly
+from flint import fmpq_mpoly
 
-from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.arcs import Arcs
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
@@ -27,7 +26,7 @@ from heavytop.features.claims.algebra.conditions import (
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
 from heavytop.features.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
@@ -220,15 +219,8 @@ class Region:
             balls = {index: evaluate(meaning, point, NUMBER_BITS) for index, meaning in meanings.items()}
         except (KeyError, Unprovable):
             return False
-        with working_precision(NUMBER_BITS):
-            total = arb(0)
-            for monomial, coefficient in p.to_dict().items():
-                term = arb(coefficient)
-                for index in balls:
-                    for _ in range(int(monomial[index])):
-                        term *= balls[index]
-                total += term
-            return bool(total.is_finite() and not total.contains(0))
+        value = value_of(p, balls)
+        return bool(value.is_finite() and not value.contains(0))
 
     # --- conditions -------------------------------------------------------------------------------------------------
 
