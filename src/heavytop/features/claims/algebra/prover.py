@@ -402,7 +402,6 @@ _DIVISORS = "the algebra divides by nothing that is 0"
 _ALGEBRA = "the algebra can carry the formulas"
 _REMOVABLE = "removable: the formulas are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
-Key = tuple[int | bool | str, ...]
 
 
 class Prover:
@@ -411,7 +410,7 @@ class Prover:
     def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
         self._statements = statements
         self._setting = setting
-        self._fields: dict[Key, Field | None] = {}
+        self._fields: dict[tuple[object, ...], Field | None] = {}
         self._regions: dict[int, Region] = {}
         self._conditions: dict[object, tuple[Condition, ...]] = {}
         self._places: dict[tuple[str, str], list[Place]] = {}
@@ -421,7 +420,7 @@ class Prover:
 
     def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
         """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
-        key: Key = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
+        key: tuple[object, ...] = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
         if key not in self._fields:
             alike = [
                 other
@@ -431,10 +430,9 @@ class Prover:
             parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
             self._fields[key] = self._make(alike, sign, strict, parts)
         if self._fields[key] is None:
-            alone: Key = (*key, as_text(statement.residual))
-            if alone not in self._fields:
-                self._fields[alone] = self._make([statement], sign, strict, [])
-            return self._fields[alone]
+            key = (*key, statement.residual)
+            if key not in self._fields:
+                self._fields[key] = self._make([statement], sign, strict, [])
         return self._fields[key]
 
     def _make(
