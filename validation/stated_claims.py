@@ -87,6 +87,47 @@ def _wp3(u: mpf, g2: mpf, g3: mpf) -> mpf:
     return e3 + (e2 - e3) * mpmath.ellipfun("sn", mpmath.sqrt(e1 - e3) * u, m=(e2 - e3) / (e1 - e3)).real ** 2
 
 
+def _of_lattice(index: int, u: mpf, g2: mpf, g3: mpf) -> tuple[mpf, mpf, mpf, mpf]:
+    """η1/ω1, θ'/θ by u, θ and π/(2ω1) of theta 1, or of theta 4 for the argument u + ω3."""
+    e1, e2, e3 = _roots(g2, g3)
+    m = (e2 - e3) / (e1 - e3)
+    half, q = mpmath.ellipk(m) / mpmath.sqrt(e1 - e3), mpmath.qfrom(m=m)
+    scale = mpmath.pi / (2 * half)
+    theta, slope = (mpmath.jtheta(index, scale * u, q, order).real for order in (0, 1))
+    mean = -(scale**2) * (mpmath.jtheta(1, 0, q, 3) / mpmath.jtheta(1, 0, q, 1)).real / 3
+    if theta == 0:
+        raise Undefined
+    return mean, scale * slope / theta, theta, scale
+
+
+def _wzeta(index: int) -> Callable[[mpf, mpf, mpf], mpf]:
+    def value(u: mpf, g2: mpf, g3: mpf) -> mpf:
+        mean, slope, _, _ = _of_lattice(index, u, g2, g3)
+        return mean * u + slope
+
+    return value
+
+
+def _wsigma(u: mpf, g2: mpf, g3: mpf) -> mpf:
+    if u == 0:
+        return u
+    mean, _, theta, scale = _of_lattice(1, u, g2, g3)
+    q = mpmath.exp(-mpmath.pi * _ratio(g2, g3))
+    return mpmath.exp(mean * u**2 / 2) * theta / (scale * mpmath.jtheta(1, 0, q, 1).real)
+
+
+def _wsigma3(u: mpf, g2: mpf, g3: mpf) -> mpf:
+    mean, _, theta, _ = _of_lattice(4, u, g2, g3)
+    return mpmath.exp(mean * u**2 / 2) * theta / mpmath.jtheta(4, 0, mpmath.exp(-mpmath.pi * _ratio(g2, g3))).real
+
+
+def _ratio(g2: mpf, g3: mpf) -> mpf:
+    """K'/K."""
+    e1, e2, e3 = _roots(g2, g3)
+    m = (e2 - e3) / (e1 - e3)
+    return mpmath.ellipk(1 - m) / mpmath.ellipk(m)
+
+
 def _shifted(s: mpf, m: mpf) -> tuple[Any, mpf, mpf]:
     """i a with sn(i a) = i s, K, and the nome."""
     return 1j * mpmath.ellipf(mpmath.atan(s), 1 - m), mpmath.ellipk(m), mpmath.qfrom(m=m)
@@ -117,6 +158,10 @@ _FUNCTIONS |= {
     "nome": lambda m: mpmath.qfrom(m=m),
     "wp": _wp,
     "wp3": _wp3,
+    "wzeta": _wzeta(1),
+    "wzeta3": _wzeta(4),
+    "wsigma": _wsigma,
+    "wsigma3": _wsigma3,
     "thetaArgument": _theta_argument,
     "thetaRate": _theta_rate,
 }
@@ -637,6 +682,74 @@ def _rows_of_quaternion(sign: str = "-") -> list[list[str]]:
     ]
 
 
+def weierstrass_clock(clock: str, other: str, slope: str) -> Callable[[], Family]:
+    """The regular precession of a free body by t = F of u, with ζ or σ in F."""
+    level = [f"h*{turn}((C - A)*s/A*({clock}))" for turn in ("cos", "sin")]
+
+    def family() -> Family:
+        table = _top(
+            ("A", "A", "C"),
+            "0",
+            ("0", "0", "0"),
+            kind="motion",
+            assume=["A > 0", "C > 0", "h > 0", "s > 0", "e > 0", "e < 1"],
+            parameters={"A": ["1", "2"], "C": ["3/2", "1"], "h": ["1", "3/4"], "s": ["1/2", "1"], "e": ["1/2", "1/4"]},
+            definitions={
+                # e1 = 1 + e, e2 = -e, e3 = -1
+                "g2": "4*(1 + e + e^2)",
+                "g3": "4*e*(1 + e)",
+                "G": "sqrt(A^2*h^2 + C^2*s^2)",
+            },
+            motion={"omega": [*level, "s"], "gamma": [f"A/G*{level[0]}", f"A/G*{level[1]}", "C*s/G"]},
+            quadrature={"variable": "u", "time": clock, "where": ["0 < u < 1", slope], "points": ["1/2"]},
+        )
+        return Family(
+            table,
+            [
+                ("quadrature.time", "", f"0*u + {clock}"),
+                ("quadrature", "", {**table["quadrature"], "time": f"{clock} + 2*s"}),
+                ("definitions.g2", "", "4*((1 + e)^2 - e)"),
+            ],
+            [
+                ("quadrature.time", "u, g2, g3", "u, g2, g3/2"),
+                ("quadrature.time", "u, g2, g3", "2*u, g2, g3"),
+                ("quadrature.time", clock, other),
+                ("motion.omega.0", "(C - A)", "(A - C)"),
+                ("motion.omega.1", "u, g2", "-u, g2"),
+                ("motion.omega.2", "s", "2*s"),
+                ("motion.gamma.2", "C*s", "A*s"),
+                ("motion.gamma.0", "g2, g3", "g2, -g3"),
+            ],
+            lambda rng: {n: mpf(rng.uniform(0.1, 0.9) if n == "e" else rng.uniform(0.5, 2)) for n in "AChse"},
+        )
+
+    return family
+
+
+def swinging_sigma() -> Family:
+    """The swinging pendulum, with a component that is 0 as σ and ζ are odd, σ of u + ω3 is even."""
+    family = swinging()
+    family.table["definitions"] |= {"g2": "3 + k", "g3": "k/2", "x": "p*t"}
+    odd, even = "wsigma(x, g2, g3) + wsigma(-x, g2, g3)", "log(wsigma3(x, g2, g3)/wsigma3(-x, g2, g3))"
+    third = "wzeta3(x, g2, g3) + wzeta3(-x, g2, g3)"
+    forms = (odd, even, third, f"({odd})*{third}", f"wsigma(x, g2, g3)*({third})")
+    wrong = (
+        odd.replace("+", "-"),
+        odd.replace("wsigma(-x, g2, g3)", "wsigma(-x, g3, g2)"),
+        odd.replace("wsigma(-x", "wsigma3(-x"),
+        even.replace("/", "*"),
+        even.replace("log(", "wsigma(x, g2, g3)*("),
+        third.replace("+", "-"),
+        third.replace("wzeta3(-x", "wzeta3(-2*x"),
+    )
+    return Family(
+        family.table,
+        [("motion.gamma.0", "", form) for form in forms],
+        [*(("motion.gamma.0", "", form) for form in wrong), *family.wrong[:3]],
+        family.draw,
+    )
+
+
 FAMILIES: dict[str, Callable[[], Family]] = {
     "lagrange sn": lagrange_sn,
     "lagrange angles": lagrange_angles,
@@ -652,6 +765,9 @@ FAMILIES: dict[str, Callable[[], Family]] = {
     "pendulum clock": pendulum_clock,
     "bounded": bounded,
     "quaternion": free_quaternion,
+    "zeta 3": weierstrass_clock("2*u - wzeta3(u, g2, g3)", "2*u + wzeta3(u, g2, g3)", "wp3(u, g2, g3) > -2"),
+    "sigma 3": weierstrass_clock("log(wsigma3(u, g2, g3))", "log(wsigma(u, g2, g3))", "wzeta3(u, g2, g3) > 0"),
+    "sigma": swinging_sigma,
 }
 
 

@@ -113,9 +113,7 @@ def precision(value: Precision | str) -> Precision:
 
 def any_times(values: Numbers) -> list[Fraction]:
     """Exact times in any order, at least one."""
-    instants = [
-        physical(exact(value), "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")
-    ]
+    instants = [physical(value, "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")]
     if not instants:
         raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
     return instants
@@ -166,7 +164,7 @@ def limit(value: Number | None, what: str) -> str | None:
     """A number of a policy as text, or None."""
     if value is None:
         return None
-    number = physical(exact(value), what)
+    number = physical(value, what)
     return shown(number) if number == 0 or abs(number) > Fraction(1, 10**150) else "0"
 
 
@@ -227,7 +225,7 @@ MOST_STATES = 100_000
 
 def required(digits: Any) -> Fraction:
     """How many digits are asked for, exactly; raises InputError for what is not a number, or is not positive."""
-    asked = physical(exact(digits), "require")
+    asked = physical(digits, "require")
     if asked <= 0:
         raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
     return asked

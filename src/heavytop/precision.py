@@ -132,11 +132,12 @@ def require(precision: Precision) -> Precision:
 
 def usable_tolerance(value: Given, precision: Precision) -> Fraction:
     """An exact tolerance; raises InputError unless it goes from the eps of the format to 1."""
-    tolerance = exact(value)
+    tolerance = physical(value, "tolerance")
     if not precision.eps <= tolerance <= 1:
         raise InputError(
-            f"The tolerance {shown(tolerance)} cannot be kept in {precision.name}.",
-            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1, or none.",
+            f"The tolerance in {precision.name} must be from its eps, {decimal_text(precision.eps, 3)}, to 1; got "
+            f"{shown(tolerance)}.",
+            "Leave it out for the accuracy of the format.",
         )
     return tolerance
 
@@ -251,8 +252,12 @@ def exact_text(value: Fraction) -> str:
     return f"{numerator}" if denominator == 1 else f"{numerator}/{denominator}"
 
 
-def physical(value: Fraction, what: str) -> Fraction:
-    """``value``; raises InputError if it is larger than 10^150."""
+def physical(number: Any, what: str) -> Fraction:
+    """The exact value; raises InputError, which names it, for what is not a number and for more than 10^150."""
+    try:
+        value = exact(number)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
     apart = value.numerator.bit_length() - value.denominator.bit_length()
     if apart >= _LARGE_POWER and abs(value) > LARGEST:
         raise InputError(f"{what} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150.")

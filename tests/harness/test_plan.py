@@ -108,7 +108,7 @@ def test_the_asymptotic_case_tends_to_its_saddle_at_its_rate() -> None:
         (f"name = 'x'\n{MEASURE.replace('double', 'float')}", "Unknown precision 'float'"),
         (f"name = 'x'\n{MEASURE.replace('10', '-10')}", "positive"),
         (f"name = 'x'\n{MEASURE.replace('10', 'nan')}", "not a finite number"),
-        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "0 samples"),
+        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "samples must be from 1"),
         (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "has to be an integer"),
         (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
         (f"name = 'x'\n{TOP}{TOP}{MEASURE}", "two tops 'mine'"),

@@ -12,13 +12,12 @@ from flint import arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.catalogue import find, state_and_attitude
+from heavytop.exact.closed_form import starting_at
 from heavytop.exact.enclosure.run import EFFORT, Validated
-from heavytop.exact.flint.balls import ball, relative_bits, to_bits, whole_evaluation, working_precision
+from heavytop.exact.flint.balls import ball, relative_bits, whole_evaluation, working_precision
 from heavytop.exact.resolved import Resolved, resolve
 from heavytop.exact.solution import ExactSolution
-from heavytop.precision import cross, dot
 from heavytop.top.amplification import amplification
-from heavytop.top.attitude import perpendicular
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -96,7 +95,8 @@ class BodyMotion:
         if known[0].uncertainty is not None:
             return self.method, self._enclosed
         method, inner = state_and_attitude(known[1], latest, bits, self.effort)
-        inner = _from_start(known, inner)
+        if known[0].xi is not None:
+            inner = starting_at(known[0].xi, known[1].start.gamma, inner)
         if not known[0].is_rotated:
             return method, inner
         return method, lambda time, bits: _turned(known, bits, lambda _known, working: inner(time, working))
@@ -164,19 +164,3 @@ def _given(resolved: Resolved, values: Sequence[arb], bits: int) -> list[arb]:
             for begin in range(0, len(values), 3)
             for row in resolved.axes
         ]
-
-
-def _from_start(known: tuple[Resolved, ExactSolution], whole: Whole) -> Whole:
-    """Ω, γ and ξ in principal axes, ξ from the start that was given, out of ξ from :func:`perpendicular` of γ."""
-    resolved, solution = known
-    gamma = solution.start.gamma
-    if resolved.xi is None or resolved.xi == (began := perpendicular(gamma)):
-        return whole
-    cosine, sine = dot(resolved.xi, began), dot(resolved.xi, cross(gamma, began))
-    # turned about γ by the constant angle between the two starts, whose cosine and sine are rational
-    return lambda time, bits: to_bits(lambda working: _about_gamma(whole(time, working), cosine, sine), bits)
-
-
-def _about_gamma(values: Sequence[arb], cosine: Fraction, sine: Fraction) -> list[arb]:
-    gamma, xi = values[3:6], values[6:]
-    return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(xi, cross(gamma, xi), strict=True))]

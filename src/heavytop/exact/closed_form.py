@@ -66,6 +66,19 @@ def cached_per_precision(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
     return look_up
 
 
+def once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """``make(motion)`` once for each motion: of what is exact, and needs no working precision."""
+
+    @wraps(make)
+    def look_up(motion: Any) -> Made:
+        if make not in motion.made:
+            motion.made[make] = make(motion)
+        value: Made = motion.made[make]
+        return value
+
+    return look_up
+
+
 def taylor(
     field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
 ) -> list[list[Fraction]]:
@@ -230,7 +243,7 @@ class ClosedForm(Evaluated):
     """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, ``source``, its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
-    made: what :func:`heavytop.exact.closed_form.cached_per_precision` keeps.
+    made: what :func:`once` and :func:`cached_per_precision` keep.
     """
 
     top: HeavyTop
@@ -354,6 +367,24 @@ class Turned:
             self._turns[working] = turn
             return turn
         return rotation
+
+
+def starting_at(xi: Vector, gamma: Vector, whole: Attitude) -> Attitude:
+    """Ω, γ, ξ with ξ(0) = ``xi`` out of those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
+
+    Turned about γ by the constant angle between the two, whose cosine and sine are rational.
+    """
+    began = perpendicular(gamma)
+    if xi == began:
+        return whole
+    cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
+
+    def turned(working: int, time: Fraction) -> list[arb]:
+        values = whole(time, working)
+        across = cross(values[3:6], values[6:])
+        return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(values[6:], across, strict=True))]
+
+    return lambda time, bits: to_bits(lambda working: turned(working, time), bits)
 
 
 # Renaming of the principal axes, once for all cases.

@@ -425,7 +425,7 @@ def log_spaced(count: int) -> list[int]:
 
 def positive(texts: list[str], what: str) -> list[Fraction]:
     """Exact numbers; raises InputError unless they are positive and grow."""
-    values = [physical(exact(text), what) for text in texts]
+    values = [physical(text, what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
         raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
     return values
@@ -434,7 +434,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 def samples(count: int) -> int:
     """The count; raises InputError where it cannot be."""
     if not 1 <= count <= _MAX_SAMPLES:
-        raise InputError(f"{count} samples cannot be taken.", f"Give a number from 1 to {_MAX_SAMPLES}.")
+        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give such as 100.")
     return count
 
 

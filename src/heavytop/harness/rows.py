@@ -398,9 +398,7 @@ def measure(kind: MeasuredKind, task: Task, saved: Saved) -> Row:
         return msgspec.structs.replace(_taken_up(kind, task, saved), data=data_of(task.case))
     except PeerFailed as error:
         return failed(task, error.cause)
-    except Unsupported as error:
-        return unmeasured(task, error)
-    except (OutOfReach, Contradiction) as error:
+    except (Unsupported, OutOfReach, Contradiction) as error:
         return unmeasured(task, error)
     except InputError as error:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None

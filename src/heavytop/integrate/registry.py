@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
@@ -39,6 +39,7 @@ from heavytop.precision import (
     exact,
     log10,
     parse,
+    physical,
 )
 from heavytop.records import INTEGRATORS as FORMER
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, System, square_of_rate, system
@@ -270,7 +271,7 @@ class Integrator:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
         runs = []
         for index, problem in enumerate(problems):
-            watch = None if observer is None else _watching(observer, index)
+            watch = None if observer is None else partial(observer, index)
             first = index == 0
             arguments = *_given(problem), times, problem.precision, problem.system, watch
             runs.append(self.propagate(*arguments, xi=problem.xi, again=first))
@@ -286,13 +287,6 @@ def _given(problem: Problem) -> tuple[HeavyTop, State]:
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system, problem.xi) != problem:
         raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
     return problem.given
-
-
-def _watching(observer: EnsembleObserver, index: int) -> Callable[[Fraction, Any], None]:
-    def watch(time: Fraction, state: Any) -> None:
-        observer(index, time, state)
-
-    return watch
 
 
 def foreign(name: str, function: str = "", source: IntegratorSource | None = None) -> Integrator:
@@ -462,7 +456,7 @@ def _require_possible(command: Command) -> None:
 
 def seconds_of(value: Any, what: str) -> float:
     """A time limit in seconds; raises InputError unless it is above 0."""
-    seconds: Fraction = exact(value)
+    seconds = physical(value, what)
     if not 0 < seconds <= _MOST_SECONDS:
         raise InputError(f"{what} = {quoted(value)} is not a time limit.", f"Give seconds, up to {_MOST_SECONDS}.")
     return float(seconds)

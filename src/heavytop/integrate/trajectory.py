@@ -313,15 +313,8 @@ class ResumePoint:
             # a zero keeps its sign
             return ["-0" if v == 0 and str(v).startswith("-") else native_text(v, precision) for v in values]
 
-        return {
-            "samples": self.samples,
-            "state": texts(self.state),
-            "time": texts(self.time),
-            "steps": self.steps,
-            "seconds": self.seconds,
-            "flags": self.flags,
-            "words": list(self.words),
-        }
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return fields | {"state": texts(self.state), "time": texts(self.time), "words": list(self.words)}
 
     @classmethod
     def of(cls, content: dict[str, Any], precision: Precision) -> ResumePoint:

@@ -134,6 +134,8 @@ def space_to_body(rows: Rows[Any], vector: Sequence[Any]) -> tuple[Any, Any, Any
 
 
 ATTITUDE_ERROR, POSITION_ERROR, JOINT_VIOLATION = "attitude_error", "position_error", "joint_violation"
+_WORST = Quantity(SOLUTION_ERROR, "relative")
+"""The largest error of a column."""
 _ONE = arb(1)
 Values = Mapping[str, Sequence[Fraction]]
 """The numbers of one sample by the name of the quantity."""
@@ -214,7 +216,7 @@ class ObservedErrors(Statistics):
         if "position" in names:
             quantities.append(Quantity(POSITION_ERROR))
             quantities += [Quantity(POSITION_ERROR, "relative")] if self.distance_squared else []
-        return [*quantities, Quantity(SOLUTION_ERROR, "relative")]
+        return [*quantities, _WORST]
 
     @whole_evaluation
     def __call__(self, time: Fraction, values: Values, state: Sequence[arb] | None) -> None:
@@ -230,7 +232,7 @@ class ObservedErrors(Statistics):
                 errors |= {Quantity(SOLUTION_ERROR, "along"): along, Quantity(SOLUTION_ERROR, "across"): across}
             for quantity, running in self.running.items():
                 running.take(time, running.following(errors[quantity]), time in self.keep)
-            self._last = float(errors[Quantity(SOLUTION_ERROR, "relative")].abs_upper())
+            self._last = float(errors[_WORST].abs_upper())
 
     def last(self, rate: Fraction) -> float:
         """The largest error of a column in the last sample."""
@@ -249,15 +251,14 @@ class ObservedErrors(Statistics):
         columns: list[arb] = []
         for name, part in numbers.items():
             errors = self._of_columns(name, part, omega, gamma, rows)
-            columns.append(errors.pop(Quantity(SOLUTION_ERROR, "relative")))
+            columns.append(errors.pop(_WORST))
             for quantity, error in errors.items():
                 parts[quantity] = largest((parts.get(quantity, error), error))
-        return parts | {Quantity(SOLUTION_ERROR, "relative"): largest(columns)}
+        return parts | {_WORST: largest(columns)}
 
     def _of_columns(
         self, name: str, part: list[arb], omega: Sequence[arb], gamma: Sequence[arb], rows: Rows[arb] | None
     ) -> dict[Quantity, arb]:
-        relative = Quantity(SOLUTION_ERROR, "relative")
         if name in ("omega", "gamma"):
             return _vector_error(name, part, omega if name == "omega" else gamma)
         assert rows is not None
@@ -271,7 +272,7 @@ class ObservedErrors(Statistics):
             entries = largest((entries, (sum((c * c for c in part), arb(0)) - 1) / 2))
         third = largest(a - b for a, b in zip(computed[2], rows[2], strict=True))
         return {
-            relative: entries,
+            _WORST: entries,
             Quantity(ATTITUDE_ERROR): attitude_angle(computed, rows),
             Quantity(SOLUTION_ERROR, "gamma"): third,
         }
@@ -281,11 +282,11 @@ class ObservedErrors(Statistics):
         position = self.said.upright([a - b for a, b in zip(part, pivot, strict=True)])
         true = rotated(rows, [ball(value) for value in self.point])
         off = [a - b for a, b in zip(position, true, strict=True)]
-        length, relative = root(dot(off, off)), Quantity(SOLUTION_ERROR, "relative")
+        length = root(dot(off, off))
         if not self.distance_squared:
-            return {Quantity(POSITION_ERROR): length, relative: length}
+            return {Quantity(POSITION_ERROR): length, _WORST: length}
         part_of = length / ball(self.distance_squared).sqrt()
-        return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, relative: part_of}
+        return {Quantity(POSITION_ERROR): length, Quantity(POSITION_ERROR, "relative"): part_of, _WORST: part_of}
 
     def quantities(self) -> dict[Quantity, Running]:
         """The errors of the columns, by what they are of."""
@@ -293,14 +294,14 @@ class ObservedErrors(Statistics):
 
     def largest_alone(self, quantity: Quantity) -> bool:
         """So of the relative error of all columns."""
-        return quantity == Quantity(SOLUTION_ERROR, "relative")
+        return quantity == _WORST
 
 
 def _vector_error(name: str, vector: Sequence[arb], true: Sequence[arb]) -> dict[Quantity, arb]:
     off = [a - b for a, b in zip(vector, true, strict=True)]
     return {
         Quantity(SOLUTION_ERROR, name): largest(off),
-        Quantity(SOLUTION_ERROR, "relative"): relative_error(off, true),
+        _WORST: relative_error(off, true),
     }
 
 

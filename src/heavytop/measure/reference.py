@@ -35,6 +35,7 @@ from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import Ball as Ball
 from heavytop.measure.derivatives import Derivatives, known_derivatives
 from heavytop.measure.motion import motion_texts, xi_texts
+from heavytop.measure.scalar import root
 from heavytop.precision import Vector, decimal_text, dot, exact, shown, vector
 from heavytop.top.attitude import Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
 from heavytop.top.bodies import Body
@@ -194,13 +195,6 @@ class KnownMotion:
         return (wide / most).__ceil__().bit_length() if most else math.inf
 
 
-def _root(value: arb) -> arb:
-    """√ of a number that is not negative, whose ball may reach below 0."""
-    if value >= 0:
-        return arb.sqrt(value)
-    return arb(0).union(value.abs_upper().sqrt())
-
-
 def _atan2(y: arb, x: arb) -> arb:
     """atan2 in (−π, π], but that a ball which reaches over the cut lies around π."""
     if x < 0 and not (y > 0 or y < 0):
@@ -208,7 +202,7 @@ def _atan2(y: arb, x: arb) -> arb:
     return arb.atan2(y, x) if not (y.contains(0) and x.contains(0)) else arb("nan")
 
 
-_BALLS = SimpleNamespace(**vars(FUNCTIONS) | {"sqrt": _root, "atan2": _atan2})
+_BALLS = SimpleNamespace(**vars(FUNCTIONS) | {"sqrt": root, "atan2": _atan2})
 
 
 def text(value: arb | None, digits: int) -> tuple[str, str]:
@@ -450,7 +444,7 @@ def reference(
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
-        raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
+        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give such as 50.")
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Any
 from flint import arb
 
 from heavytop.exact.flint.balls import (
-    at_precision,
     ball,
     ball_from,
     ball_text,
-    current_length,
     midpoint,
     radius,
     rational,
@@ -178,7 +176,8 @@ class Drift(Statistics):
     @whole_evaluation
     def following(self, state: Sequence[Any]) -> list[Sums]:
         """The sums of the drifts with this native state; nothing is taken in."""
-        return at_precision(self.bits, current_length(), lambda _: self.sums(to_balls(state)))
+        with working_precision(self.bits):
+            return self.sums(to_balls(state))
 
     def sums(self, y: Sequence[arb]) -> list[Sums]:
         """The sums of the drifts with a state of balls, at a working precision of ``bits``."""
@@ -274,7 +273,7 @@ class SolutionError(Statistics):
         with working_precision(self.bits):
             return self.errors(to_balls(state[:6]), truth)
 
-    def known(self, time: Fraction) -> list[arb] | None:
+    def known(self, time: Fraction) -> Sequence[arb] | None:
         """The true state; None where absent."""
         return self.truth.state(time, self.bits) if self.truth.covers(time) else None
 
@@ -415,7 +414,6 @@ class Scorer(DriftAndError):
 # The error of a motion at each of its samples, and the drift of its integrals there, as decimal logarithms.
 
 
-Exact = Sequence[Fraction]
 Logs = list[float | None]
 """log10 of a quantity at each sample; None where it is 0."""
 

@@ -21,6 +21,7 @@ from msgspec.structs import replace as replace_struct
 from heavytop.errors import HeavyTopError, InputError, NotInClass, OutOfReach
 from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.catalogue import matches, state_and_attitude
+from heavytop.exact.closed_form import starting_at
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
@@ -30,9 +31,8 @@ from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import Precision, Vector, cross, decimal_text, dot, exact, number, real, shown, time_text
+from heavytop.precision import Precision, Vector, decimal_text, exact, number, real, shown, time_text
 from heavytop.records import Against, Certified
-from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import check_times
 
@@ -286,7 +286,7 @@ _SPARE_DIGITS = 3
 _EFFORT = 1.0
 """Seconds that a second source at the horizon itself may cost; beyond, it is compared near 0 and near the horizon."""
 
-Evaluate = Callable[[Fraction, int], list[arb]]
+Evaluate = Callable[[Fraction, int], Sequence[arb]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,9 +430,6 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
 # The attitude vector of a known motion, from that which the problem begins with.
 
 
-_SPARE_BITS = 8
-
-
 def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evaluate | None:
     """Ω, γ and ξ of a known motion: ξ by its closed form where that reaches the horizon, else by the enclosure.
 
@@ -442,33 +439,15 @@ def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evalu
     xi = problem.xi
     assert xi is not None
     start: Vector = (xi[0], xi[1], xi[2])
-    whole: Evaluate
     if isinstance(solution, Validated):
-        whole = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
+        whole: Evaluate = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
     else:
-        known = state_and_attitude(solution, horizon, bits)[1]
-        whole = _turned(solution.start.gamma, start, lambda time, working: list(known(time, working)))
+        whole = starting_at(start, solution.start.gamma, state_and_attitude(solution, horizon, bits)[1])
     try:
         whole(horizon, bits)
     except (NotInClass, OutOfReach):
         return None
     return whole
-
-
-def _turned(gamma: Vector, xi: Vector, whole: Evaluate) -> Evaluate:
-    """Ω, γ and ξ with the attitude turned about γ by the constant angle with which it begins at ``xi``; |γ| = 1."""
-    began = perpendicular(gamma)
-    cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
-
-    @whole_evaluation
-    def evaluate(time: Fraction, bits: int) -> list[arb]:
-        known = list(whole(time, bits + _SPARE_BITS))
-        with working_precision(bits + _SPARE_BITS):
-            eta = cross(known[3:6], known[6:9])
-            along = [ball(cosine) * x + ball(sine) * y for x, y in zip(known[6:9], eta, strict=True)]
-        return [*known[:6], *along]
-
-    return evaluate
 
 
 # What the motions of an ensemble are compared with: closed forms, else runs in more bits.

@@ -23,7 +23,7 @@ from math import isqrt
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.precision import (
     Given,
     Real,
@@ -206,8 +206,8 @@ class Angle:
         if isinstance(value, Angle):
             return value
         if isinstance(value, str) and value.strip().lower().endswith(_DEGREES):
-            return cls(exact(value.strip()[: -len(_DEGREES)].strip()), True)
-        return cls(exact(value))
+            return cls(physical(value.strip()[: -len(_DEGREES)].strip(), "angle"), True)
+        return cls(physical(value, "angle"))
 
     def __str__(self) -> str:
         return exact_text(self.number) + (_DEGREES if self.degrees else "")
@@ -245,7 +245,8 @@ class Attitude:
         Raises InputError unless |q| = 1 exactly, or, with ``normalize``, for q = 0; R of any rational quaternion is
         rational.
         """
-        q = tuple(exact(value) for value in (w, x, y, z))
+        with prefixed("quaternion"):
+            q = tuple(exact(value) for value in (w, x, y, z))
         square = sum(value * value for value in q)
         if square == 0:
             raise InputError("A quaternion must not be zero.", "Give w,x,y,z of length 1.")

@@ -10,7 +10,7 @@ from math import isqrt
 from operator import lt
 from typing import Any, cast
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, prefixed, quoted
 from heavytop.precision import (
     MOST_MEMBERS,
     Given,
@@ -363,7 +363,8 @@ def check_times(times: Iterable[Any]) -> CheckedTimes | DoubleTimes:
     if doubles is not None:
         return DoubleTimes(doubles)
     instants = ordered(times, "times", "Give a list such as [1, 2, 5].")
-    values = CheckedTimes(instants if set(map(type, instants)) == {Fraction} else map(exact, instants))
+    with prefixed("times"):
+        values = CheckedTimes(instants if set(map(type, instants)) == {Fraction} else map(exact, instants))
     values.doubles = _in_order(values)
     if not values.doubles:
         _check_each(values)

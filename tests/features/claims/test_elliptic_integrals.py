@@ -130,6 +130,32 @@ def test_degenerate_parameters_and_poles_are_conditions(
     assert any(missing in text for text in left) if missing else not left
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("ellipticPi(0, t, a) - ellipticF(t, a)", "holds"),
+        ("sin(am(t, 1)) - tanh(t)", "holds"),
+        ("wp3(-t, 4, a) - wp3(t, 4, a)", "holds"),
+        ("wp3prime(-t, 4, a) + wp3prime(t, 4, a)", "holds"),
+        ("theta3(0, nome(a))^2 - 2*ellipticK(a)/pi", "holds"),
+        ("theta3(0, nome(a))^2 - 2*ellipticK(a)/pi + 1e-30", "refuted"),
+        ("asin(sin(t)) - t", "refuted"),  # from a quarter of the period on
+        ("ellipticE(t, 1) - sin(t)", "refuted"),
+        ("ellipticF(asin(sn(t, a)), a) - t", "refuted"),
+    ],
+)
+def test_degenerate_values_nomes_and_later_branches_are_decided(text: str, expected: str) -> None:
+    table = {
+        "name": "x",
+        "kind": "motion",
+        "parameters": {"a": "1/2"},
+        "assume": ["0 < a < 1"],
+        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
+        "motion": {"omega": ["0", "0", f"1 + t*({text})"], "gamma": ["0", "0", "1"]},
+    }
+    assert audit_claim(claim_from_table(table, "x")).verdict == expected
+
+
 @pytest.mark.parametrize("text", ["am(1, 2)", "ellipticF(1, 1)", "ellipticPi(2, 1, 1/2)", "modulus(2)"])
 def test_beyond_the_parameters_there_is_no_value(text: str) -> None:
     assert not evaluate(formula(text), {}, 100).is_finite()

@@ -366,7 +366,7 @@ def test_a_run_that_ends_early_says_so() -> None:
         ({"function": lambda omega, gamma: "x"}, "raised TypeError"),
         ({"function": lambda omega, gamma: abs(omega[0]), "digits": 10}, "must be rational"),
         ({"integrator": "scipy"}, "hands over no polynomial"),
-        ({"digits": 0}, "0 digits"),
+        ({"digits": 0}, "digits must be from 1"),
         ({"digits": 10, "precision": ht.QUAD}, "know no precision"),
         ({"limit": 0}, "allows nothing"),
     ],

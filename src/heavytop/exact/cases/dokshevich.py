@@ -28,7 +28,7 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import InputError, prefixed
 from heavytop.exact.cases.algebraic_starts import Algebraic
-from heavytop.exact.closed_form import ClosedForm, cached_per_precision, sign
+from heavytop.exact.closed_form import ClosedForm, cached_per_precision, once, sign
 from heavytop.exact.flint.balls import (
     BallLike,
     Balls,
@@ -55,7 +55,6 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _TERMS = 1 << 14
-_REMEDY = "`dokshevich_motion` builds a top with such a motion."
 _LEAST = 128
 
 
@@ -251,12 +250,6 @@ def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
     ]
 
 
-def _exact(top: HeavyTop, start: State) -> tuple[Data, Fraction, Fraction, Fraction]:
-    """The data, and |n|², X = M·n and Z = M·e3 at the start."""
-    (square, skew, *_), (unit, x, z) = _numbers(top), _components(top, start)
-    return (top.inertia, top.moment[0] ** 2 / square, _constants(top), skew * skew * unit), square, x, z
-
-
 @dataclass(frozen=True, slots=True)
 class Dokshevich(_Moving, ClosedForm):
     """A motion of Dokshevich with exact data; S is rational then.
@@ -285,12 +278,12 @@ class Dokshevich(_Moving, ClosedForm):
         _require_reach(self)
 
 
+@once
 def _all(motion: Dokshevich) -> tuple[Data, Fraction, Fraction, Fraction]:
-    """:func:`_exact`, once."""
-    if "exact" not in motion.made:
-        motion.made["exact"] = _exact(motion.top, motion.start)
-    data: tuple[Data, Fraction, Fraction, Fraction] = motion.made["exact"]
-    return data
+    """The data, and |n|², X = M·n and Z = M·e3 at the start."""
+    (square, skew, *_), (unit, x, z) = _numbers(motion.top), _components(motion.top, motion.start)
+    data = motion.top.inertia, motion.top.moment[0] ** 2 / square, _constants(motion.top), skew * skew * unit
+    return data, square, x, z
 
 
 def _data(motion: Any) -> Data:

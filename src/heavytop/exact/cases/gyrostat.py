@@ -32,11 +32,9 @@ from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticM
 from heavytop.exact.elliptic.weierstrass import Point, Winding, imag, real
 from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, to_bits
 from heavytop.precision import Vector, cross, dot
+from heavytop.top.bodies import IDENTITY
 from heavytop.top.equations import GYROSTAT, Parameters, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State
-
-_ZERO, _ONE = Fraction(0), Fraction(1)
-_UNITS: tuple[Vector, ...] = ((_ONE, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO), (_ZERO, _ZERO, _ONE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +182,7 @@ def _prepared(motion: Gyrostat) -> _Prepared:
 @cached_per_precision
 def _units(motion: Gyrostat) -> list[_Fixed]:
     """The axes of the body at t = 0."""
-    return [_fixed(motion, _prepared(motion).motion, unit) for unit in _UNITS]
+    return [_fixed(motion, _prepared(motion).motion, unit) for unit in IDENTITY]
 
 
 def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:

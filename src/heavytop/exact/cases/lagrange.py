@@ -44,6 +44,7 @@ from heavytop.exact.closed_form import (
     carried_xi,
     initial_xi,
     instant,
+    once,
     rotate,
     taylor,
     turned,
@@ -311,35 +312,20 @@ class LagrangeGyrostat(ClosedForm):
     system = HEAVY_GYROSTAT
     body = *SYMMETRIC, AXIAL_ROTOR
 
-    def __post_init__(self) -> None:
-        ClosedForm.__post_init__(self)
-        self.made["top"] = self._top()
-
-    def _top(self) -> Lagrange:
-        first, second, third = self.start.omega
-        plain = HeavyTop(self.top.inertia, self.top.weight, self.top.centre)
-        return Lagrange(plain, State((first, second, third + self._ahead), self.start.gamma))
-
     @property
     def _ahead(self) -> Fraction:
         """k3/I3."""
         return Fraction(self.top.rotor[2] / self.top.inertia[2]) if self.top.rotor else Fraction(0)
 
-    @property
-    def lagrange(self) -> Lagrange:
-        """The motion of the top."""
-        top: Lagrange = self.made["top"]
-        return top
-
     def evaluate(self, time: Fraction) -> list[BallLike]:
-        turned = self._turned(self.lagrange.evaluate(time), instant(time))
+        turned = self._turned(_top_of(self).evaluate(time), instant(time))
         return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
 
         def evaluate(working: int) -> list[arb]:
-            known = self.lagrange.attitude(time, working + _ATTITUDE_BITS)
+            known = _top_of(self).attitude(time, working + _ATTITUDE_BITS)
             with series_length(1):
                 return self._turned(known, ball(time))
 
@@ -353,6 +339,14 @@ class LagrangeGyrostat(ClosedForm):
             x, y, z = vectors[begin : begin + 3]
             rotated += [cosine * x - sine * y, sine * x + cosine * y, z]
         return rotated
+
+
+@once
+def _top_of(case: LagrangeGyrostat) -> Lagrange:
+    """The motion of the top with the same M."""
+    first, second, third = case.start.omega
+    plain = HeavyTop(case.top.inertia, case.top.weight, case.top.centre)
+    return Lagrange(plain, State((first, second, third + case._ahead), case.start.gamma))
 
 
 # A top with I1 = I2 and P c = 0, in sizes of about 1 and turned so that its moment of weight is (c, 0, 0).

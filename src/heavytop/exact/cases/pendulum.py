@@ -32,8 +32,6 @@ from heavytop.exact.solution import GAMMA, TORQUE, ExactRelation
 from heavytop.precision import Vector, cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
 
-_REMEDY = "It turns about a principal axis, with P r and gamma across it."
-
 
 def _axis(top: HeavyTop, start: State) -> Vector:
     """Ω, or γ × n at rest, in units of its largest component; 0 in equilibrium."""

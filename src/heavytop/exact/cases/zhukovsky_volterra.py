@@ -31,7 +31,7 @@ from fractions import Fraction
 from math import factorial
 from typing import Any
 
-from flint import arb, arb_mat, fmpq_mat
+from flint import arb, arb_mat, fmpq_mat, fmpq_poly
 
 from heavytop.errors import LevelNotDone
 from heavytop.exact.closed_form import (
@@ -40,11 +40,12 @@ from heavytop.exact.closed_form import (
     cached_per_precision,
     initial_xi,
     instant,
+    once,
     rotate,
     taylor,
     without_turning,
 )
-from heavytop.exact.elliptic.quartic import lift
+from heavytop.exact.elliptic.quartic import QuarticMotion, lift
 from heavytop.exact.elliptic.weierstrass import (
     Lattice,
     Point,
@@ -58,11 +59,11 @@ from heavytop.exact.elliptic.weierstrass import (
 from heavytop.exact.flint.balls import BallLike, Balls, ball, current_length, rational, to_bits, unit_of_time
 from heavytop.exact.solution import NO_TORQUE
 from heavytop.precision import Vector, cross, dot
+from heavytop.top.bodies import IDENTITY
 from heavytop.top.equations import HEAVY_GYROSTAT
 
 _POLE, _LAST = 5, 5
 """D and D Mi have a pole of that order at t = 0, and are compared up to that power of t."""
-_UNITS: tuple[Vector, ...] = tuple(tuple(Fraction(int(i == j)) for j in range(3)) for i in range(3))  # type: ignore[misc]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,29 +101,28 @@ class ZhukovskyVolterra(ClosedForm):
     @property
     def permanent(self) -> bool:
         """Whether M is at rest in the body."""
-        if "permanent" not in self.made:
-            self.made["permanent"] = not any(cross(self.momentum, self.start.omega))
-        return bool(self.made["permanent"])
+        return _is_permanent(self)
 
     def coefficients(self) -> tuple[Fraction, ...]:
         """a0, a1, a2, a3, a4 of f."""
-        rates = [1 / i for i in self.top.inertia]
-        square = dot(self.momentum, self.momentum)
-        shift = [k * a for k, a in zip(self._rotor, rates, strict=True)]
-        constant = Fraction(dot(shift, self._rotor))
-        constant -= sum((w * w * i for w, i in zip(self.start.omega, self.top.inertia, strict=True)), Fraction(0))
-        lines: list[list[Fraction]] = [[rate, Fraction(1)] for rate in rates]
-        product = _product([*lines, [constant, Fraction(-square)]])
-        for row, part in enumerate(shift):
-            others = _product([line for other, line in enumerate(lines) if other != row])
-            product = [f - part * part * g for f, g in zip(product, [*others, Fraction(0), Fraction(0)], strict=True)]
-        return tuple(c / weight for c, weight in zip(reversed(product), (1, 4, 6, 4, 1), strict=True))
+        weights = (1, 4, 6, 4, 1)
+        return tuple(c / weight for c, weight in zip(reversed(self._quartic()), weights, strict=True))
+
+    def _quartic(self) -> list[Fraction]:
+        """f, the lowest coefficient first."""
+        rates, rotor = ([*map(rational, part)] for part in ([1 / i for i in self.top.inertia], self._rotor))
+        lines = [fmpq_poly([rate, 1]) for rate in rates]
+        square, energy = dot(self.momentum, self.momentum), dot(self.start.omega, self.momentum)
+        energy -= dot(self.start.omega, self._rotor)
+        last = fmpq_poly([dot(rotor, [k * a for k, a in zip(rotor, rates, strict=True)]) - rational(energy)])
+        product = lines[0] * lines[1] * lines[2] * (last - fmpq_poly([0, rational(square)]))
+        for row in range(3):
+            product -= (rotor[row] * rates[row]) ** 2 * lines[row - 1] * lines[row - 2]
+        return [Fraction(int(c.p), int(c.q)) for c in product.coeffs()]
 
     def invariants(self) -> tuple[Fraction, Fraction]:
         """(g2, g3)."""
-        a0, a1, a2, a3, a4 = self.coefficients()
-        g3 = a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a0 * a3 * a3 - a1 * a1 * a4
-        return a0 * a4 - 4 * a1 * a3 + 3 * a2 * a2, g3
+        return QuarticMotion(tuple(self._quartic()), Fraction(0), Fraction(0)).invariants()
 
     def winding(self) -> Winding:
         """V and κ of Z."""
@@ -151,10 +151,7 @@ class ZhukovskyVolterra(ClosedForm):
         return to_bits(evaluate, bits, self.own_time(time))
 
     def own_time(self, time: Fraction) -> Fraction:
-        if "unit" not in self.made:
-            parameters = HEAVY_GYROSTAT.parameters(self.top, self.start)
-            self.made["unit"] = Fraction(2) ** unit_of_time(parameters, self.start.flat)
-        return Fraction(time * self.made["unit"])
+        return _unit(self) * time
 
     def _momentum(self, time: Fraction) -> tuple[list[BallLike], Point, BallLike]:
         """M, the point of the lattice, and 1/(D T^5)."""
@@ -165,24 +162,27 @@ class ZhukovskyVolterra(ClosedForm):
         return [part * inverse for part in above], point, inverse
 
 
-def _product(factors: Sequence[Sequence[Fraction]]) -> list[Fraction]:
-    """The product of polynomials, lowest coefficient first."""
-    product = [Fraction(1)]
-    for factor in factors:
-        row = [Fraction(0)] * (len(product) + len(factor) - 1)
-        for i, a in enumerate(product):
-            for j, b in enumerate(factor):
-                row[i + j] += a * b
-        product = row
-    return product
+@once
+def _is_permanent(case: ZhukovskyVolterra) -> bool:
+    return not any(cross(case.momentum, case.start.omega))
+
+
+@once
+def _unit(case: ZhukovskyVolterra) -> Fraction:
+    return Fraction(2) ** unit_of_time(_parameters(case), case.start.flat)
+
+
+def _powers(value: Any, most: int) -> list[Any]:
+    """1, value, ..., value^most."""
+    powers = [value * 0 + 1]
+    for _ in range(most):
+        powers.append(powers[-1] * value)
+    return powers
 
 
 def _terms(point: Point, order: int) -> list[BallLike]:
     """1, ℘, ℘', ℘² and ℘℘', each times T^order."""
-    t, wp, slope = point.scale, point.above(Fraction(0)), point.slope
-    powers = [point.square * 0 + 1]
-    for _ in range(order):
-        powers.append(powers[-1] * t)
+    wp, slope, powers = point.above(Fraction(0)), point.slope, _powers(point.scale, order)
     terms = [powers[order], wp * powers[order - 2], slope * powers[order - 3], wp * wp * powers[order - 4]]
     return [*terms, wp * slope] if order == _POLE else terms
 
@@ -251,11 +251,9 @@ def _parameters(case: ZhukovskyVolterra) -> Any:
     return HEAVY_GYROSTAT.parameters(case.top, case.start)
 
 
+@once
 def _exact(case: ZhukovskyVolterra) -> _Exact:
-    """By linear equations, once."""
-    if "exact" in case.made:
-        kept_one: _Exact = case.made["exact"]
-        return kept_one
+    """By linear equations."""
     basis, momentum = _basis(*case.invariants()), _momentum_series(case)
     size = len(basis[0])
     equations = []
@@ -271,9 +269,7 @@ def _exact(case: ZhukovskyVolterra) -> _Exact:
     whole = tuple(
         sum((d * row[power] for d, row in zip(groups[0], basis, strict=True)), Fraction(0)) for power in range(size)
     )
-    exact = _Exact(groups[0], tuple(groups[1:]), whole)
-    case.made["exact"] = exact
-    return exact
+    return _Exact(groups[0], tuple(groups[1:]), whole)
 
 
 def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> list[Fraction]:
@@ -285,19 +281,11 @@ def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> li
 
 def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
     """The one solution of homogeneous equations, up to a factor; raises LevelNotDone where there are more."""
-    width = len(equations[0])
-    matrix: Any = fmpq_mat(len(equations), width, [rational(value) for line in equations for value in line])
-    reduced, rank = matrix.rref()
-    if rank != width - 1:
+    matrix: Any = fmpq_mat([[rational(value) for value in line] for line in equations])
+    basis, count = matrix.numer_denom()[0].nullspace()
+    if count != 1:
         raise LevelNotDone("The curve of M is degenerate.", "The enclosure proves such a motion, up to its reach.")
-    pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
-    (free,) = set(range(width)) - set(pivots)
-    kernel = [Fraction(0)] * width
-    kernel[free] = Fraction(1)
-    for i, j in enumerate(pivots):
-        entry = reduced[i, free]
-        kernel[j] = -Fraction(int(entry.p), int(entry.q))
-    return kernel
+    return [Fraction(int(row[0])) for row in basis.table()]
 
 
 @cached_per_precision
@@ -341,12 +329,9 @@ class _Fixed:
     def _terms(self, wave: SecondKind, point: Point) -> list[BallLike]:
         """Φ .. Φ'''' times e^(iκt) T^order, by Lamé's equation."""
         phi, slope = map(lift, wave.at(point))
-        t, square = lift(point.scale), lift(point.square)
+        square, powers = lift(point.square), _powers(lift(point.scale), self.order - 1)
         wp, steep = lift(point.above(Fraction(0))), lift(point.slope)
         lame = 2 * wp + wave.value * square if isinstance(wave.value, arb) else 2 * wp + ball(wave.value) * square
-        powers = [square * 0 + 1]
-        for _ in range(self.order - 1):
-            powers.append(powers[-1] * t)
         terms = [
             phi * powers[self.order - 1],
             slope * powers[self.order - 2],
@@ -366,7 +351,7 @@ def _gamma(case: ZhukovskyVolterra) -> _Fixed:
 @cached_per_precision
 def _axes(case: ZhukovskyVolterra) -> list[_Fixed]:
     """The axes of the body at t = 0."""
-    return [_fixed(case, unit) for unit in _UNITS]
+    return [_fixed(case, unit) for unit in IDENTITY]
 
 
 def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:

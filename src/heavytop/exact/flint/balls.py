@@ -240,24 +240,6 @@ class series_length(_Block):  # noqa: N801 - reads as a verb
         self.precision, self.length = None, length
 
 
-def at_precision(bits: int, length: int, evaluate: Callable[[int], Found]) -> Found:
-    """``evaluate(bits)`` as inside :class:`working_precision`, for the thread that evaluates already.
-
-    It spares the block that every state would make.  Raises ContextChanged as the block does.
-    """
-    before = _held.context
-    _held.context = ctx.prec, ctx.cap = bits, length
-    try:
-        result = evaluate(bits)
-    finally:
-        if (ctx.prec, ctx.cap) != _held.context:
-            _note()
-        _held.context = ctx.prec, ctx.cap = before
-    if _held.disturbed:
-        raise ContextChanged
-    return result
-
-
 def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
     """``function`` with the context for itself from beginning to end, and again where another thread changed it.
 
@@ -504,7 +486,8 @@ def to_bits(
     while True:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
         try:
-            values = at_precision(inside, length, evaluate)
+            with working_precision(inside, length):
+                values = evaluate(inside)
         except Undecided:
             values = [arb("nan")]
         except ValueError as error:

@@ -300,8 +300,8 @@ def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     if not np.isfinite(rows).all():
         return rows
     sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
-    cached_per_precision = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
-    return rows[:, : cached_per_precision[-1] + 1] if cached_per_precision.size else rows[:, :1]
+    visible = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
+    return rows[:, : visible[-1] + 1] if visible.size else rows[:, :1]
 
 
 # A variable that leaves and approaches a double root of a polynomial, and its Abel integrals with a proven error.

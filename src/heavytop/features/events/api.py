@@ -29,7 +29,7 @@ from heavytop.integrate.dense import dense
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import named
 from heavytop.measure.reference import DIGITS, Ball
-from heavytop.precision import DOUBLE, Precision, as_integer, exact, exact_text, physical
+from heavytop.precision import DOUBLE, Precision, as_integer, exact_text, physical
 from heavytop.top.amplification import amplification
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System, area, energy
@@ -155,7 +155,7 @@ def _known_events(
 ) -> ReferenceEvents:
     """Proven events of a motion that was checked."""
     if digits not in DIGITS:
-        raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
+        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give such as 50.")
     if not function.rational:
         raise InputError(
             f"For a proof the function must be rational in Ω and γ; got {quoted(function.name)}.",
@@ -253,7 +253,7 @@ def _as_float(value: Fraction) -> float:
 
 
 def _until(value: Number) -> Fraction:
-    end = physical(exact(value), "until")
+    end = physical(value, "until")
     if end == 0:
         raise InputError("until = 0 leaves no time for an event.", "Give a time of either sign.")
     return end

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from heavytop.display import LazyLines, Tabular, TitledTable
 from heavytop.errors import InputError, quoted
-from heavytop.exact.flint.balls import radius_text
+from heavytop.exact.flint.balls import radius_text, rational
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
 from heavytop.precision import Array, decimal_text, exact, native_text
@@ -72,7 +72,7 @@ class Ratio:
             number = exact(value)
         except InputError:
             raise NotRational(f"{quoted(value)} is not a number") from None
-        return Ratio(_context.constant(fmpq(number.numerator, number.denominator)), _context.constant(1))
+        return Ratio(_context.constant(rational(number)), _context.constant(1))
 
     def __add__(self, other: Any) -> Ratio:
         o = Ratio.of(other)
@@ -288,7 +288,7 @@ def in_body_axes(function: EventFunction, axes: Sequence[Sequence[Fraction]]) ->
         return function
     own = _context.gens()
     forms = [
-        sum((_rational(axes[i][j]) * own[3 * part + j] for j in range(3)), _context.constant(0))
+        sum((rational(axes[i][j]) * own[3 * part + j] for j in range(3)), _context.constant(0))
         for part in range(2)
         for i in range(3)
     ]
@@ -327,16 +327,11 @@ def composed(terms: Sequence[tuple[tuple[int, ...], Any]], components: Sequence[
 def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     """d/dt of a polynomial along the motions: Σ ∂f/∂y_i f_i(y), a polynomial."""
 
-    field = system.field(parameters.mapped(_rational), _context.gens())
+    field = system.field(parameters.mapped(rational), _context.gens())
     total = _context.constant(0)
     for index, rate in enumerate(field):
         total = total + polynomial.derivative(index) * rate
     return total
-
-
-def _rational(value: Any) -> fmpq:
-    number = Fraction(value)
-    return fmpq(number.numerator, number.denominator)
 
 
 def start_series(
@@ -347,7 +342,7 @@ def start_series(
     from heavytop.exact.flint.balls import coefficient, series_length
 
     rows = taylor(system.field, parameters, start, _DERIVATIVES)
-    y = [[fmpq(v.numerator, v.denominator) / math.factorial(n) for n, v in enumerate(row)] for row in rows]
+    y = [[rational(v) / math.factorial(n) for n, v in enumerate(row)] for row in rows]
     with series_length(_DERIVATIVES):
         series = [fmpq_series(row, prec=_DERIVATIVES) for row in y]
         zero = fmpq_series([0], prec=_DERIVATIVES)

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
-from math import ceil, log2
+from math import ceil, floor, log2
 from typing import Any, NamedTuple
 
 from flint import arb, arb_poly
@@ -499,7 +499,4 @@ def _narrowed(
 def _rounded(value: Fraction, bits: int, direction: int = 0) -> Fraction:
     """A dyadic number within 2^-bits: not above the value for −1, not below it for 1, near it for 0."""
     scaled = value * 2**bits
-    whole = scaled.numerator // scaled.denominator
-    if direction > 0 and whole * scaled.denominator != scaled.numerator:
-        whole += 1
-    return Fraction(whole, 1 << bits)
+    return Fraction(ceil(scaled) if direction > 0 else floor(scaled), 1 << bits)

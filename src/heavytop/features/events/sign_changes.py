@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from flint import fmpq, fmpz, fmpz_poly
+from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
 _ONE_MORE = fmpz_poly([1, 1])
 _DEEPEST = 400
@@ -84,18 +84,7 @@ def _bounded_away(polynomial: fmpz_poly) -> bool:
 
 def _scaled(polynomial: fmpz_poly, end: fmpq) -> fmpz_poly:
     """A positive multiple of g(end x): that on (0, 1) is g on (0, end)."""
-    if end == 1:
-        return polynomial
-    p, q, coefficients = int(end.p), int(end.q), [int(c) for c in polynomial.coeffs()]
-    power = 1
-    for n in range(len(coefficients)):
-        coefficients[n] *= power
-        power *= p
-    power = 1
-    for n in range(len(coefficients) - 1, -1, -1):
-        coefficients[n] *= power
-        power *= q
-    return fmpz_poly(coefficients)
+    return polynomial if end == 1 else fmpq_poly(polynomial)(fmpq_poly([0, end])).numer()
 
 
 def _without_root_at_zero(polynomial: fmpz_poly) -> fmpz_poly:

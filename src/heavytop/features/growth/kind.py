@@ -93,7 +93,7 @@ def _task(case: Case, run: GrowthRun, integrator: str) -> Task:
     for name, limits in _LIMITS.items():
         if (value := getattr(run, name)) not in limits:
             raise InputError(f"{name} = {value} in a growth run.", f"Give {limits[0]} to {limits[-1]}.")
-    horizon = physical(exact(run.horizon), "horizon")
+    horizon = physical(run.horizon, "horizon")
     if horizon <= 0:
         raise InputError(f"horizon = {run.horizon} in a growth run.", "Give a positive number.")
     if run.tolerance is not None:

@@ -18,7 +18,7 @@ from heavytop.features.hunt.text import hunt_text
 from heavytop.integrate import registry
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.registry import described, named
-from heavytop.precision import DOUBLE_DOUBLE, Precision, as_integer, exact, physical, time_text
+from heavytop.precision import DOUBLE_DOUBLE, Precision, as_integer, physical, time_text
 
 _MOST = 1_000_000
 _MOST_SECONDS = 10**7
@@ -88,13 +88,13 @@ def hunt(
             registry.require(chosen)
     if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"family must be a known one; got {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
-    time = physical(exact(horizon), "horizon")
+    time = physical(horizon, "horizon")
     if not time:
         raise InputError("horizon must not be zero.", "Give a time other than 0, such as 100.")
     if which == "heyoka" and form == DOUBLE_DOUBLE:
         raise InputError("heyoka has no double-double.", "Use --integrator multiword, or another format.")
     motions, seconds = _budget(budget)
-    beyond = None if limit is None else float(physical(exact(limit), "limit"))
+    beyond = None if limit is None else float(physical(limit, "limit"))
     if beyond is not None and not beyond > 0:
         raise InputError(f"limit = {quoted(limit)} is not above 0.", "Give a positive number, or leave it out.")
     if other is not None and other == which:

@@ -16,7 +16,7 @@ from heavytop.harness.rows import Find, PlanTable, Task, computed, exact_row, fa
 from heavytop.integrate.registry import described
 from heavytop.kind import Kind
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import exact, exact_text, parse, time_text
+from heavytop.precision import exact, exact_text, parse, physical, time_text
 from heavytop.records import HEYOKA, Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.document.document import Block, Card, In, Note, short
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
@@ -105,10 +105,10 @@ def _asked(task: Task) -> Asked:
     return Asked(
         task.integrator,
         task.precision,
-        Fraction(exact(horizon)),
+        physical(horizon, "horizon"),
         family,
         described(against) if against else None,
-        float(exact(limit)) if limit else None,
+        float(physical(limit, "limit")) if limit else None,
         budget,
         seed=seed + task.seed,
         first=kept(Path(file)) if file else (),

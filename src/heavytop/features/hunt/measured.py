@@ -465,8 +465,8 @@ class Meter:
         problems = [Problem.of(*motion, self.precision, system_of(None, motion[0])) for motion in motions]
         rates = [rate(problem.system, problem.parameters, problem.start.flat) for problem in problems]
         truths = self._truths(problems, rates)
-        runs = self._runs(self.integrator, problems, motions, self._apart)
-        others = [] if self.against is None else self._runs(self.against, problems, motions, None)
+        runs = self._runs(self.integrator, problems, motions)
+        others = [] if self.against is None else self._runs(self.against, problems, motions)
         measured = []
         for i, (motion, unit, (true, grown), run) in enumerate(zip(motions, rates, truths, runs, strict=True)):
             turns = float(unit * abs(self.horizon))
@@ -492,14 +492,12 @@ class Meter:
         return replace(motion, amplification=max(largest, motion.amplification))
 
     def _runs(
-        self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
+        self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion]
     ) -> list[IntegratedRun]:
         if integrator.ensemble:
             runs = integrator.propagate_many(problems, self.times, threads=1)
             return [IntegratedRun(run.outcome.value, run.states) for run in runs]
-        if apart is not None:
-            return [apart.follow(*motion, self.times, self.precision) for motion in motions]
-        return [follow(integrator, *motion, self.times, self.precision) for motion in motions]
+        return [self.run_of(integrator, motion) for motion in motions]
 
     def _truths(
         self, problems: Sequence[Problem], rates: Sequence[Fraction]

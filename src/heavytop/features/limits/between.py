@@ -16,7 +16,7 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
-from heavytop.precision import Array, decimal_text, exact, exact_text
+from heavytop.precision import Array, decimal_text, exact_text, physical
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, check_times
@@ -86,8 +86,8 @@ def between_samples(
         InputError: for an invalid motion, for more than 20,000 intervals, and for other numbers.
     """
     body, state = arguments.motion(top, start)
-    about, end, step = arguments.system(system, body), exact(until), exact(spacing)
-    wanted = None if within is None else float(exact(within))
+    about, end, step = arguments.system(system, body), physical(until, "until"), physical(spacing, "between")
+    wanted = None if within is None else float(physical(within, "within"))
     if not 0 < step <= end:
         raise InputError(f"spacing must be above 0 and at most until; got {spacing}.", "Give such as until/100.")
     if wanted is not None and not 1e-12 < wanted < 1:

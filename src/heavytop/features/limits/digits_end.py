@@ -24,7 +24,7 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import propagator
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, real
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, exact_text, number, physical, real
 from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -122,7 +122,7 @@ def digits_end(
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
-    about, end = arguments.system(system, body), exact(until)
+    about, end = arguments.system(system, body), physical(until, "until")
     if not end:
         raise InputError("until must not be 0; got 0.", "Give the time up to which digits are followed.")
     if about is GYROSTAT:

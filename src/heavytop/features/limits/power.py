@@ -21,7 +21,7 @@ from heavytop.display import Tabular, TitledTable
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.frames import Setup
 from heavytop.integrate.registry import control_name, named, propagator
-from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact, exact_text, real
+from heavytop.precision import DOUBLE, QUAD, Array, Precision, decimal_text, exact_text, physical, real
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -131,8 +131,8 @@ def power(
     motion = body, state, arguments.system(system, body)
     if motion[2] is GYROSTAT:
         raise InputError("power is not of the system gyrostat.", "Use heavy_gyrostat, with a rotor.")
-    end, most = exact(until), exact(tolerance)
-    apart = end / 100 if step is None else exact(step)
+    end, most = physical(until, "until"), physical(tolerance, "tolerance")
+    apart = end / 100 if step is None else physical(step, "step")
     if not (0 < apart <= end and most > 0):
         asked = f"until = {until}, step = {apart}, tolerance = {tolerance}"
         raise InputError(f"{asked}: these must be positive, and step at most until.", "Give such as 10, 0.1, 1e-6.")
@@ -142,7 +142,7 @@ def power(
     times = [apart * k for k in range(1, count + 1)]
     true, limit = _rows(motion, times), float(most)
     method = named(integrator)
-    options = {} if control is None else {control_name(method) or "tolerance": exact(control)}
+    options = {} if control is None else {control_name(method) or "tolerance": physical(control, "control")}
     error = float(_off(_states(motion, times, DOUBLE, method, options), _states(motion, times, QUAD)).max())
     faults, left_out = [], {}
     for name in _names(planted):

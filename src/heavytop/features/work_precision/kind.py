@@ -76,10 +76,10 @@ class Curve(msgspec.Struct, forbid_unknown_fields=True):
         if not self.tolerances and not self.steps:
             raise InputError(f"The list of points of {self.integrator} is empty.", "Give it tolerances, or steps.")
         for text in self.steps:
-            if text != FINEST and physical(exact(text), "step") <= 0:
+            if text != FINEST and physical(text, "step") <= 0:
                 raise InputError(f"A step of {text[:60]!r}.", "Give numbers above 0.")
         for text in self.tolerances:
-            if text != FINEST and not 0 < exact(text) <= 1:
+            if text != FINEST and not 0 < physical(text, "tolerance") <= 1:
                 raise InputError(f"A tolerance of {text[:60]!r}.", "Give numbers above 0, up to 1.")
             if self.integrator in (OURS, CONSTANTS, LANES) and text != FINEST:
                 usable_tolerance(text, parse(self.precision))

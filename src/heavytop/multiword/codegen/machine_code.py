@@ -455,21 +455,38 @@ class Code:
         values: Sequence[Operand],
     ) -> tuple[Operand, list[Operand]]:
         """:meth:`loop` up to the first i at which ``holds(values)`` does not, and that i."""
+
+        def going(index: Operand, *carried: Operand) -> Operand:
+            inside = index < stop
+            return inside & holds(list(carried)) if holds else inside
+
+        def following(index: Operand, *carried: Operand) -> list[Operand]:
+            new = body(index, list(carried)) or []
+            return [index + 1, *new]
+
+        index, *carried = self.as_long_as(going, following, [self.integer(start), *values])
+        return index, carried
+
+    def as_long_as(
+        self,
+        holds: Callable[..., Operand],
+        body: Callable[..., Sequence[Operand]],
+        values: Sequence[Operand],
+    ) -> list[Operand]:
+        """``values`` after ``values = body(*values)`` as long as ``holds(*values)``."""
         b = self.builder
         before, head = b.block, b.append_basic_block("head")
         b.branch(head)
         b.position_at_end(head)
-        index, carried = self.phi(INT), [self.phi(value.type) for value in values]
-        self.add_incoming([index, *carried], [start, *values], before)
+        carried = [self.phi(value.type) for value in values]
+        self.add_incoming(carried, values, before)
         inside, after = b.append_basic_block("body"), b.append_basic_block("after")
-        going = index < stop
-        b.cbranch(going & holds(carried) if holds else going, inside, after)
+        b.cbranch(holds(*carried), inside, after)
         b.position_at_end(inside)
-        self.add_incoming(carried, body(index, carried) or [])
-        self.add_incoming([index], [index + 1])
+        self.add_incoming(carried, body(*carried))
         b.branch(head)
         b.position_at_end(after)
-        return index, carried
+        return carried
 
     def either(
         self, condition: Operand, one: Callable[[], list[Operand]], other: Callable[[], list[Operand]]
@@ -531,22 +548,16 @@ class Stepping(ABC):
 
     def write(self) -> None:
         """The loop; the function gives the number of steps that stand."""
-        code, b = self.code, self.code.builder
-        head, body, out = (b.append_basic_block(name) for name in ("steps", "step", "out"))
-        entry = b.block
-        b.branch(head)
-        b.position_at_end(head)
-        taken = code.phi(INT)
-        code.add_incoming([taken], [0], entry)
-        running = self.count(self.status) == 0
-        wanted = (taken < self.most) & ~self.covered()
-        b.cbranch(running & wanted, body, out)
-        b.position_at_end(body)
-        good = self.write_step()
-        code.add_incoming([taken], [taken + good.extended()])
-        b.branch(head)
-        b.position_at_end(out)
-        b.ret(taken)
+
+        def wanted(taken: Operand) -> Operand:
+            running = self.count(self.status) == 0
+            return running & (taken < self.most) & ~self.covered()
+
+        def step(taken: Operand) -> list[Operand]:
+            return [taken + self.write_step().extended()]
+
+        taken = self.code.as_long_as(wanted, step, [self.code.integer(0)])[0]
+        self.code.builder.ret(taken)
 
 
 class Following(ABC):

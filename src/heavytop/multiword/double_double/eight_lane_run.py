@@ -132,25 +132,19 @@ class _Round:
 
     def write(self) -> None:
         """The loop of rounds."""
-        code, b = self.code, self.code.builder
-        head, body, out = (b.append_basic_block(name) for name in ("rounds", "round", "out"))
-        entry = b.block
-        b.branch(head)
-        b.position_at_end(head)
-        taken = code.phi(INT)
-        code.add_incoming([taken], [0], entry)
-        b.cbranch(taken < self.most, body, out)
-        b.position_at_end(body)
-        first = self.series.row(0)
-        for offset, table in ((0, 0), (ROW, LOW)):
-            for at in range(0, ROW, LANES):
-                code.store(code.load(self.state, offset + at), first, table + at)
-        splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
-        some = self._finish(peaks, splitting)
-        code.add_incoming([taken], [taken + 1])
-        b.cbranch(some, head, out)
-        b.position_at_end(out)
-        b.ret(taken)
+        code = self.code
+
+        def body(taken: Operand, _: Operand) -> list[Operand]:
+            first = self.series.row(0)
+            for offset, table in ((0, 0), (ROW, LOW)):
+                for at in range(0, ROW, LANES):
+                    code.store(code.load(self.state, offset + at), first, table + at)
+            splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
+            some = self._finish(peaks, splitting)
+            return [taken + some.extended(), some]
+
+        taken, _ = code.as_long_as(lambda taken, some: (taken < self.most) & some, body, [code.integer(0), code.true])
+        code.builder.ret(taken)
 
     def _norm(self, n: Operand) -> Operand:
         row, largest = self.series.row(n), self.code.zero

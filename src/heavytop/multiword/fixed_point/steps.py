@@ -21,7 +21,6 @@ from heavytop.multiword.codegen.machine_code import (
     INT_POINTER,
     INTEGERS,
     POINTER,
-    VECTOR,
     Code,
     Following,
     Machine,
@@ -123,38 +122,37 @@ class SeriesCode:
 
     def _orders(self, first: list[Operand]) -> tuple[Operand, Operand, Operand, list[Operand]]:
         """The loop over orders: their number, how many were small at the end, the largest word, the sum."""
-        code, b = self.code, self.code.builder
-        wide_before = self.rows.begin(first, code.zero)
-        entry = b.block
-        head, body, out = (b.append_basic_block(name) for name in ("orders", "order", "summed"))
-        b.branch(head)
-        b.position_at_end(head)
-        n, zeros, small = (code.phi(INT) for _ in range(3))
-        wide = code.phi(VECTOR)
-        y, total = ([code.phi(VECTOR) for _ in first] for _ in range(2))
-        floating = range(self.grid.words - 1, len(first), self.grid.words) if not self.grid.whole else ()
-        rest = {k: code.phi(VECTOR) for k in floating}
-        carried = [n, zeros, small, wide, *y, *total, *rest.values()]
-        begin = [code.integer(0)] * 3 + [wide_before, *first, *first, *(code.zero for _ in rest)]
-        code.add_incoming(carried, begin, entry)
-        b.cbranch((n < most_orders(self.grid)) & (small < 2), body, out)
-        b.position_at_end(body)
-        after = n + 1
-        status, wide_after = self._order(n, zeros, wide, y)
-        following, zeros_after, wide_after = self.rows.keep(after, status, zeros, wide_after)
-        size = self.rows.largest_sum(following)
-        counted = small + 1
-        small_after = code.select(size <= self.grid.smallest, counted, 0)
-        sums = [a + c for a, c in zip(total, following, strict=True)]
-        lost = []
-        for k, before in rest.items():
-            sums[k], error = code.two_sum(total[k], following[k])
-            lost.append(before + error)
-        values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
-        code.add_incoming(carried, values)
-        b.branch(head)
-        b.position_at_end(out)
-        return n, small, wide, [word + rest[k] if k in rest else word for k, word in enumerate(total)]
+        code, count = self.code, len(first)
+        floating = range(self.grid.words - 1, count, self.grid.words) if not self.grid.whole else ()
+        begin = [code.integer(0)] * 3 + [
+            self.rows.begin(first, code.zero),
+            *first,
+            *first,
+            *(code.zero for _ in floating),
+        ]
+
+        def wanted(n: Operand, zeros: Operand, small: Operand, *_: Operand) -> Operand:
+            return (n < most_orders(self.grid)) & (small < 2)
+
+        def body(n: Operand, zeros: Operand, small: Operand, wide: Operand, *vectors: Operand) -> list[Operand]:
+            y, total, rest = list(vectors[:count]), vectors[count : 2 * count], vectors[2 * count :]
+            after = n + 1
+            status, wide = self._order(n, zeros, wide, y)
+            following, zeros, wide = self.rows.keep(after, status, zeros, wide)
+            size = self.rows.largest_sum(following)
+            small = code.select(size <= self.grid.smallest, small + 1, 0)
+            sums = [a + c for a, c in zip(total, following, strict=True)]
+            lost = []
+            for k, before in zip(floating, rest, strict=True):
+                sums[k], error = code.two_sum(total[k], following[k])
+                lost.append(before + error)
+            return [after, zeros, small, wide, *following, *sums, *lost]
+
+        n, _, small, wide, *vectors = code.as_long_as(wanted, body, begin)
+        total = vectors[count : 2 * count]
+        for k, lost in zip(floating, vectors[2 * count :], strict=True):
+            total[k] = total[k] + lost
+        return n, small, wide, total
 
     def _order(self, n: Operand, zeros: Operand, wide: Operand, y: list[Operand]) -> tuple[list[Operand], Operand]:
         """y_(n+1) and the largest word over its limit."""
@@ -483,19 +481,15 @@ class _Follow(Following):
 
     def _while(self, start: Operand, stop: Operand, holds: Callable[[Operand], Operand]) -> Operand:
         """The first place from ``start`` on that ``holds`` does not, ``stop`` at the latest."""
-        code, b = self.code, self.code.builder
-        entry, head, body, out = b.block, *map(b.append_basic_block, ("while", "holds", "so_far"))
-        b.branch(head)
-        b.position_at_end(head)
-        index = code.phi(INT)
-        code.add_incoming([index], [start], entry)
-        b.cbranch(index < stop, body, out)
-        b.position_at_end(body)
-        condition, after = holds(index), index + 1
-        code.add_incoming([index], [after])
-        b.cbranch(condition, head, out)
-        b.position_at_end(out)
-        return index
+
+        def wanted(index: Operand, so_far: Operand) -> Operand:
+            return (index < stop) & so_far
+
+        def body(index: Operand, _: Operand) -> list[Operand]:
+            good = holds(index)
+            return [index + good.extended(), good]
+
+        return self.code.as_long_as(wanted, body, [start, self.code.true])[0]
 
     def _is_known(self, index: Operand) -> Operand:
         """Whether a time is in the last step and its words are exact, a bit; puts them.

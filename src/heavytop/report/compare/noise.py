@@ -21,7 +21,7 @@ from typing import Literal
 
 import msgspec
 
-from heavytop.errors import InputError, invalid, prefixed, why
+from heavytop.errors import InputError, invalid, why
 from heavytop.files import read_whole
 from heavytop.measure.scorer import SOLUTION_ERROR
 from heavytop.precision import exact, log10, physical
@@ -205,9 +205,7 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
 
 
 def _not_negative(name: str, value: str | float) -> None:
-    with prefixed(name):
-        number = exact(value)
-    if physical(number, name) < 0:
+    if physical(value, name) < 0:
         shown = f"{value:g}" if isinstance(value, float) else value
         raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
 

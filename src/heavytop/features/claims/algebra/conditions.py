@@ -13,7 +13,7 @@ from math import comb, prod
 import sympy
 from flint import arb, fmpq_mpoly
 
-from heavytop.features.claims.algebra.elliptic import wpinverse
+from heavytop.features.claims.algebra.elliptic import modulus, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.ring import Unprovable, used
@@ -119,6 +119,8 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
     elif function in _OF_PARAMETER:
         below, above = _OF_PARAMETER[function]
         m = arguments[-1]
+        if isinstance(m, sympy.exp) and not isinstance(modulus(m), modulus):
+            return frozenset()  # a nome, whose own m is between 0 and 1
         needs = {Need(below, m)} if below else set()
         needs.add(Need(above, 1 - m, f"{m} {'<' if above is ConditionKind.POSITIVE else '≤'} 1"))
         if function == "ellipticPi":

@@ -50,11 +50,15 @@ class Analytic(sympy.Function):  # type: ignore[misc]
         u, m = arguments[last], arguments[-1]
         if cls.parity and u.could_extract_minus_sign():
             return cls.parity * cls(*arguments[:last], -u, *arguments[last + 1 :])
-        if cls.parity and u == 0:
+        if cls.parity and u == 0 and not cls.__name__.startswith("wp"):
             return sympy.Integer(cls.parity > 0)
         inverse = _INVERSE.get(cls.__name__)
         if inverse == type(u).__name__ and u.args[1] == m:
             return u.args[0]
+        if cls is third and arguments[0] == 0:
+            return first(u, m)
+        if cls is am and m == 1:
+            return sympy.atan(sympy.sinh(u))
         return sympy.Integer(1) if m == 0 and cls is thetan else u if m == 0 and cls in _OF_ANGLE else None
 
 
@@ -64,9 +68,9 @@ def _made(name: str, nargs: int, parity: int = 0, moving: int = 1) -> Any:
 
 _OF_ANGLE = am, first, second = tuple(_made(name, 2, -1) for name in ("am", "ellipticF", "ellipticE"))
 third, thetan = _made("ellipticPi", 3, -1, 2), _made("thetan", 2, 1)
-wp, wpprime, wp3, wp3prime, wpinverse = (_made(n, 3) for n in ("wp", "wpprime", "wp3", "wp3prime", "wpinverse"))
+wp, wp3, wpinverse, wsigma3 = (_made(name, 3, 1) for name in ("wp", "wp3", "wpinverse", "wsigma3"))
+wpprime, wp3prime = (_made(name, 3, -1) for name in ("wpprime", "wp3prime"))
 wzeta, wsigma, wzeta3 = (_made(name, 3, -1) for name in ("wzeta", "wsigma", "wzeta3"))
-wsigma3 = _made("wsigma3", 3, 1)
 _INVERSE = {"am": "ellipticF", "ellipticF": "am"}
 
 

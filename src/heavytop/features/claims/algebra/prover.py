@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import sympy
-from flint import arb, fmpq_mpoly
+from flint import fmpq_mpoly
 
-from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.arcs import Arcs
 from heavytop.features.claims.algebra.conditions import (
     ConditionKind,
@@ -27,7 +26,7 @@ from heavytop.features.claims.algebra.conditions import (
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
-from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS
+from heavytop.features.claims.algebra.signs import NUMBER_BITS, PLUS, value_of
 from heavytop.features.claims.algebra.statement import Domain, Flow, Place, Setting, Statement
 from heavytop.features.claims.algebra.structure import sign_of
 from heavytop.precision import shown
@@ -220,15 +219,8 @@ class Region:
             balls = {index: evaluate(meaning, point, NUMBER_BITS) for index, meaning in meanings.items()}
         except (KeyError, Unprovable):
             return False
-        with working_precision(NUMBER_BITS):
-            total = arb(0)
-            for monomial, coefficient in p.to_dict().items():
-                term = arb(coefficient)
-                for index in balls:
-                    for _ in range(int(monomial[index])):
-                        term *= balls[index]
-                total += term
-            return bool(total.is_finite() and not total.contains(0))
+        value = value_of(p, balls)
+        return bool(value.is_finite() and not value.contains(0))
 
     # --- conditions -------------------------------------------------------------------------------------------------
 
@@ -410,7 +402,6 @@ _DIVISORS = "the algebra divides by nothing that is 0"
 _ALGEBRA = "the algebra can carry the formulas"
 _REMOVABLE = "removable: the formulas are continuous across it"
 _AT_THE_END = "proven inside the domain, removable in gamma at its end"
-Key = tuple[int | bool | str, ...]
 
 
 class Prover:
@@ -419,7 +410,7 @@ class Prover:
     def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
         self._statements = statements
         self._setting = setting
-        self._fields: dict[Key, Field | None] = {}
+        self._fields: dict[tuple[object, ...], Field | None] = {}
         self._regions: dict[int, Region] = {}
         self._conditions: dict[object, tuple[Condition, ...]] = {}
         self._places: dict[tuple[str, str], list[Place]] = {}
@@ -429,7 +420,7 @@ class Prover:
 
     def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
         """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
-        key: Key = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
+        key: tuple[object, ...] = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
         if key not in self._fields:
             alike = [
                 other
@@ -439,10 +430,9 @@ class Prover:
             parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
             self._fields[key] = self._make(alike, sign, strict, parts)
         if self._fields[key] is None:
-            alone: Key = (*key, as_text(statement.residual))
-            if alone not in self._fields:
-                self._fields[alone] = self._make([statement], sign, strict, [])
-            return self._fields[alone]
+            key = (*key, statement.residual)
+            if key not in self._fields:
+                self._fields[key] = self._make([statement], sign, strict, [])
         return self._fields[key]
 
     def _make(

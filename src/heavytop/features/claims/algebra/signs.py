@@ -5,7 +5,7 @@ Every rule here is a proof.  What no rule decides is unknown, and a condition th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -34,6 +34,19 @@ class Sign(NamedTuple):
 
 UNKNOWN = Sign(0, False)
 PLUS = Sign(1, True)
+
+
+def value_of(p: fmpq_mpoly, numbers: Mapping[int, arb]) -> arb:
+    """The ball of a polynomial at those of its generators."""
+    with working_precision(NUMBER_BITS):
+        total = arb(0)
+        for monomial, coefficient in p.to_dict().items():
+            term = arb(coefficient)
+            for index, power in enumerate(monomial):
+                for _ in range(int(power)):
+                    term *= numbers[index]
+            total += term
+        return total
 
 
 def sum_of(signs: Iterable[Sign]) -> Sign:
@@ -227,17 +240,7 @@ class Signs:
 
     def ball(self, p: fmpq_mpoly) -> arb | None:
         """The ball of a polynomial in numbers; None where another generator occurs."""
-        if not used(p) <= self.numbers.keys():
-            return None
-        with working_precision(NUMBER_BITS):
-            total = arb(0)
-            for monomial, coefficient in p.to_dict().items():
-                term = arb(coefficient)
-                for index, power in enumerate(monomial):
-                    for _ in range(int(power)):
-                        term *= self.numbers[index]
-                total += term
-            return total
+        return value_of(p, self.numbers) if used(p) <= self.numbers.keys() else None
 
     def _by_number(self, p: fmpq_mpoly) -> Sign:
         """A number other than a fraction: its ball."""

@@ -35,9 +35,10 @@ class Domain:
         return self.label == "t<=0" and not self.note
 
 
-_BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9))
-_AFTER = (Fraction(1, 2), Fraction(7, 5), Fraction(1, 9))
-ALL = Domain("all", 0, (*_BEFORE[:2], *_AFTER[:2]))
+# the last are beyond a quarter of a period, where another branch of an inverse function shows
+_BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9), Fraction(-17, 3))
+_AFTER = (Fraction(1, 2), Fraction(7, 5), Fraction(1, 9), Fraction(9, 2))
+ALL = Domain("all", 0, (*_BEFORE[:2], *_AFTER[:2], _AFTER[3], _BEFORE[3]))
 BEFORE = Domain("t<=0", -1, _BEFORE)
 AFTER = Domain("t>0", 1, _AFTER)
 

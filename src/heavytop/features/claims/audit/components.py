@@ -238,10 +238,8 @@ class UserComponent(UserIntegral):
         along = _put(self._square.needs, u, c)
         formulas = Formulas((c,), value.needs | along | self.context.needs)
 
-        def made(
-            equation: str, component: int, residual: sympy.Expr, text: str, extra: Formulas = formulas
-        ) -> Statement:
-            return Statement(equation, component, "smooth", domain, residual, text, extra)
+        def made(equation: str, index: int, residual: sympy.Expr, text: str, extra: Formulas = formulas) -> Statement:
+            return Statement(equation, index, "smooth", domain, residual, text, extra)
 
         first, second = _IN_TIME(c), _IN_TIME(_IN_TIME(c))
         equations = [
@@ -294,18 +292,12 @@ def _through(
     """
     if not all(e.is_polynomial(*STATE) for e in (q, *zeros, *parts)):
         return None
-    near = (
-        set()
-        .union(*(e.free_symbols for e in (q, *parts)))
-        .union(*(z.free_symbols for z in zeros if len(z.free_symbols & frozenset(STATE)) == 1))
-    )
-    zeros = [z for z in zeros if z.free_symbols & frozenset(STATE)]
-    close = [z for z in zeros if z.free_symbols & frozenset(STATE) <= near]
-    for chosen in (close, zeros) if len(close) < len(zeros) else (zeros,):
-        audits = _found(u, q, chosen, parts)
-        if audits is not None:
-            return audits
-    return None
+    held = {z: z.free_symbols & frozenset(STATE) for z in zeros}
+    near = set().union(*(e.free_symbols for e in (q, *parts)), *(x for x in held.values() if len(x) == 1))
+    zeros = [z for z in zeros if held[z]]
+    close = [z for z in zeros if held[z] <= near]
+    audits = (_found(u, q, chosen, parts) for chosen in ((close, zeros) if len(close) < len(zeros) else (zeros,)))
+    return next((audit for audit in audits if audit is not None), None)
 
 
 def _found(

@@ -306,7 +306,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     variables = tuple(variables)
     reserved = RESERVED.union(map(str, variables))
     for name in (*content.parameters, *content.definitions):
-        if name in reserved or (name in content.parameters and name in content.definitions):
+        if name in content.parameters and name in content.definitions:
+            raise InputError(f"The name {name!r} is a parameter and a definition.", "Rename one of them.")
+        if name in reserved:
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
     compared = inequalities(content.assume)
     above = compared[0]
