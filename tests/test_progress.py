@@ -122,6 +122,7 @@ def test_a_bar_says_rows_per_cent_and_time_left() -> None:
     bar = Bar(Estimator(4, 1.0, clock), 4, "rows", console)
     with bar:
         clock.now += 30
+        assert bar.said() == "0/4 rows"  # nothing is measured yet that tells how long
         bar.estimator.advance(1)
         bar.finished = 1
         bar.show("drift lagrange")

@@ -52,7 +52,7 @@ BODIES = {"generic-body": "10", "middle-axis": "10", "slow-lagrange": "10", "bru
 """Bodies and their horizons."""
 ON = {
     "generic-body": ("mujoco", "mjx", "pinocchio", "exudyn", "drake", "dart", "pybullet", "siconos"),
-    "middle-axis": ("mujoco", "pinocchio:RKMK4", "exudyn:RK44", "drake:RK3", "dart", "basilisk"),
+    "middle-axis": ("mujoco", "pinocchio:RKMK4", "exudyn:RK44", "drake:RK3", "dart", "basilisk", "siconos"),
     "slow-lagrange": ("mujoco", "pinocchio:RKMK4", "exudyn:generalized", "drake:RK3", "pybullet"),
     "bruels-cardona-arnold": ("mujoco", "exudyn:generalized"),
 }

@@ -28,7 +28,7 @@ class Kind(run.MeasuredKind, reported.ReportedKind):
 # What explains the states of a third-party integrator that are far off: a sign, a step too many, a row too late.
 
 
-_FAR = 1e-2
+FAR = 1e-2
 """Smaller errors, relative to max(1, |value|), are those of a method."""
 
 
@@ -41,7 +41,7 @@ def with_explanation(row: Row, task: Task, run: Trajectory, scorer: Scorer) -> R
         return row
     parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
     error = max((float(part) for part in parts if part.is_finite()), default=0.0)
-    if error <= _FAR:
+    if error <= FAR:
         return row
     explanations = (feature.load(feature.explain)(task.given, run, error) for feature in FEATURES if feature.explain)
     explained = next((explanation for explanation in explanations if explanation is not None), msgspec.UNSET)

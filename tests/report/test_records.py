@@ -13,7 +13,7 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.records import Against, Law, Metric, Quantity, Row, RowKey, Series, Subject, by_name, of_row
 from support.small_reports import row
 
 METRICS = [
@@ -105,6 +105,15 @@ def test_a_stored_row_is_written_as_it_was_read() -> None:
     rows = [line.rstrip(b",") for line in lines if line.startswith(b'{"case"')]
     assert len(rows) > 10
     assert [msgspec.json.encode(msgspec.json.decode(each, type=Row)) for each in rows] == rows
+
+
+def test_former_texts_of_a_row_are_read_as_those_of_now() -> None:
+    lost = Against("computed", "words of 106 and 138 bits", "1e-13", until="700")
+    now = msgspec.structs.replace(row(), reference=lost, against="", flags={"arithmetic": "integers"})
+    former = msgspec.json.encode(now).replace(b"all significant digits are lost from", b"no digit is left from")
+    former = former.replace(b'"integers"', b'"whole numbers"')
+    assert former != msgspec.json.encode(now)
+    assert of_row(msgspec.json.decode(former, type=Row)) == now
 
 
 def test_errors_smaller_than_any_float_have_an_order() -> None:

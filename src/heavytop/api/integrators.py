@@ -164,7 +164,8 @@ def _adapter(engine: str, folder: str) -> dict[str, str]:
     files = {name: texts[source] for name, source in own.items()}
     tables = tomllib.loads(files["engine.toml"])["integrator"]
     line = '    {{ integrator = "{name}", {setting}s = {points} }},'
-    curves = (line.format(**table, points=json.dumps(_POINTS[table["setting"]])) for table in tables)
+    points = (_POINTS["first order" if table.get("order") == 1 else table["setting"]] for table in tables)
+    curves = (line.format(**table, points=json.dumps(own)) for table, own in zip(tables, points, strict=True))
     runs = "\n".join(_DRIFT.format(name=table["name"]) for table in tables)
     words = {"ENGINE": engine, "LADDERS": "\n".join(curves), "DRIFTS": runs, "FIRST": tables[-1]["name"]}
     words["INSTALL"] = files["engine.toml"].partition(": ")[2].partition("\n")[0]
@@ -175,7 +176,11 @@ def _adapter(engine: str, folder: str) -> dict[str, str]:
     }
 
 
-_POINTS = {"step": ["1/50", "1/100", "1/200", "1/400"], "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"]}
+_POINTS = {
+    "step": ["1/50", "1/100", "1/200", "1/400"],
+    "first order": ["1/500", "1/1000", "1/2000", "1/4000"],  # from two digits on a mistake can be named
+    "tolerance": ["1e-4", "1e-6", "1e-8", "1e-10"],
+}
 _DRIFT = """
 [[measure]]
 kind = "drift"

@@ -154,7 +154,7 @@ def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vect
     """The top with short numbers, and what its n and k lack."""
     centre = tuple(round_to(value, bits) for value in top.centre)
     rotor = None if top.rotor is None else tuple(round_to(value, bits) for value in top.rotor)
-    short = HeavyTop(top.inertia, top.weight, centre, rotor=rotor)
+    short = HeavyTop(top.inertia, top.weight, centre, rotor, top.mass)
     missing = [
         tuple(a - b for a, b in zip(one or (Fraction(0),) * 3, other or (Fraction(0),) * 3, strict=True))
         for one, other in ((top.moment, short.moment), (top.rotor, short.rotor))

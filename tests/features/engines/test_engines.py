@@ -1,20 +1,25 @@
 """Adapters of engines of rigid bodies: what they are given, what `heavytop new --engine` writes, the real packages."""
 
 import tomllib
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import heavytop as ht
 from heavytop.api.integrators import engines, listing, new_integrator
 from heavytop.cases import case
 from heavytop.errors import InputError, Unsupported
+from heavytop.exact.resolved import resolve
 from heavytop.features.kinds import KINDS
+from heavytop.features.score.diagnose.readings import of_states, simulate
+from heavytop.features.score.explanation import explanation
 from heavytop.harness.plan import read
 from heavytop.integrate.peers.command import Command
-from heavytop.integrate.registry import commands_in, load
-from heavytop.integrate.trajectory import Problem
+from heavytop.integrate.registry import commands_in, ready
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE
 from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.inertia_slips import MassProperties
@@ -86,6 +91,42 @@ def test_the_mass_of_a_body_is_its_own_and_a_top_without_one_gets_a_light_body()
     assert body is not None
     assert body.mass * 9 <= Fraction(1, 4) / 64
     assert body.weight == 10**6
+
+
+GENERIC = next(task.given for task in read("engines", KINDS)[2] if task.given.name == "generic-body")
+
+
+def test_a_body_in_other_axes_keeps_its_mass() -> None:
+    lines = body_lines(GENERIC.top, GENERIC.start)
+    assert (lines["mass"], float(lines["gravity"][0])) == ([2], 9.81)
+
+
+FAULTS = {
+    "steiner": lambda data: replace(data, inertia=data.tensor),
+    "top": lambda data: replace(data, inertia=data.inertia * (1 + np.diag([0, 0.01, 0]))),
+}
+
+
+def faulty(fault: str) -> Trajectory:
+    """The run of an adapter with that fault, without an error of its own."""
+    times = [Fraction(k, 5) for k in range(1, 11)]
+    xi = resolve(GENERIC.body, GENERIC.given_start).xi
+    problem = Problem.of(GENERIC.top, GENERIC.start, DOUBLE, xi=xi)
+    seen = of_states(GENERIC.top, GENERIC.start, times, [[Fraction(1)] * 9], xi)
+    course = simulate(
+        FAULTS.get(fault, lambda data: data)(seen.body), seen.start.begin(seen.said, seen.body.tensor), times
+    )
+    rotation = course.rotation.transpose(0, 2, 1) if fault == "conjugate" else course.rotation
+    states = np.hstack([course.omega, rotation[:, 2], rotation[:, 0]])
+    return Trajectory(
+        problem, "engine", times, states, Outcome.SUCCESS, times[-1], 800, 4, {"run": 1.0}, {"step": "1/400"}
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["conjugate", *FAULTS])
+def test_a_fault_of_an_adapter_is_named_in_its_row(fault: str) -> None:
+    assert explanation(GENERIC, faulty(fault), 1.0).kind == fault
 
 
 @pytest.mark.parametrize(
@@ -189,6 +230,7 @@ def test_the_real_engine_keeps_the_motion(engine: str, tmp_path: Path) -> None:
     pytest.importorskip(PACKAGES[engine])
     top = case("lagrange").top
     for command in commands_in(ADAPTERS / f"{engine}.toml"):
-        run = load(command)(top, case("lagrange").start, [Fraction(1)], step=Fraction(1, 1000))
+        integrate = ready(command, ("step", Fraction(1, 1000)))
+        run = integrate(top, case("lagrange").start, [Fraction(1)], DOUBLE)
         known = ht.reference(top, case("lagrange").start, [1], digits=20).to_numpy()
         assert abs(run.states[-1] - known[-1]).max() < (0.05 if command.order == 1 else 1e-3)

@@ -191,7 +191,7 @@ def _conditions(report: Audit) -> list[Text]:
         if row.holds is not False:
             for c in row.conditions:
                 rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
-    lines = [Text("Conditions of the proofs:")] if rows else []
+    lines = [Text("Conditions of the proofs (domain: moments of inertia > 0, and `assume`):")] if rows else []
     for (discharged, text, reason), labels in sorted(rows.items()):
         state = Text(
             "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]

@@ -68,7 +68,8 @@ _CONVENTION_SENTENCES = {
     "up": "Another axis points up: up = {up}",
     "left_handed": "The axes are left-handed: the {axis} axis is reversed",
     "inertia_about": "The inertia tensor is that about the {about}",
-    "steiner": "The inertia tensor is the one that is given and {times} times its Steiner term, m (r² 1 − r rᵀ)",
+    "steiner": "The inertia tensor is the one that is given and {times} times its Steiner term, m (r² 1 − r rᵀ): one "
+    "about the fixed point was taken for one about the centre of mass, or the other way round",
     "weight": "The weight is {factor} times the one that is given",
     "mass": "The mass is {factor} times the one that is given, in the weight and in the Steiner term",
     "top": "{number} of the body is {factor} times the one that is given",

@@ -166,11 +166,12 @@ class WorkPrecision(Kind):
 
         sampled = integrate(task.times)
         scorer = _scored(task, problem, sampled)
-        metrics, error = _metrics(scorer, bool(sampled.times)), _error(scorer)
+        metrics, error, turned = _metrics(scorer, bool(sampled.times)), _error(scorer), None
         if sampled.joint_violation is not None:
             metrics[Quantity(JOINT_VIOLATION, statistic="max")] = of_fraction(exact(sampled.joint_violation))
         if task.options.attitude and task.integrator.carries_attitude:
-            metrics |= _of_attitude(task)
+            turned, more = _of_attitude(task)
+            metrics |= more
         if error is not None and not task.integrator.one_step:  # it may begin anew at each sample, and be off by less
             error = max(error, _error(_scored(task, problem, integrate(task.times[-1:]))) or error)
         seconds, alone = self._timed(task, integrate, sampled, error)
@@ -186,7 +187,7 @@ class WorkPrecision(Kind):
         row = msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
         if done and not task.integrator.own and (text := doubtful_counts(run, error)):
             return msgspec.structs.replace(row, explained=Explained("steps", text))
-        return with_explanation(row, task, run, scorer)
+        return with_explanation(row, task, turned or run, scorer)
 
     def _timed(
         self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None
@@ -303,12 +304,12 @@ def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
     return metrics
 
 
-def _of_attitude(task: Task) -> dict[Quantity, Metric]:
-    """The largest errors of attitude and position."""
-    _, scorer = run_with_attitude(task)
+def _of_attitude(task: Task) -> tuple[Trajectory, dict[Quantity, Metric]]:
+    """The run with ξ, and the largest errors of attitude and position."""
+    run, scorer = run_with_attitude(task)
     measured = ((metric.quantity, metric) for metric in scorer.metrics().values())
     names = (ATTITUDE_ERROR, POSITION_ERROR)
-    return {q: metric for q, metric in measured if q is not None and q.name in names and q.statistic == "max"}
+    return run, {q: metric for q, metric in measured if q is not None and q.name in names and q.statistic == "max"}
 
 
 def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:

@@ -21,7 +21,9 @@ class Engine:
         self.body.setFExtPtr(self.weight)
         self.model = kernel.NonSmoothDynamicalSystem(0, LONG)
         self.model.insertDynamicalSystem(self.body)
-        self.joint = joints.KneeJointR([0, 0, 0], True, self.body)
+        # KneeJointR asserts that its place fits to eps, which it does exactly without a rotation
+        upright = kernel.NewtonEulerDS(np.r_[self.centre, 1, 0, 0, 0], np.zeros(6), body.mass, body.inertia)
+        self.joint = joints.KneeJointR([0, 0, 0], True, upright)
         held = kernel.EqualityConditionNSL(self.joint.numberOfConstraints())
         self.model.link(kernel.Interaction(held, self.joint), self.body)
 

@@ -68,6 +68,8 @@ _FEWEST = 4
 """Samples to which the six numbers of a start, or one of the body, are fitted."""
 _SLIGHT = 1e-6
 """Of a number relative to its size, in a difference quotient."""
+_ROUND = 3
+"""Digits of a factor that no method's own error has by accident."""
 _START_DROP = 1e5
 """How far the error must fall for a start, whose six numbers may also carry the errors of first steps."""
 Move = Callable[[Any], tuple[BodyData, Beginning]]
@@ -96,6 +98,7 @@ class _Try:
 
     shift: the file's columns are those of t + shift; of Ω alone where ``rates``.  still: the columns of Ω are 0.
     mixed: a quantity, and the matrix by which the rows of its columns are to be multiplied.  begin: of the motion.
+    is_round: whether a number that was fitted is one of three digits.
     """
 
     kind: str
@@ -109,6 +112,11 @@ class _Try:
     still: bool = False
     mixed: tuple[str, Array] | None = None
     begin: Beginning | None = None
+    is_round: bool = False
+
+    def least_fall(self, likely: float) -> float:
+        """How far the error must fall; by less, ``likely`` or for a round number DROP, where it need only be likely."""
+        return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
 
 
 class _Courses:
@@ -239,10 +247,7 @@ class Suppositions:
         self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
     ) -> Diagnosis | None:
         largest = [(attempt, float(left[:looked].max())) for attempt, left in tried]
-        least = {DROP: drop or DROP}  # with a number that was fitted nothing is merely likely
-        explained = [
-            (attempt, left) for attempt, left in largest if left * least.get(attempt.drop, attempt.drop) <= own
-        ]
+        explained = [(attempt, left) for attempt, left in largest if left * attempt.least_fall(drop) <= own]
         if not explained:
             return None
         best = min(max(left, FLOOR) for _, left in explained)
@@ -340,7 +345,9 @@ def _data(suppositions: Suppositions) -> Iterator[_Try]:
         factor = named(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
         if notable(factor, Fraction(1)):
             body, _ = body_of(numpy.array([float(factor) - 1]))
-            yield _Try(kind, {**numbers, "factor": decimal_text(factor, 8)}, body=body, drop=FITTED_DROP)
+            is_round = Fraction(decimal_text(factor, _ROUND)) == factor and factor != 1
+            numbers = {**numbers, "factor": decimal_text(factor, 8)}
+            yield _Try(kind, numbers, body=body, drop=FITTED_DROP, is_round=is_round)
 
 
 def _start(suppositions: Suppositions) -> Iterator[_Try]:

@@ -12,7 +12,8 @@ import numpy
 
 from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
 from heavytop.measure.attitude_error import UPS, Convention
-from heavytop.top.attitude import matrix_of_quaternion, rows_of_euler
+from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -394,20 +395,39 @@ def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
 
 
 def of_states(
-    top: HeavyTop, start: State, times: Sequence[Fraction], states: Sequence[Sequence[Fraction | None]]
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Fraction],
+    states: Sequence[Sequence[Fraction | None]],
+    xi: Sequence[Fraction] | None = None,
 ) -> Seen | None:
-    """A file of Ω and γ in principal axes; None where no double holds its numbers."""
+    """A file in principal axes of Ω and γ, or with ξ of Ω and a quaternion; None where no double holds its numbers."""
     try:
         columns = numpy.array(states, dtype=float)
-        centre, rotor = (numpy.array([float(v) for v in part]) for part in (top.centre, top.rotor or (0, 0, 0)))
-        body = BodyData(numpy.diag([float(i) for i in top.inertia]), centre, None, float(top.weight), False, rotor)
-        omega, gamma = (numpy.array([float(v) for v in part]) for part in (start.omega, start.gamma))
+        omega, gamma, along = (floats(part or ()) for part in (start.omega, start.gamma, xi))
+        body = _data_of(top)
     except OverflowError:
         return None
     if not len(columns) or not numpy.isfinite(columns).all():
         return None
-    along = numpy.cross(gamma, numpy.eye(3)[int(numpy.abs(gamma).argmin())])
+    if xi is None:
+        along = numpy.cross(gamma, numpy.eye(3)[int(numpy.abs(gamma).argmin())])
     rows = numpy.array([along, numpy.cross(gamma, along), gamma])
     reading = GivenStart("rows", (rows / numpy.linalg.norm(rows, axis=1)[:, None]).reshape(-1), omega)
     split = {"omega": columns[:, :3], "gamma": columns[:, 3:6]}
-    return Seen(tuple(times), split, body, reading, Reading(), centre, numpy.zeros(3))
+    if xi is not None:
+        up, first = ([*columns[:, part].T] for part in (slice(3, 6), slice(6, 9)))
+        products: Array = numpy.array(quaternion_products(rows_of(up, first)))
+        largest = numpy.einsum("iin->ni", products).argmax(axis=1)
+        split = {"omega": columns[:, :3], "quaternion": products[largest, :, range(len(columns))]}
+    return Seen(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
+
+
+def _data_of(top: HeavyTop) -> BodyData:
+    """The body of a top; with a mass its tensor is about the centre of mass, as a program is given it."""
+    rotor = numpy.zeros(3) if top.rotor is None else floats(top.rotor)
+    body = None if top.mass is None else Body.realising(top)
+    if body is None:
+        return BodyData(numpy.diag(floats(top.inertia)), floats(top.centre), None, float(top.weight), False, rotor)
+    tensor = numpy.array([floats(row) for row in body.central])
+    return BodyData(tensor, floats(body.centre), float(body.mass), float(body.gravity), True, rotor)

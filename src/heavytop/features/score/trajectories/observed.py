@@ -84,7 +84,7 @@ def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
     # short numbers in place of long ones, which are not exact anyway
     centre = [round_to(value, bits) for value in top.centre]
     rotor = None if top.rotor is None else [round_to(value, bits) for value in top.rotor]
-    return HeavyTop(top.inertia, top.weight, centre, rotor=rotor), principal.axes
+    return HeavyTop(top.inertia, top.weight, centre, rotor, top.mass), principal.axes
 
 
 def system_of(body: AnyBody, named: System) -> System:
