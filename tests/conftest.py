@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import sys
 from collections.abc import Iterator
@@ -17,12 +18,30 @@ MISSING = [name for name in EXTRAS if not has_extra(name)]
 """Extras that are not installed."""
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Leaves files in their order for xdist, which else puts those of few and costly tests last."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_finish() -> None:
+    """Leaves all that is loaded by now to no garbage collection, which costs a seventh of the time else."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
+
+
 @pytest.fixture(autouse=True)
 def integrators_of_a_test_end_with_it() -> Iterator[None]:
     """Two tests may call theirs by one name."""
     loaded = set(sys.modules)
     yield
     forget_integrators(loaded)
+
+
+@pytest.fixture
+def undiagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scores without the search for what explains an error, which takes a second: where it is not the point."""
+    monkeypatch.setattr("heavytop.features.score.measurement.diagnose", lambda *_, **__: [])
 
 
 def _needed(error: BaseException | None) -> str:

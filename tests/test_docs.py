@@ -110,9 +110,10 @@ def to_run(page: Path) -> list[Block]:
 
 
 HERE = re.compile(
-    r"(?:\.venv/bin/)?heavytop (?:audit|claims|compare|docs|export|history|list|new|propagate|reference|score|show)\b"
+    r"(?:\.venv/bin/)?heavytop (?:audit|body|check-integrator|claims|compare|docs|export|figures|gate|history|list|new"
+    r"|power|propagate|reference|score|show)\b"
 )
-"""Commands that need no process of their own: they start none, and neither signals nor streams are their point."""
+"""Commands that need no process of their own: neither signals nor streams are their point, nor what is installed."""
 FOR_A_SHELL = re.compile(r"[|&;<>$`*?~{}()\\]")
 
 

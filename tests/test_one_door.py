@@ -337,8 +337,10 @@ def trajectory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", SCORED)
-def test_a_score_is_the_same_or_the_same_error(name: str, trajectory: Path) -> None:
+def test_a_score_is_the_same_or_the_same_error(name: str, trajectory: Path, request: pytest.FixtureRequest) -> None:
     words, options = SCORED[name]
+    if words:  # as it is, with its diagnosis
+        request.getfixturevalue("undiagnosed")
 
     def printed() -> Any:
         done = CliRunner().invoke(
@@ -361,6 +363,7 @@ def test_a_score_is_the_same_or_the_same_error(name: str, trajectory: Path) -> N
         assert arrays.digits_right == known[0]["digits_right"]
 
 
+@pytest.mark.usefixtures("undiagnosed")
 def test_the_report_and_the_page_of_a_score_are_the_same(trajectory: Path, tmp_path: Path) -> None:
     words = ["score", str(trajectory), "--out", str(tmp_path / "new"), "--html", str(tmp_path / "page.html")]
     CliRunner().invoke(app, words, catch_exceptions=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,6 +32,7 @@ def room(module: str) -> str:
     return _OF_FILES.get(".".join(module.split(".")[:2]), _OF_FILES.get(head, head if head in ROOMS else "ground"))
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """The modules of heavytop that a file imports, anywhere and for types too, by their names behind ``heavytop.``."""
     modules: set[str] = set()

@@ -42,8 +42,11 @@ def motion_of(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize("time", [Fraction(7, 3), Fraction(-1)])
+@pytest.mark.parametrize(
+    ("name", "time"),
+    [(name, Fraction(-1) if place % 2 else Fraction(7, 3)) for place, name in enumerate(MOTIONS)]
+    + [("generic", Fraction(-1))],
+)
 def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
     motion = motion_of(name)
     for law, values in laws(motion, time, of(motion, time, data=True)).items():
@@ -64,15 +67,15 @@ def test_central_differences_of_references_are_inside(name):
                     assert holds([row[column] - value])
 
 
-@pytest.mark.parametrize("size", [1, Fraction(10) ** 100, Fraction(1, 10**100)])
 @pytest.mark.parametrize(
-    ("name", "computed"),
+    ("name", "computed", "size"),
     [
-        ("generic", (1, 2, 4, 5)),
-        ("euler", (1, 2, 3, 4, 5)),
-        ("hanging", (1, 2, 3, 4)),
-        ("gyrostat", (1, 2, 3, 4, 5)),
-        ("heavy gyrostat", (0, 1, 2, 4, 5)),
+        ("generic", (1, 2, 4, 5), 1),
+        ("generic", (1, 2, 4, 5), Fraction(1, 10**100)),
+        ("euler", (1, 2, 3, 4, 5), Fraction(10) ** 100),
+        ("hanging", (1, 2, 3, 4), Fraction(10) ** 100),
+        ("gyrostat", (1, 2, 3, 4, 5), Fraction(1, 10**100)),
+        ("heavy gyrostat", (0, 1, 2, 4, 5), Fraction(1, 10**100)),
     ],
 )
 def test_columns_that_follow_from_others_are_those_that_are_computed(monkeypatch, name, computed, size):
@@ -197,8 +200,8 @@ def test_balls_of_few_digits_hold_those_of_many():
 @pytest.mark.parametrize(
     ("size", "precision", "of_motion"),
     [
-        *((2.0**20, bits, bits) for bits in (256, 270)),
-        *((2.0**90, bits, bits) for bits in (256, 270)),
+        (2.0**20, 256, 256),
+        (2.0**90, 270, 270),
         *((2.0**20, bits, 440) for bits in (184, 192)),
         (2.0**-120, 184, 440),
         (2.0**100, 270, 184),

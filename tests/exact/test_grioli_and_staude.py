@@ -12,7 +12,7 @@ from heavytop.exact.catalogue import find
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import grioli_motion, staude_motion
-from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 
 def random_grioli(rng):
@@ -31,13 +31,11 @@ def test_every_grioli_precession_solves_all_six_equations(seed):
     assert_solves(motion, rational(rng, size=30))
 
 
-@pytest.mark.slow
 def test_a_grioli_top_is_asymmetric_and_its_attitude_turns_with_it():
     motion = grioli_motion(Fraction(1, 3), Fraction(1, 4), Fraction(2, 7), Fraction(3, 2))
     assert len(set(motion.top.inertia)) == 3
     assert_attitude(motion, Fraction(5, 3))
     assert_narrow(motion, Fraction(10**9))
-    assert_agrees(motion, Fraction(2))
 
 
 def test_grioli_takes_any_length_of_gamma():

@@ -9,7 +9,7 @@ from flint import arb
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 TINY = Fraction(1, 10**30)
 
@@ -74,11 +74,6 @@ def test_fifty_digits_come_out_at_any_time(rate, time):
     for value in motion.state(Fraction(time), 200):
         assert value.rad() < arb("1e-50")
     assert_solves(motion, Fraction(time))
-
-
-@pytest.mark.slow
-def test_the_independent_integration_agrees_to_fifty_digits():
-    assert_agrees(pendulum(1, Fraction(1, 2), (Fraction(3, 5), Fraction(-4, 5)), (1, Fraction(1, 3))), Fraction(3))
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def in_other_units(top, start, rate, size):
 @pytest.mark.parametrize(("name", "top", "start", "system"), MOTIONS, ids=[m[0] for m in MOTIONS])
 def test_other_units_give_the_same_motion(name, top, start, system):
     known = find(top, start, system).state(TIME, BITS + 16)
-    for decades in (-1000, -100, 30, 300):
+    for decades in (-1000, 30, 300):
         rate, size = Fraction(10) ** decades, Fraction(10) ** random.Random(decades).choice(DECADES)
         other = find(*in_other_units(top, start, rate, size), system)
         begun = process_time()
@@ -111,7 +111,7 @@ def times(a, b):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_numbers_of_very_different_size_are_answered(seed):
     for top, start, system in mixed(random.Random(seed)):
         begun = process_time()

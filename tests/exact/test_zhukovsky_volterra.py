@@ -3,7 +3,6 @@
 import random
 from fractions import Fraction
 
-import mpmath
 import pytest
 
 import heavytop as ht
@@ -49,28 +48,6 @@ def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)
     assert_exact(motion, seed, attitude=True)
     assert_enclosed(motion, HEAVY_GYROSTAT)
-
-
-@pytest.mark.slow
-def test_an_integration_that_knows_nothing_of_it_agrees():
-    def cross(a, b):
-        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-    with mpmath.workdps(30):
-        inertia, rotor = (3, 2, 1), (mpmath.mpf(1) / 2, -mpmath.mpf(1) / 3, mpmath.mpf(3) / 4)
-
-        def field(_time, y):
-            momentum = [i * w + k for i, w, k in zip(inertia, y[:3], rotor, strict=True)]
-            rates = [m / i for m, i in zip(cross(momentum, y[:3]), inertia, strict=True)]
-            return [*rates, *cross(y[3:], y[:3])]
-
-        found = mpmath.odefun(
-            field, 0, [mpmath.mpf(v.numerator) / v.denominator for v in START.flat], tol=mpmath.mpf(10) ** -25
-        )(3)
-        known = ht.reference(TOP, START, [3], 30)
-        assert "Zhukovsky" in known.method
-        for value, ball in zip(found, known.states[0], strict=True):
-            assert abs(value - mpmath.mpf(ball.value)) < mpmath.mpf(10) ** -22
 
 
 @pytest.mark.parametrize("axes", ALL)

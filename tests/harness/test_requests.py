@@ -130,10 +130,13 @@ def base(kind: str) -> Report:
 
 @pytest.fixture(autouse=True)
 def _no_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hunt that finds nothing and takes no time: its request is what is looked at."""
+    """A hunt that finds nothing and audits of one equation: the request is what is looked at."""
+    from heavytop.features.claims.audit import judge as audits
     from heavytop.features.hunt import kind as hunt
     from heavytop.features.hunt.search import Hunted
 
+    judge = audits.judge
+    monkeypatch.setattr(audits, "judge", lambda statements, setting: judge(statements[:1], setting))
     monkeypatch.setattr(hunt, "kept", lambda path: [])
     monkeypatch.setattr(hunt, "hunt", lambda asked: Hunted(asked, (), (), 1, 1, 1.0, 1e-15, 0, 0))
 

@@ -43,7 +43,7 @@ PLAN = plan_of(
 
 @pytest.fixture(scope="module")
 def reports() -> list[Report]:
-    return [Report(SCHEMA, {"name": "tiny"}, {}, [measure(t) for t in expand(PLAN, seed)]) for seed in range(3)]
+    return [Report(SCHEMA, {"name": "tiny"}, {}, [measure(t) for t in expand(PLAN, seed)]) for seed in range(2)]
 
 
 def test_every_error_and_break_away_has_a_band(reports: list[Report]) -> None:
@@ -56,15 +56,14 @@ def test_every_error_and_break_away_has_a_band(reports: list[Report]) -> None:
 
 
 def test_other_seeds_are_other_numbers_and_the_same_verdict(reports: list[Report]) -> None:
-    for other in reports[1:]:
-        result = compare(reports[0], other, Policy())
-        assert result.verdict == "same"
-        assert all(a.metrics != b.metrics for a, b in zip(reports[0].rows, other.rows, strict=True))
+    one, other = reports
+    assert compare(one, other, Policy()).verdict == "same"
+    assert all(a.metrics != b.metrics for a, b in zip(one.rows, other.rows, strict=True))
 
 
 def test_the_same_seed_is_the_same_row(reports: list[Report]) -> None:
-    again = measure(expand(PLAN, 2)[-1])
-    assert again.metrics == reports[2].rows[-1].metrics
+    again = measure(expand(PLAN, 1)[-1])
+    assert again.metrics == reports[1].rows[-1].metrics
 
 
 UNBANDED = plan_of(
@@ -91,13 +90,12 @@ UNBANDED = plan_of(
 
 
 def test_rows_without_a_band_are_the_same_with_other_roundings_too() -> None:
-    made = [Report(SCHEMA, {"name": "unbanded"}, {}, [measure(t) for t in expand(UNBANDED, s)]) for s in range(3)]
+    made = [Report(SCHEMA, {"name": "unbanded"}, {}, [measure(t) for t in expand(UNBANDED, s)]) for s in range(2)]
     assert all(metric.band is None for row in made[0].rows for metric in row.metrics.values())
-    for other in made[1:]:
-        assert compare(made[0], other, Policy()).verdict == "same"
-        for one, two in zip(made[0].rows, other.rows, strict=True):
-            # the formulas of a claim are evaluated from its own data: no rounding of theirs changes
-            assert (one.metrics == two.metrics) == (one.measure == "claim_evaluation")
+    assert compare(*made, Policy()).verdict == "same"
+    for one, two in zip(*(report.rows for report in made), strict=True):
+        # the formulas of a claim are evaluated from its own data: no rounding of theirs changes
+        assert (one.metrics == two.metrics) == (one.measure == "claim_evaluation")
 
 
 def planted(row: Row, factor: int) -> Row:
@@ -118,11 +116,11 @@ def planted(row: Row, factor: int) -> Row:
 
 
 def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Report]) -> None:
-    for other in reports[1:]:
-        bad = replace(other, rows=[planted(row, 1000) for row in other.rows])
-        result = compare(reports[0], bad, Policy())
-        worse = {finding.row for finding in result.findings if finding.verdict is Verdict.WORSE}
-        assert worse == {row.identity for row in other.rows}
+    one, other = reports
+    bad = replace(other, rows=[planted(row, 1000) for row in other.rows])
+    result = compare(one, bad, Policy())
+    worse = {finding.row for finding in result.findings if finding.verdict is Verdict.WORSE}
+    assert worse == {row.identity for row in other.rows}
 
 
 def test_a_run_that_failed_has_no_bands(monkeypatch: pytest.MonkeyPatch) -> None:

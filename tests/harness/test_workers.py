@@ -144,7 +144,6 @@ def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(t
     assert measured(tasks, 2, after_first=lambda: kill(active_children()[0].pid)) == expected
 
 
-@pytest.mark.usefixtures("short")
 def test_a_task_that_kills_its_worker_every_time_is_named_and_the_others_are_measured(tasks) -> None:
     found = []
     with pytest.raises(HeavyTopError, match="died 3 times during drift poison"):
@@ -277,9 +276,9 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
     ]
     theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
     before = worker_pids()
-    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
+    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=6.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
-    assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s, in pendulum"
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 6 s, in pendulum"
     assert "mine.py:dies ended its process 3 times, with exit code 3, in pendulum" in found[2].against
     assert worker_pids() == before
     assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout

@@ -161,7 +161,7 @@ def test_every_format_is_right_to_its_rounding_with_the_attitude_and_without(nam
         pytest.skip(f"{form} is not available")
     problem = Problem.of(CASE.top, CASE.start, precision, HEAVY_GYROSTAT, XI)
     known = Validated(problem.top, problem.start, HEAVY_GYROSTAT, xi=problem.xi)
-    for time in (F(1), F(-3, 4)):
+    for time in (F(1), F(-3, 4)) if form in ("double", "double-double") else (F(-3, 4),):
         truth = [_fraction(ball.mid()) for ball in known.state(time, precision.bits + 32)]
         truth += [_fraction(ball.mid()) for ball in known.attitude(time, precision.bits + 32)]
         for xi in (None, XI) if form in ("double", "real:400", "quad") else (None,):

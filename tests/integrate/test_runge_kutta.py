@@ -17,7 +17,7 @@ KUTTA = Tableau(3, ((F(1, 2),), (-1, 2)), (F(1, 6), F(2, 3), F(1, 6)))
 CLASSICAL = Tableau(4, ((F(1, 2),), (0, F(1, 2)), (0, 0, 1)), (F(1, 6), F(1, 3), F(1, 3), F(1, 6)))
 THREE_EIGHTHS = Tableau(4, ((F(1, 3),), (F(-1, 3), 1), (1, -1, 1)), (F(1, 8), F(3, 8), F(3, 8), F(1, 8)))
 METHODS = [EULER, MIDPOINT, KUTTA, CLASSICAL, THREE_EIGHTHS]
-LAST = F(2)
+LAST = F(1)
 
 
 def error(method: Tableau, name: str, step: Fraction) -> float:
@@ -29,8 +29,7 @@ def error(method: Tableau, name: str, step: Fraction) -> float:
     return float(abs(run.to_numpy() - known).max())
 
 
-@pytest.mark.parametrize("name", ["generic", "gyrostat"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("method", "name"), [*((method, "generic") for method in METHODS), (CLASSICAL, "gyrostat")])
 def test_the_error_shrinks_by_the_order(method: Tableau, name: str) -> None:
     coarse, fine = (error(method, name, F(1, n)) for n in (64, 128))
     assert method.order - 0.3 < np.log2(coarse / fine) < method.order + 0.7

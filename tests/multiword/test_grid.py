@@ -95,7 +95,7 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
     """
     machine, random = product_code(grid), Random(f"{grid.words} {kind}")
     caught = 0
-    for _ in range(40):
+    for _ in range(15):
         count = random.randint(1, 60)
         bound = Fraction(1) if grid.bits == 51 else Fraction(1, 2)
         rows = [doubles(8 * grid.words * count) for _ in range(2)]
@@ -126,11 +126,11 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
                 known += a * b
             total = exact(sums[lane::8]) - sum(Fraction(grid.centre(k)) for k in range(grid.words))
             assert abs(total - known) * 2**grid.total <= count * (grid.words + 1)
-    assert caught < 40 or grid.bits == 51 or kind == "largest"
+    assert caught < 15 or grid.bits == 51 or kind == "largest"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("words", "count"), [(3, 40), (6, 40), (12, 10)])
+@pytest.mark.parametrize(("words", "count"), [(3, 20), (6, 20), (12, 5)])
 def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: int) -> None:
     random, grid, span = Random(words), grid_of(words), Fraction(HORIZON)
     for _ in range(count):

@@ -42,11 +42,11 @@ FLAGS = [
 TEXT, LARGE_TEXT, DRAWING = 4.5, 3.0, 3.0
 """Contrast that WCAG 2.2 AA asks for."""
 PAGES = ("report", "results", "comparison")
-BUILT_IN = ("growth", "long", "peers", "smoke", "gate")
+BUILT_IN = ("growth", "long", "peers", "gate")
 """Plans whose pages are looked at beside that of the default plan."""
 ALL = (*PAGES, *BUILT_IN, "score", "history")
 RESULTS = Path(__file__).parents[2] / "results"
-VIEWS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
+WIDTHS = (1280, 390)
 
 
 _LOADED = "return document.readyState === 'complete'"
@@ -107,9 +107,11 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     candidate.rows[5].metrics["solution_error_relative_max"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
     read = {name: store.read(RESULTS / name) for name in ("default", "growth", "long", "peers")}
+    read["peers"] = few(read["peers"])
+    read |= {"gate": gate(read["default"], read["growth"], read["peers"])}
+    for name, each in (("default", 2), ("growth", 2), ("long", 3)):
+        read[name] = replace(read[name], rows=read[name].rows[::each])
     html.write_report(read["default"], folder / "results.html")
-    read |= {"peers": few(read["peers"]), "long": replace(read["long"], rows=read["long"].rows[::3])}
-    read |= {"smoke": smoke(read["default"]), "gate": gate(read["default"], read["growth"], read["peers"])}
     for name in BUILT_IN:
         html.write_report(read[name], folder / f"{name}.html")
     (folder / "score.html").write_text(html.report_page(score_report(scored(), {"commit": "0" * 40})), "utf-8")
@@ -127,13 +129,6 @@ def few(peers: Report) -> Report:
     """Of plan peers one case of each picture, for 334 rows take the browser long."""
     cases = ("lagrange/T=1000", "lagrange/T=10000", "lagrange/T=5")
     return replace(peers, rows=[each for each in peers.rows if each.case in cases])
-
-
-def smoke(default: Report) -> Report:
-    """What plan smoke has of the kinds of plan default, in one format and one direction; the drift of two cases."""
-    rows = [each for each in default.rows if each.precision in ("double", "exact") and "backward" not in each.case]
-    rows = [each for each in rows if each.key.kind != "drift" or each.key.case in ("generic", "gyrostat")]
-    return replace(default, plan={"name": "smoke"}, rows=rows)
 
 
 def gate(default: Report, growth: Report, peers: Report) -> Report:
@@ -205,12 +200,12 @@ return bad;
 def test_nothing_overflows_is_clipped_overlaps_errs_or_is_loaded(
     browser: Browser, pages: dict[str, Path], page: str
 ) -> None:
-    browser.open(pages[page], *VIEWS[0])
-    for view in VIEWS:
-        browser.look(*view)
-        assert browser.ask(OVERLAPPING) == [], view
-        assert browser.ask(OVERFLOW)[2] == [], view
-    for width in (1280, 390):
+    browser.open(pages[page], WIDTHS[0], "light")
+    for width in WIDTHS:
+        browser.look(width, "light")
+        assert browser.ask(OVERLAPPING) == [], width
+        assert browser.ask(OVERFLOW)[2] == [], width
+    for width in WIDTHS:
         browser.look(width, "light")
         needed, there, wide = browser.ask(UNFOLD + OVERFLOW)
         assert needed <= there, (width, wide)

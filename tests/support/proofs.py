@@ -1,11 +1,10 @@
-"""What proves a closed form: its series in the equations, its start, and an integration that knows nothing of it."""
+"""What proves a closed form: its series in the equations, its start, and the enclosure, which mpmath judges."""
 
 from __future__ import annotations
 
 import random
 from fractions import Fraction
 
-import mpmath
 from flint import arb
 
 from heavytop.exact.catalogue import state_and_attitude
@@ -76,26 +75,6 @@ def assert_meets(solution, times, bits=170):
         with working_precision(2 * bits):
             assert all(a.overlaps(b) for a, b in pairs)
             assert max(abs(a - b).upper() for a, b in pairs) < arb("1e-40")
-
-
-def integrated(solution, time, digits=55):
-    """The state by mpmath's Taylor integrator, from the equations alone."""
-    exact = solution.system.parameters(solution.top, solution.start)
-    with mpmath.workdps(digits + 5):
-        number = lambda x: mpmath.mpf(x.numerator) / x.denominator  # noqa: E731
-        p = Parameters(
-            [number(i) for i in exact.inertia], [number(n) for n in exact.moment], number(Fraction(exact.rotor))
-        )
-        start = [number(value) for value in solution.start.flat]
-        flow = mpmath.odefun(lambda _t, y: list(solution.system.field(p, y)), 0, start)
-        return flow(number(time))
-
-
-def assert_agrees(solution, time, digits=50):
-    """The closed form and the integration agree to that many digits."""
-    with mpmath.workdps(digits + 10):
-        for value, other in zip(solution.state(time, 200), integrated(solution, time), strict=True):
-            assert abs(mpmath.mpf(value.str(60, radius=False)) - other) < mpmath.mpf(10) ** -digits * (1 + abs(other))
 
 
 def assert_narrow(solution, time, digits=50):

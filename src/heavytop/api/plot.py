@@ -37,6 +37,7 @@ from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
 from heavytop.report.document.svg import COLOURS, decades, new_figure
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, component
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.stability import stability as steady_motion
@@ -550,11 +551,11 @@ def _logarithmic(axes: Axes, times: NDArray[np.float64], curves: dict[str, Logs]
     axes.legend(frameon=False, fontsize="small")
 
 
-def stability(top: HeavyTop, axes: Axes3D | None = None, *, speed: float = 1.0) -> Axes3D:
+def stability(top: HeavyTop | Body, axes: Axes3D | None = None, *, speed: float = 1.0) -> Axes3D:
     """Rotation about each principal axis on the unit sphere of the body: stable or unstable, with the rate.
 
     Arguments:
-        top: its principal moments; the axis is vertical where the top has a weight.
+        top: its principal axes at the fixed point; the axis is vertical where the top has a weight.
         axes: three-dimensional axes, or None.
         speed: Ω, 1/time unit.
 
@@ -564,7 +565,8 @@ def stability(top: HeavyTop, axes: Axes3D | None = None, *, speed: float = 1.0) 
     Raises:
         InputError: for an invalid top.
     """
-    body, drawn = arguments.is_a(top, HeavyTop, "top"), _solid(axes)
+    body = top.top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
+    drawn = _solid(axes)
     system = HEAVY_GYROSTAT if body.rotor else HEAVY_TOP
     _globe(drawn)
     for axis in range(3):
@@ -606,17 +608,18 @@ def power(test: PowerCurves, axes: Axes | None = None) -> Axes:
     return drawn
 
 
-def between(samples: Sequence[SpacedErrors], axes: Axes | None = None) -> Axes:
+def between(samples: SpacedErrors | Sequence[SpacedErrors], axes: Axes | None = None) -> Axes:
     """The error of each interpolation over the time between samples.
 
     Arguments:
-        samples: what :func:`heavytop.between_samples` returns, of several spacings.
+        samples: what :func:`heavytop.between_samples` returns, of one spacing or of several.
         axes: of matplotlib, or None.
 
     Returns:
         The axes, both logarithmic.
     """
-    drawn, rows = _flat(axes), sorted(samples, key=lambda row: row.spacing)
+    several = samples if isinstance(samples, Sequence) else [samples]
+    drawn, rows = _flat(axes), sorted(several, key=lambda row: row.spacing)
     for colour, name in zip(COLOURS, rows[0].errors if rows else (), strict=False):
         points = [(float(row.spacing), error) for row in rows if (error := row.errors[name])]
         if points:

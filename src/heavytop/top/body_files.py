@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 _BITS = 64
 _UTF8_MARK = b"\xef\xbb\xbf"
 _LARGEST_FILE = 50_000_000
+_LARGEST = Fraction(10**30)
 _MOST_SLACK = Fraction(1, 200)
 _FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
@@ -86,6 +87,10 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
     body = chosen[0][1]()
     if body.mass <= 0:
         raise InputError(f"{body.name}: mass must be positive; got {body.mass}.", "Give its mass in kg.")
+    largest = max(map(abs, body.six))
+    extremes = max(body.mass, largest, *map(abs, body.centre)), min(body.mass, largest or body.mass)
+    if extremes[0] > _LARGEST or extremes[1] < 1 / _LARGEST:
+        raise InputError(f"{body.name}: mass, centre and moments must be of 1e-30 to 1e30.", "Give them in kg and m.")
     return body
 
 

@@ -155,7 +155,7 @@ def mending(body: MassProperties) -> str:
         if None in slip.inertia or slip.inertia == body.six:
             return slip.sentence
         numbers = ", ".join(decimal_text(value, 6) for value in slip.inertia if value is not None)
-        return f"{slip.sentence} Mended: inertia = [{numbers}]."
+        return f"{slip.sentence} Corrected: inertia = [{numbers}]."
     return ""
 
 

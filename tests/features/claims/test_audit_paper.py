@@ -14,7 +14,7 @@ from heavytop.features.claims.audit.audit import audit, only_branch
 from heavytop.features.claims.audit.judge import Audit, StatementVerdict, judge
 from heavytop.features.claims.library import ershkov, ershkov_general
 from heavytop.features.claims.library.ershkov_audit import GeneralClaim, PartialClaim
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 
 
 @cache
@@ -69,12 +69,16 @@ def test_arctan_of_4_5_loses_the_quadrant_after_0():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ershkov-partial", "ershkov-general"])
-def test_everything_holds_on_the_smooth_branch_of_the_gyrostat(name):
-    smooth = only_branch(report(name, "gyrostat"), "smooth")
+def test_everything_holds_on_the_smooth_branch_of_the_gyrostat():
+    smooth = only_branch(report("ershkov-partial", "gyrostat"), "smooth")
     assert smooth.verdict == "holds"
     assert smooth.exit_code == 0
-    assert {row.equation for row in smooth.rows} >= {"1.1", "1.2", "1.3", "3.1"}
+    # the general case takes long: its smooth branch alone is audited
+    claim = GeneralClaim()
+    general = judge([each for each in claim.statements(GYROSTAT) if each.branch == "smooth"], claim.setting)
+    assert all(row.holds for row in general)
+    for rows_of in (smooth.rows, general):
+        assert {row.equation for row in rows_of} >= {"1.1", "1.2", "1.3", "3.1"}
 
 
 @pytest.mark.slow

@@ -98,7 +98,7 @@ def test_whatever_a_file_holds_its_audit_ends_in_time_with_a_verdict_or_a_reason
     path, began = tmp_path / "claim.toml", time.monotonic()
     path.write_text(text)
     with suppress(InputError):
-        assert guard.in_time(str(path), "heavy_top", seconds=2).verdict in ("undecided", "refuted")
+        assert guard.in_time(str(path), "heavy_top", seconds=1).verdict in ("undecided", "refuted")
     assert time.monotonic() - began < 2 * guard._WALL + 1
 
 

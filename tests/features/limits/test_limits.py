@@ -126,6 +126,9 @@ def test_pictures_show_each_fault_each_method_and_each_axis() -> None:
     assert len(ht.plot.power(test).lines) == len(test.faults) + 1
     samples = [ht.between_samples(*FLIP, 1, spacing) for spacing in ("1/10", "1/20")]
     assert {line.get_label() for line in ht.plot.between(samples).lines} == {"slerp", "linear", "hermite", "lagrange"}
-    words = [text.get_text() for text in ht.plot.stability(ht.HeavyTop((1, 2, 3), 0, (0, 0, 0))).texts]
-    assert len(words) == 6
-    assert [word for word in words if "unstable" in word] == ["2: unstable 0.577", "−2: unstable 0.577"]
+    assert len(ht.plot.between(samples[0]).lines) == 4
+    tensor = ("1.72", "2.28", 2, "0.96", 0, 0)  # moments 1, 2, 3 in turned axes
+    for body in (ht.HeavyTop((1, 2, 3), 0, (0, 0, 0)), ht.Body(1, 0, (0, 0, 0), tensor)):
+        words = [text.get_text() for text in ht.plot.stability(body).texts]
+        assert len(words) == 6
+        assert sum(word.endswith(": unstable 0.577") for word in words) == 2

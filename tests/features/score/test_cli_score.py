@@ -54,6 +54,7 @@ def across(i: int, state: list) -> list:
     return [*state[:2], state[2] + 2e-9, *state[3:]]
 
 
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.slow
 def test_the_first_lines_say_how_good_it_is() -> None:
     found = assess(given(spoilt=across))
@@ -67,6 +68,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
     assert found.peer.digits_right == assess(given()).digits_right
 
 
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["double-double", "real:600"])
 def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,6 +120,7 @@ def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> 
     assert "Digits right over time" in text
 
 
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.slow
 def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     found = assess(given(spoilt=across))
@@ -157,6 +160,7 @@ def test_the_page_of_score_and_that_of_its_report_are_the_same(spoilt, tmp_path:
     assert "heavytop report, plan score" in pages[1].read_text("utf-8")
 
 
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("require", "spoilt", "more", "code", "said"),
@@ -188,6 +192,7 @@ def test_a_number_of_digits_that_is_none_is_refused(require: str, tmp_path: Path
         ht.score(TIMES, given().states, top=CASE.top, start=CASE.start, require=require)
 
 
+@pytest.mark.usefixtures("undiagnosed")
 @pytest.mark.slow
 def test_digits_that_nobody_knows_do_not_pass() -> None:
     def passed(case, times: list[Fraction], require: object) -> bool | None:

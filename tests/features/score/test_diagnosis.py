@@ -250,11 +250,10 @@ def test_small_oscillations_lag_as_any_clock_would() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [6, 7])
-def test_near_misses_stay_silent(seed: int) -> None:
-    top, start, times = problem(seed)
+def test_near_misses_stay_silent() -> None:
+    top, start, times = problem(6)
     y = runge_kutta(top, start, times)
-    noise = np.random.default_rng(seed).normal(size=y.shape)
+    noise = np.random.default_rng(6).normal(size=y.shape)
     # γ down, but with an error that hides it; one vector shifted in time and the other not; states of nothing
     assert found(top, start, times, y * [1, 1, 1, -1, -1, -1] + 0.1 * noise) == []
     later = runge_kutta(top, start, [t + SHIFT for t in times])
@@ -273,7 +272,7 @@ def test_one_state_that_is_off_is_pointed_at() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", [1, 3, 7])
+@pytest.mark.parametrize("row", [1, 7])
 def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
     top, start, times = problem(8)
     times = [Fraction(k, 2) for k in range(1, 12)]

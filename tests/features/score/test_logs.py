@@ -180,6 +180,25 @@ def test_arrays_of_numpy_are_a_table(tmp_path: Path) -> None:
     assert scored(path)["digits_right"] > 13  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("name", ["empty.npz", "zero.npy", "cut.npz", "none.npy", "cut.parquet", "ragged.parquet"])
+def test_arrays_without_rows_or_cut_short_are_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if name == "empty.npz":
+        numpy.savez(path)
+    elif name == "zero.npy":
+        numpy.save(path, numpy.zeros((0, 7)))
+    elif name == "ragged.parquet":
+        pyarrow = pytest.importorskip("pyarrow")
+        from pyarrow import parquet
+
+        parquet.write_table(pyarrow.table({"t": [1.0, 2.0], "orientation": [[1.0, 0.0], [1.0]]}), path)
+    else:
+        path.write_bytes({"cut.npz": b"PK\x03\x04", "none.npy": b"", "cut.parquet": b"PAR1"}[name])
+    refused = heavytop("score", path)
+    assert refused.returncode == 2
+    assert "A log must be" in refused.stderr or "The arrays have none rows" in refused.stderr
+
+
 def test_a_parquet_table_may_hold_instants_lists_and_the_body(tmp_path: Path) -> None:
     pyarrow = pytest.importorskip("pyarrow")
     from pyarrow import parquet

@@ -52,6 +52,8 @@ _USUAL_UNITS = -34.0
 """log2 of the product of two units where the state is about 1."""
 _NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
+SMALLEST_TIME = 1 / LARGEST_TIME
+"""A target that is nearer would be 0 in two doubles, and no step is taken to 0."""
 _STEPS_AT_ONCE, _SAMPLES_AT_ONCE = 1024, 2048
 """Words of so many samples fit into a near cache; memory that is new to the process takes longer than they do."""
 PLACES = (*range(6), *range(19, 22))
@@ -156,7 +158,7 @@ class Floating(ResumableRun):
         return _exact_state(self.words, len(self.problem.state))
 
     def advance(self, target: Fraction, steps: int) -> Status:
-        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(min(target, LARGEST_TIME))
+        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(max(SMALLEST_TIME, min(target, LARGEST_TIME)))
         arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         taken = self.machine.functions["advance"](*arrays, steps)
         self.steps += taken

@@ -181,7 +181,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
     columns = {name.strip() for name in header}
     own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
     more = [name for name in names if name.strip() not in own]
-    return [f"columns that are not read: {', '.join(name[:20] for name in more[:6])}"] if more else []
+    return [f"columns that are not read: {', '.join(name[:40] for name in more[:6])}"] if more else []
 
 
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:

@@ -328,7 +328,7 @@ def of_arrays(content: bytes, suffix: str) -> str:
     for name, array in columns.items():
         if array.ndim == 0 or array.dtype.kind in "US" or (len(array) != count and array.size <= 9):
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
-        elif array.ndim <= 3 and array.dtype.kind in "fiu":
+        elif array.ndim <= 3 and array.size and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
             names += _names_of(name, parts[-1].shape[1], last)
     if not parts or len({len(part) for part in parts}) != 1:
@@ -339,25 +339,35 @@ def of_arrays(content: bytes, suffix: str) -> str:
 
 
 def _of_numpy(content: bytes) -> dict[str, Any]:
+    from zipfile import BadZipFile
+
     import numpy
 
     try:
         loaded = numpy.load(BytesIO(content), allow_pickle=False)
         names = loaded.files if hasattr(loaded, "files") else loaded.dtype.names
-        return {name: loaded[name] for name in names} if names else {"": loaded}
-    except ValueError as error:
+        return {"": loaded} if names is None else {name: loaded[name] for name in names}
+    except (ValueError, EOFError, BadZipFile) as error:
         raise InputError(f"A log must be an array: {error}.", "Save plain numbers, without pickle.") from None
 
 
 def _of_parquet(content: bytes) -> dict[str, Any]:
     """Its columns, also of lists and of instants, and its metadata."""
-    import numpy
-
     require_extra("parquet")
     import pyarrow
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(BytesIO(content))
+    try:
+        return _columns_of(pyarrow.parquet.read_table(BytesIO(content)))
+    except (pyarrow.ArrowException, ValueError) as error:
+        raise InputError(f"A log must be a Parquet table: {error}.", "Give one number or list for each time.") from None
+
+
+def _columns_of(table: Any) -> dict[str, Any]:
+    """The columns of a table of pyarrow, and its metadata."""
+    import numpy
+    import pyarrow
+
     columns = {
         key.decode(): numpy.array(value.decode())
         for key, value in (table.schema.metadata or {}).items()
