@@ -1,6 +1,10 @@
-"""Siconos: Newton-Euler equations about the centre of mass, held by a knee joint; Moreau-Jean with theta = 1/2."""
+"""Siconos: Newton-Euler equations about the centre of mass, held by a knee joint; Moreau-Jean with theta = 1/2.
+
+Debian's package 4.4.0 calls itself 4.5.0.
+"""
 
 import numpy as np
+import siconos
 import siconos.kernel as kernel
 import siconos.mechanics.joints as joints
 from heavytop_engine import matrix, serve
@@ -44,4 +48,4 @@ class Engine:
         return self.body.q()[:3] - matrix(self.body.q()[3:]) @ self.centre
 
 
-serve("Siconos:Moreau-Jean", Engine)
+serve(f"Siconos:Moreau-Jean {siconos.version}", Engine)
