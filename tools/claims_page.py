@@ -167,6 +167,8 @@ _SAID = {
     "component": "Claimed: a component of a motion",
     "integral": "Claimed: constant",
     "relation": "Claimed: stays 0 where it is 0",
+    "stability": "Claimed: stable",
+    "unstable": "Claimed: unstable",
     "value": "Claimed: numbers",
 }
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+!|$~-])")
@@ -231,8 +233,8 @@ def _claim(published: Published) -> str:
     lines += [_equal(None, f"{text}", "0") for text in claim.get("relations", [])]
     if claim.get("assume"):
         lines.append("<p>assumed: " + ", ".join(_comparison(text) for text in claim["assume"]) + "</p>")
-    lines.append(f"<p>{_SAID.get(kind, kind)}</p>")
-    if kind == "motion":
+    lines.append(f"<p>{_SAID.get('unstable' if claim.get('stable') is False else kind, kind)}</p>")
+    if kind in ("motion", "stability"):
         lines += _motion(claim.get("motion", {}))
     elif kind == "value":
         lines.append(_start(claim.get("start", {})))
@@ -343,7 +345,8 @@ def _numbered(row: Equation) -> str:
 def _witness(witness: Mapping[str, Any]) -> str:
     place = {**witness.get("parameters", {}), **({"t": witness["t"]} if "t" in witness else {})}
     said = ", ".join(f"<math>{name(key)}</math> = {escape(str(value))}" for key, value in place.items())
-    return f"{escape(witness['value'])} ± {escape(witness['radius'])} at {said}"
+    ball = f"{escape(witness['value'])} ± {escape(witness['radius'])} " if "value" in witness else ""
+    return f"{ball}at {said}"
 
 
 def _equal(left: str | None, text: str, right: str = "") -> str:

@@ -114,6 +114,12 @@ def test_a_regular_precession_is_stable_and_other_motions_are_none() -> None:
     assert of(CASES["gyrostat"].top, CASES["gyrostat"].start, GYROSTAT) is None
 
 
+def test_about_an_axis_between_two_equal_moments_omega_drifts_away() -> None:
+    found = of(ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((3, 4, 0), (0, 0, 1)))
+    assert found is not None
+    assert found.verdict == "spectrally stable"
+
+
 def test_sentence_attribute_and_key_say_the_same() -> None:
     top, start = ht.HeavyTop((3, 2, 1), 0, (0, 0, 0)), ht.State((0, 20, 0), ("3/5", 0, "4/5"))
     said = "permanent rotation about the middle axis, unstable, 11.55 per unit of time: 2^-53 grows to 1 by t = 3.2"

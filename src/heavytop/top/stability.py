@@ -3,26 +3,24 @@
 Linearised about a steady motion, the field has eigenvalues ±λ beside those, 0, of its conserved quantities: λ² are the
 roots of a polynomial of degree one (of Ω alone, where γ does not enter its rates) or two, of rational coefficients.
 One of them that is positive or not real proves the motion unstable, at the rate max Re λ.  That none is proves nothing
-by itself.  Stable is said where the second variation of E − ω M·γ − κ γ²/2 is definite on the level of the two Casimir
-functions (Arnold's energy-Casimir method, (M, γ) at an equilibrium with Ω = ωγ), of a free rotation about the axis of
-the largest or smallest moment, of Lagrange's sleeping top where (I3 Ω3)² > 4 I1 P r·γ, and of a regular precession of
-his top, whose inclination is a minimum of the effective potential.
+by itself.  Stable is said where the second variation of E − ω M·γ − κ γ²/2 − c G is definite on the level of the two
+Casimir functions (Arnold's energy-Casimir method; G is |M|²/2 of a free body, M_k of a top symmetric about axis k), and
+of a regular precession of Lagrange's top, whose inclination is a minimum of the effective potential.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
+from functools import partial
+from typing import Any, Literal
 
-from flint import fmpq, fmpq_mat
-
-from heavytop.precision import cross
+from heavytop.precision import cross, dot
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 
-Matrix = list[list[Fraction]]
+Matrix = list[list[Any]]
 _AXES = {0: "smallest", 1: "middle", 2: "largest"}
 
 
@@ -53,41 +51,47 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
     if any(rates[:3]) or (any(rates[3:]) and not free):
         return _precession(system, p, y)
     size = 3 if free else 6
-    jacobian = _jacobian(system, p, y, size)
+    rate = _largest_real_part(*quadratic_of_squares(system, p, y, size))
     motion = _words(system, p, y, free)
-    powers = _characteristic(jacobian)
-
-    squares = powers[0 : 4 if free else 6 : 2]
-    rate = _largest_real_part(squares)
     if rate:
         return Stability(motion, "unstable", rate)
-    return Stability(motion, "stable" if _proven_stable(system, p, y, free) else "spectrally stable")
+    # of a free rotation γ, which enters no rate of Ω, is taken along Ω
+    state = [*y[:3], *y[:3]] if free else y
+    proven = system is HEAVY_TOP and any(state[3:]) and is_stable(p, state, _is_zero, _is_positive)
+    return Stability(motion, "stable" if proven else "spectrally stable")
 
 
-def _jacobian(system: System, p: Parameters, y: Sequence[Fraction], size: int) -> Matrix:
-    """The Jacobian of the first components; exact as the field is of degree two: half a difference of steps 1."""
+def quadratic_of_squares(system: System, p: Parameters, y: Sequence[Any], size: int = 6) -> tuple[Any, Any]:
+    """a, b of μ² + a μ + b, whose roots are the μ = λ² of a steady motion; of the first components alone b is 0.
+
+    Exact in any ring, as the field is of degree two: its Jacobian is half a difference of steps 1.  It is unstable if
+    a < 0, b < 0 or a² < 4b, and else each λ is imaginary.
+    """
     columns = []
     for j in range(size):
-        up, down = (system.field(p, [v + sign * (k == j) for k, v in enumerate(y)]) for sign in (1, -1))
+        up, down = (system.rates(p, [v + sign * (k == j) for k, v in enumerate(y)]) for sign in (1, -1))
         columns.append([(a - b) / 2 for a, b in zip(up[:size], down[:size], strict=True)])
-    return [list(row) for row in zip(*columns, strict=True)]
+    square = [[_inner(row, column) for column in columns] for row in zip(*columns, strict=True)]
+    second = sum(square[i][i] for i in range(size))
+    fourth = sum(square[i][j] * square[j][i] for i in range(size) for j in range(size))
+    return -second / 2, (second * second / 2 - fourth) / 4
 
 
-def _characteristic(matrix: Matrix) -> list[Fraction]:
-    """1, c1, ..., cn of λⁿ + c1 λⁿ⁻¹ + ... + cn."""
-    entries = [fmpq(value.numerator, value.denominator) for row in matrix for value in row]
-    polynomial = fmpq_mat(len(matrix), len(matrix), entries).charpoly()
-    return [Fraction(int(c.p), int(c.q)) for c in reversed(polynomial.coeffs())]
-
-
-def _inner(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
     """Σ a_i b_i, of vectors of any length."""
-    return sum((v * w for v, w in zip(a, b, strict=True)), Fraction(0))
+    return sum(v * w for v, w in zip(a, b, strict=True))
 
 
-def _largest_real_part(squares: Sequence[Fraction]) -> float:
-    """max Re λ where μ = λ² are the roots of 1, a or 1, a, b; 0 where all μ are real and not positive."""
-    a, b = (*squares[1:], Fraction(0))[:2]
+def _is_zero(value: Fraction) -> bool:
+    return not value
+
+
+def _is_positive(value: Fraction) -> bool:
+    return value > 0
+
+
+def _largest_real_part(a: Fraction, b: Fraction) -> float:
+    """max Re λ where μ = λ² are the roots of μ² + a μ + b; 0 where all μ are real and not positive."""
     disc = a * a - 4 * b
     if disc >= 0:
         if a >= 0 and b >= 0:
@@ -117,44 +121,70 @@ def _words(system: System, p: Parameters, y: Sequence[Fraction], free: bool) -> 
     return f"permanent rotation about {about}"
 
 
-def _proven_stable(system: System, p: Parameters, y: Sequence[Fraction], free: bool) -> bool:
-    if system is not HEAVY_TOP:
-        return False
-    turning = [k for k in range(3) if y[k]]
-    if free:
-        others = [p.inertia[k] for k in range(3) if k not in turning]
-        own = {p.inertia[k] for k in turning}
-        return len(own) == 1 and (all(i < min(own) for i in others) or all(i > min(own) for i in others))
-    return _sleeps(p, y) or _definite(p, y)
+def is_stable(
+    p: Parameters, y: Sequence[Any], is_zero: Callable[[Any], bool], is_positive: Callable[[Any], bool]
+) -> bool:
+    """Whether a second variation is definite: Ω and γ of every motion that starts close enough then stay close.
 
-
-def _sleeps(p: Parameters, y: Sequence[Fraction]) -> bool:
-    """Lagrange's top on its axis, fast enough."""
-    for k in range(3):
-        i, j = ((k + 1) % 3, (k + 2) % 3)
-        if p.inertia[i] == p.inertia[j] and not (p.moment[i] or p.moment[j] or y[i] or y[j] or y[3 + i] or y[3 + j]):
-            return bool((p.inertia[k] * y[k]) ** 2 > 4 * p.inertia[i] * p.moment[k] * y[3 + k])
+    That is so in all six variables: a definite form on the level of integrals becomes so everywhere with multiples of
+    the squares of what these are off.  Exact in any ring with these two tests, which may not know.
+    """
+    for zeros, squares, hessian in _second_variations(p, y):
+        if all(map(is_zero, zeros)) and all(map(is_positive, squares)):
+            minors = [_determinant([row[:n] for row in hessian[:n]]) for n in range(1, 5)]
+            for sign in (1, -1):
+                if all(is_positive(sign**n * minor) for n, minor in enumerate(minors, 1)):
+                    return True
     return False
 
 
-def _definite(p: Parameters, y: Sequence[Fraction]) -> bool:
-    """Whether the second variation is definite on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
+def _second_variations(p: Parameters, y: Sequence[Any]) -> Iterator[tuple[list[Any], list[Any], Matrix]]:
+    """(what must be 0, what must be positive, the form) on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
     gamma, momentum = y[3:], [i * w for i, w in zip(p.inertia, y[:3], strict=True)]
-    square = _inner(gamma, gamma)
-    turning = _inner(y[:3], gamma) / square
-    kappa = (_inner(p.moment, gamma) - turning * _inner(momentum, gamma)) / square
-    axis = max(range(3), key=lambda k: abs(gamma[k]))
-    across = [cross(gamma, [Fraction(k == j) for k in range(3)]) for j in range(3) if j != axis]
-    basis = [[*v, Fraction(0), Fraction(0), Fraction(0)] for v in across]
-    basis += [[*(-_inner(momentum, v) / square * g for g in gamma), *v] for v in across]
+    square, spin = dot(gamma, gamma), dot(momentum, gamma)
+    for turning, gradient, curvature, zeros, squares in _multipliers(p, y, momentum):
+        kappa = (dot(p.moment, gamma) - turning * spin) / square
+        first = [w - turning * g - c for w, g, c in zip(y[:3], gamma, gradient, strict=True)]
+        first += [n - turning * m - kappa * g for n, m, g in zip(p.moment, momentum, gamma, strict=True)]
+        for axis in (k for k in range(3) if gamma[k]):
+            across = [cross(gamma, [int(k == j) for k in range(3)]) for j in range(3) if j != axis]
+            basis: list[tuple[Sequence[Any], Sequence[Any]]] = [(v, (0, 0, 0)) for v in across]
+            basis += [([-dot(momentum, v) / square * g for g in gamma], v) for v in across]
+            form = partial(_form, p, turning, curvature, kappa)
+            yield [*zeros, *first], [*squares, square, gamma[axis] ** 2], [[form(u, v) for v in basis] for u in basis]
 
-    def form(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-        kinetic = sum((u * v / i for u, v, i in zip(a[:3], b[:3], p.inertia, strict=True)), Fraction(0))
-        return kinetic - turning * (_inner(a[:3], b[3:]) + _inner(a[3:], b[:3])) - kappa * _inner(a[3:], b[3:])
 
-    hessians = [[[form(u, v) for v in basis[:n]] for u in basis[:n]] for n in range(1, 5)]
-    minors = [_characteristic(hessian)[-1] * (-1) ** len(hessian) for hessian in hessians]
-    return all(minor > 0 for minor in minors)  # kinetic energy is positive: it is never negative definite
+def _form(p: Parameters, turning: Any, curvature: Any, kappa: Any, a: Sequence[Any], b: Sequence[Any]) -> Any:
+    kinetic = sum((1 / i - curvature) * u * v for u, v, i in zip(a[0], b[0], p.inertia, strict=True))
+    return kinetic - turning * (dot(a[0], b[1]) + dot(a[1], b[0])) - kappa * dot(a[1], b[1])
+
+
+def _multipliers(p: Parameters, y: Sequence[Any], momentum: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
+    """ω, c ∇G and c G'' by M, what must be 0 for G to be an integral, and what is divided by: without G, and with each.
+
+    −ω of the free body makes the form definite about the axis of the smallest moment, M·γ/(2 I) that of a sleeping top.
+    """
+    square = dot(y[3:], y[3:])
+    turning = dot(y[:3], y[3:]) / square
+    yield turning, [0, 0, 0], 0, [], []
+    if any(momentum):
+        size = dot(momentum, momentum)
+        c = (dot(y[:3], momentum) + turning * dot(y[3:], momentum)) / size
+        yield -turning, [c * m for m in momentum], c, list(p.moment), [size]
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        sleeping = dot(momentum, y[3:]) / (2 * p.inertia[i] * square)
+        gradient = [(y[n] - sleeping * y[3 + n]) * int(n == k) for n in range(3)]
+        yield sleeping, gradient, 0, [p.inertia[i] - p.inertia[j], p.moment[i], p.moment[j]], []
+
+
+def _determinant(rows: Matrix) -> Any:
+    if len(rows) == 1:
+        return rows[0][0]
+    return sum(
+        (-1) ** k * value * _determinant([[*row[:k], *row[k + 1 :]] for row in rows[1:]])
+        for k, value in enumerate(rows[0])
+    )
 
 
 def _precession(system: System, p: Parameters, y: Sequence[Fraction]) -> Stability | None:

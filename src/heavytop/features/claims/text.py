@@ -102,6 +102,7 @@ _PROVEN = {
     "component": "It is proven for",
     "integral": "It is proven to be constant along the motions of",
     "relation": "It is proven to be kept by the motions of",
+    "stability": "The constant solution is proven for",
 }
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
@@ -175,9 +176,10 @@ def _witnesses(report: Audit) -> list[Text]:
     lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
     for row in refuted:
         witness = dict(row.witness or {})
-        value, radius, parameters = witness.pop("value"), witness.pop("radius"), witness.pop("parameters")
+        parameters = witness.pop("parameters")
+        ball = f"{witness.pop('value')} +/- {witness.pop('radius')}" if "value" in witness else row.residual
         point = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
-        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {value} +/- {radius} at {point}"))
+        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {ball} at {point}"))
     notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
     if notes:
         lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]

@@ -23,6 +23,7 @@ from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
 from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
 from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
@@ -41,6 +42,7 @@ _TABLES: dict[str, tuple[str, Callable[[ClaimFile], Auditable]]] = {
     "component": ("component", UserComponent),
     "integral": ("integral", UserIntegral),
     "relation": ("integral", UserIntegral),
+    "stability": ("motion", UserStability),
 }
 """The table that each kind of claim needs, and what it is read as."""
 _MAX_BYTES = 100_000
@@ -82,6 +84,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     wanted, made = _TABLES[content.kind]
     if {name for name, _ in _TABLES.values() if getattr(content, name) is not None} != {wanted}:
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    if (content.stable is None) is (content.kind == "stability"):
+        raise InputError(f"{where}: stable must be true or false of kind 'stability', and of no other.", _REMEDY)
     if content.quadrature is not None and wanted == "integral":
         raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
@@ -166,7 +170,8 @@ def _rows(
     claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[StatementVerdict, ...]:
     if not isinstance(claim, UserComponent):
-        return judge(claim.statements(about), claim.setting, progress)
+        rows = judge(claim.statements(about), claim.setting, progress)
+        return (*rows, claim.judged(about, rows)) if isinstance(claim, UserStability) else rows
     return tuple(row for statements, setting in claim.groups(about) for row in judge(statements, setting))
 
 

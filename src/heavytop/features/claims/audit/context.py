@@ -142,6 +142,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Annotated[str, msgspec.Meta(max_length=80)]
     kind: str
     top: TopTable
+    stable: bool | None = None
     system: str | None = None
     source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
     domain: str = "all"
@@ -496,7 +497,7 @@ def of_file(asked: System | None, written: str | None, usual: System) -> System:
     return asked or own or usual
 
 
-_NO_FORMULAS = ("name", "kind", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
+_NO_FORMULAS = ("name", "kind", "stable", "system", "source", "domain", "assume", "parameters", "definitions", "entry")
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ ABOUT = {
     "component": "a component of a motion",
     "integral": "a first integral",
     "relation": "an invariant relation",
+    "stability": "the stability of a steady motion",
     "value": "numbers of a motion",
 }
 """The subject of the formulas of each kind of claim."""

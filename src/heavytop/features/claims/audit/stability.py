@@ -1,0 +1,118 @@
+"""An equilibrium or a permanent rotation that is claimed to be stable, or not, as a point of the equations in Ω and γ.
+
+Stable is Lyapunov's: Ω and γ stay as close to the claimed ones as one likes, for all time, if they start close enough.
+First the claimed ones have to be constant solutions.  Then the criteria of :mod:`heavytop.top.stability` are proven
+over the whole domain; what refutes is the opposite, proven at a sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+from heavytop.errors import InputError
+from heavytop.features.claims.algebra.fields import Assumptions, Field
+from heavytop.features.claims.algebra.prover import Condition
+from heavytop.features.claims.algebra.ring import Quotient, Unprovable
+from heavytop.features.claims.algebra.statement import ALL, Statement
+from heavytop.features.claims.audit.context import TIME
+from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
+from heavytop.features.claims.audit.user_claims import UserMotion
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.stability import is_stable, quadratic_of_squares, stability
+
+_CRITERIA = {
+    True: "the second variation of a combination of first integrals is definite on their level",
+    False: "an eigenvalue of the linearised equations has a positive real part",
+}
+
+
+@dataclass(frozen=True)
+class UserStability(UserMotion):
+    """A steady motion claimed in a file to be stable or unstable."""
+
+    def __post_init__(self) -> None:
+        UserMotion.__post_init__(self)
+        table, content = self.content.motion, self.content
+        assert table is not None
+        moves = TIME in sympy.Tuple(*self.motion.state).free_symbols
+        if moves or table.omega is None or table.gamma is None or self.motion.attitude:
+            cause = "A claim of stability needs omega and gamma in [motion], constant in time, and no attitude."
+            raise InputError(cause, "State the equilibrium or permanent rotation in parameters.")
+        if content.quadrature is not None or content.times is not None or content.domain != "all":
+            raise InputError("A claim of stability is about all times.", "Leave out quadrature, times and domain.")
+        if isinstance(self.context.top.inertia[0], tuple):
+            raise InputError("A claim of stability needs principal axes.", "Give the three principal moments.")
+
+    def about(self, asked: System | None) -> System:
+        """The heavy top; raises InputError where the file or the caller names another."""
+        about = UserMotion.about(self, asked)
+        if about is not HEAVY_TOP:
+            raise InputError(f"A claim of stability must be about heavy_top; got {about.name}.", "Leave out the rotor.")
+        return about
+
+    def judged(self, about: System, rows: Sequence[StatementVerdict]) -> StatementVerdict:
+        """The verdict on the stability, where ``rows`` are those of the equations of motion."""
+        claimed = bool(self.content.stable)
+        is_steady = verdict_of(rows) == "holds"
+        opposite = next(self._opposites(about), None) if is_steady else None
+        settings = (self.setting, self.setting.with_solutions())
+        proven = is_steady and opposite is None and any(self._is_proven(about, s.assumptions(0)) for s in settings)
+        conditions = (
+            Condition("Omega and gamma are a constant solution", is_steady, "by the rows of the equations of motion"),
+            Condition(_CRITERIA[claimed], proven, "proven on the whole domain" if proven else "not shown"),
+        )
+        residual, witness = opposite or ("none: proven" if proven else "not known", None)
+        text = f"the constant solution is {'stable' if claimed else 'unstable'} (Lyapunov), in Omega and gamma"
+        holds = False if witness else True if proven else None
+        return StatementVerdict("stability", 1, "smooth", "all", holds, residual, text, witness, "", conditions)
+
+    def _opposites(self, about: System) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Samples at which the opposite is proven in exact rationals."""
+        p, y = self.context.parameters(about), self.motion.state
+        at_once = Statement("", 1, "", replace(ALL, points=(Fraction(0),)), sympy.Integer(0), "")
+        for sample in self.setting.places(at_once):
+            numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in sample.items()}
+            exact = [e.xreplace(numbers) for e in (*p.inertia, *p.moment, *y)]
+            if not all(value.is_Rational for value in exact):
+                continue
+            values = [Fraction(int(value.p), int(value.q)) for value in exact]
+            top = Parameters(tuple(values[:3]), tuple(values[3:6]), Fraction(0))
+            steady = stability(about, top, values[6:])
+            if steady is not None and steady.verdict == ("unstable" if self.content.stable else "stable"):
+                rate = f", at the rate {steady.rate:.6g}" if steady.rate else ""
+                parameters = {str(s): str(value) for s, value in sample.items() if s != TIME}
+                yield f"{steady.verdict} at the witness{rate}", {"parameters": parameters}
+
+    def _is_proven(self, about: System, assumptions: Assumptions) -> bool:
+        p, y = self.context.parameters(about), self.motion.state
+
+        def is_zero(e: sympy.Expr) -> bool:
+            value = _entered(assumptions, e)
+            return value is not None and not value[1].numerator
+
+        def is_positive(e: sympy.Expr) -> bool:
+            value = _entered(assumptions, e)
+            sign = None if value is None else value[0].tower.sign(value[1])
+            return sign is not None and sign.value > 0 and sign.strict
+
+        if self.content.stable:
+            return is_stable(p, y, is_zero, is_positive)
+        a, b = quadratic_of_squares(about, p, y)
+        return any(map(is_positive, (-a, -b, 4 * b - a**2)))
+
+
+def _entered(assumptions: Assumptions, e: sympy.Expr) -> tuple[Field, Quotient] | None:
+    """The expression in a field of its own; None where a divisor is not known to be nowhere 0."""
+    e = sympy.sympify(e)
+    try:
+        field = Field(assumptions, [e])
+        value = field.enter(e)
+    except Unprovable:
+        return None
+    divisors = (value.denominator, *field.tower.divisors.values())
+    return (field, value) if all(field.tower.signs.of(p).strict for p in divisors) else None
