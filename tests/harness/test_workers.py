@@ -133,14 +133,8 @@ def kill(pid: int) -> None:
     os.kill(pid, signal.SIGKILL)
 
 
-@pytest.fixture(params=[0.25, 100])
-def short(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tasks that wait for others of so many seconds: none of these tasks, or several behind each worker's."""
-    monkeypatch.setattr(limited, "_SHORT", request.param)
-
-
-@pytest.mark.usefixtures("short")
-def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected) -> None:
+def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected, monkeypatch) -> None:
+    monkeypatch.setattr(limited, "_SHORT", 100)  # several tasks wait behind each worker's; elsewhere none does
     assert measured(tasks, 2, after_first=lambda: kill(active_children()[0].pid)) == expected
 
 
