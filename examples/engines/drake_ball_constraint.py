@@ -9,15 +9,16 @@ import sys
 
 from pydrake.all import MultibodyPlant, RigidTransform, Simulator, SpatialInertia, UnitInertia
 
+which = (*sys.argv[1:], "world")[0]
 plant = MultibodyPlant(1e-3)
 inertia = SpatialInertia(1.0, [0, 0, 0], UnitInertia(1.0, 1.0, 1.0))
 first, second = plant.AddRigidBody("first", inertia), plant.AddRigidBody("second", inertia)
-if sys.argv[1] == "world":
+if which == "world":
     plant.AddBallConstraint(plant.world_body(), [0, 0, 0], first, [0, 0, 0])
-elif sys.argv[1] == "bodies":
+elif which == "bodies":
     plant.AddBallConstraint(first, [0, 0, 0], second, [0, 0, 0])
 else:
     plant.AddWeldConstraint(plant.world_body(), RigidTransform(), first, RigidTransform())
 plant.Finalize()
 Simulator(plant).AdvanceTo(0.01)
-print(sys.argv[1], "ends well", flush=True)
+print(which, "ends well", flush=True)

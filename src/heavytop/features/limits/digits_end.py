@@ -190,8 +190,12 @@ def _losses(
     @cache
     @whole_evaluation
     def rounded_at(at: Fraction) -> ExactSolution:
-        state = [midpoint(ball) for ball in known.state(at, bits)] if at else problem.start.flat
-        return find(problem.top, _rounded(state, problem.precision), problem.system)
+        if not at:
+            return find(problem.top, _rounded(problem.start.flat, problem.precision), problem.system)
+        state = known.state(at, bits)
+        if any(ball.rel_accuracy_bits() <= problem.precision.bits for ball in state):  # a small component
+            state = known.state(at, bits + problem.precision.bits)
+        return find(problem.top, _rounded([midpoint(ball) for ball in state], problem.precision), problem.system)
 
     losses: list[Loss | None] = []
     for least in levels:
