@@ -57,7 +57,7 @@ def stability(system: System, parameters: Parameters, start: Sequence[Fraction])
         return Stability(motion, "unstable", rate)
     # of a free rotation γ, which enters no rate of Ω, is taken along Ω
     state = [*y[:3], *y[:3]] if free else y
-    proven = system is HEAVY_TOP and any(state[3:]) and is_stable(p, state, _is_zero, _is_positive)
+    proven = system is HEAVY_TOP and any(state[3:]) and is_stable(p, state, _sign)
     return Stability(motion, "stable" if proven else "spectrally stable")
 
 
@@ -82,12 +82,8 @@ def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
     return sum(v * w for v, w in zip(a, b, strict=True))
 
 
-def _is_zero(value: Fraction) -> bool:
-    return not value
-
-
-def _is_positive(value: Fraction) -> bool:
-    return value > 0
+def _sign(value: Fraction) -> int:
+    return (value > 0) - (value < 0)
 
 
 def _largest_real_part(a: Fraction, b: Fraction) -> float:
@@ -121,25 +117,22 @@ def _words(system: System, p: Parameters, y: Sequence[Fraction], free: bool) -> 
     return f"permanent rotation about {about}"
 
 
-def is_stable(
-    p: Parameters, y: Sequence[Any], is_zero: Callable[[Any], bool], is_positive: Callable[[Any], bool]
-) -> bool:
+def is_stable(p: Parameters, y: Sequence[Any], sign: Callable[[Any], int | None]) -> bool:
     """Whether a second variation is definite: Ω and γ of every motion that starts close enough then stay close.
 
     That is so in all six variables: a definite form on the level of integrals becomes so everywhere with multiples of
-    the squares of what these are off.  Exact in any ring with these two tests, which may not know.
+    the squares of what these are off.  Exact in any ring with its ``sign``, which may not know.
     """
-    for zeros, squares, hessian in _second_variations(p, y):
-        if all(map(is_zero, zeros)) and all(map(is_positive, squares)):
+    for squares, zeros, hessian in _second_variations(p, y):
+        if all(sign(square) == 1 for square in squares) and all(sign(zero) == 0 for zero in zeros):
             minors = [_determinant([row[:n] for row in hessian[:n]]) for n in range(1, 5)]
-            for sign in (1, -1):
-                if all(is_positive(sign**n * minor) for n, minor in enumerate(minors, 1)):
-                    return True
+            if any(all(sign(s**n * minor) == 1 for n, minor in enumerate(minors, 1)) for s in (1, -1)):
+                return True
     return False
 
 
 def _second_variations(p: Parameters, y: Sequence[Any]) -> Iterator[tuple[list[Any], list[Any], Matrix]]:
-    """(what must be 0, what must be positive, the form) on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
+    """(what must be positive, what must be 0, the form) on the tangent space δM·γ + M·δγ = 0, γ·δγ = 0."""
     gamma, momentum = y[3:], [i * w for i, w in zip(p.inertia, y[:3], strict=True)]
     square, spin = dot(gamma, gamma), dot(momentum, gamma)
     for turning, gradient, curvature, zeros, squares in _multipliers(p, y, momentum):
@@ -151,7 +144,7 @@ def _second_variations(p: Parameters, y: Sequence[Any]) -> Iterator[tuple[list[A
             basis: list[tuple[Sequence[Any], Sequence[Any]]] = [(v, (0, 0, 0)) for v in across]
             basis += [([-dot(momentum, v) / square * g for g in gamma], v) for v in across]
             form = partial(_form, p, turning, curvature, kappa)
-            yield [*zeros, *first], [*squares, square, gamma[axis] ** 2], [[form(u, v) for v in basis] for u in basis]
+            yield [*squares, square, gamma[axis] ** 2], [*zeros, *first], [[form(u, v) for v in basis] for u in basis]
 
 
 def _form(p: Parameters, turning: Any, curvature: Any, kappa: Any, a: Sequence[Any], b: Sequence[Any]) -> Any:

@@ -1,4 +1,4 @@
-"""Claims of stability: against eigenvalues in 40 digits, a Lyapunov function in exact rationals, and degenerate tops."""
+"""Claims of stability: against eigenvalues in 40 digits, a Lyapunov function in rationals, and degenerate tops."""
 
 from fractions import Fraction
 from itertools import permutations

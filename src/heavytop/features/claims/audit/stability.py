@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import sympy
@@ -17,7 +18,7 @@ import sympy
 from heavytop.errors import InputError
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import Condition
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable
+from heavytop.features.claims.algebra.ring import Unprovable
 from heavytop.features.claims.algebra.statement import ALL, Statement
 from heavytop.features.claims.audit.context import TIME
 from heavytop.features.claims.audit.judge import StatementVerdict, verdict_of
@@ -89,30 +90,21 @@ class UserStability(UserMotion):
                 yield f"{steady.verdict} at the witness{rate}", {"parameters": parameters}
 
     def _is_proven(self, about: System, assumptions: Assumptions) -> bool:
-        p, y = self.context.parameters(about), self.motion.state
-
-        def is_zero(e: sympy.Expr) -> bool:
-            value = _entered(assumptions, e)
-            return value is not None and not value[1].numerator
-
-        def is_positive(e: sympy.Expr) -> bool:
-            value = _entered(assumptions, e)
-            sign = None if value is None else value[0].tower.sign(value[1])
-            return sign is not None and sign.value > 0 and sign.strict
-
+        p, y, sign = self.context.parameters(about), self.motion.state, partial(_sign, assumptions)
         if self.content.stable:
-            return is_stable(p, y, is_zero, is_positive)
+            return is_stable(p, y, sign)
         a, b = quadratic_of_squares(about, p, y)
-        return any(map(is_positive, (-a, -b, 4 * b - a**2)))
+        return any(sign(e) == 1 for e in (-a, -b, 4 * b - a**2))
 
 
-def _entered(assumptions: Assumptions, e: sympy.Expr) -> tuple[Field, Quotient] | None:
-    """The expression in a field of its own; None where a divisor is not known to be nowhere 0."""
-    e = sympy.sympify(e)
+def _sign(assumptions: Assumptions, e: sympy.Expr) -> int | None:
+    """0 or 1 where the expression is proven to be 0, or positive, and defined all over the domain; else None."""
     try:
-        field = Field(assumptions, [e])
-        value = field.enter(e)
+        field = Field(assumptions, [sympy.sympify(e)])
+        value = field.enter(sympy.sympify(e))
     except Unprovable:
         return None
-    divisors = (value.denominator, *field.tower.divisors.values())
-    return (field, value) if all(field.tower.signs.of(p).strict for p in divisors) else None
+    sign, signs = field.tower.sign(value), field.tower.signs
+    if not all(signs.of(p).strict for p in (value.denominator, *field.tower.divisors.values())):
+        return None
+    return 0 if not value.numerator else 1 if sign.value > 0 and sign.strict else None
