@@ -206,8 +206,10 @@ class Angle:
         if isinstance(value, Angle):
             return value
         if isinstance(value, str) and value.strip().lower().endswith(_DEGREES):
-            return cls(physical(value.strip()[: -len(_DEGREES)].strip(), "angle"), True)
-        return cls(physical(value, "angle"))
+            with prefixed("angle"):
+                return cls(exact(value.strip()[: -len(_DEGREES)].strip()), True)
+        with prefixed("angle"):
+            return cls(exact(value))
 
     def __str__(self) -> str:
         return exact_text(self.number) + (_DEGREES if self.degrees else "")

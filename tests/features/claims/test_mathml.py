@@ -108,7 +108,8 @@ def test_every_formula_of_the_library_is_typeset() -> None:
         integral, motion = table.get("integral", {}), table.get("motion", {})
         texts += [*table.get("definitions", {}).values(), *table.get("relations", []), *integral.get("where", [])]
         texts += [integral["value"]] if integral else []
-        texts += [text for part in motion.values() for text in part]
+        for part in motion.values():
+            texts += [text for row in part for text in ([row] if isinstance(row, str) else row)]
     assert len(texts) > 100
     for text in texts:
         ElementTree.fromstring(mathml(text))

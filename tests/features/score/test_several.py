@@ -48,7 +48,7 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
     document = json.loads(done.stdout)
     assert [each["file"] for each in document["files"]] == paths
     assert document["files"][0]["digits_right"] == pytest.approx(4, abs=0.1)
-    assert "The header is not" in document["files"][1]["error"]
+    assert "no row below its header" in document["files"][1]["error"]
     (order,) = document["orders"]
     assert order["order"] == pytest.approx(2, abs=0.01)
 
