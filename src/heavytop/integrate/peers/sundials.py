@@ -35,15 +35,15 @@ def _solve(request: Request) -> Solution:
         run = solver.solve(numpy.array([0.0, *request.times]), request.start)
         return Solution(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
     # the states of CVODE.solve to the bit, which does not count the steps between more times
-    run, end, steps, states = solver.init_step(0.0, request.start), request.times[-1], 0, []
+    run, end, steps, states = solver.init_step(0.0, request.start), request.times[-1], 0, list[Any]()
     for time in request.times:
-        while abs(run.t) < abs(time):
-            run = solver.step(time, method="onestep", tstop=end)
-            if not run.success:
-                return Solution(states, run.t, steps, run.nfev, seconds)
-            steps += 1
+        while abs(run.t) < abs(time) and run.success:
+            before, run = run.t, solver.step(time, method="onestep", tstop=end)
+            steps += run.t != before  # after a state within a step CVODE first returns to the end of that
+        if not run.success:
+            break
         states.append(solver.step(time, tstop=end).y)
-    return Solution(states, run.t, steps, run.nfev, seconds)
+    return Solution(states, run.t, int(steps), run.nfev, seconds)
 
 
 cvode = double_peer("sundials:CVODE", 12, _solve, attitude=True)
