@@ -53,6 +53,16 @@ def test_a_run_that_gives_up_says_where(capfd) -> None:
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize(("name", "step"), [("splitting:4", True), ("sundials:CVODE", False)])
+def test_more_times_add_no_steps(name: str, step: bool) -> None:
+    """Rounding of the spans between the times shortens no fixed step; CVODE counts steps at any number of times."""
+    pytest.importorskip("sksundae")
+    case, times = CASES["lagrange"], [Fraction(i, 5) for i in range(1, 101)]
+    setting = ("step", Fraction(1, 100)) if step else ("tolerance", Fraction(1, 10**6))
+    many, alone = (run_peer(name, case.top, case.start, samples, setting=setting) for samples in (times, times[-1:]))
+    assert many.steps == alone.steps == (2000 if step else 241)
+
+
 @pytest.mark.parametrize(
     ("states", "outcome", "count"),
     [

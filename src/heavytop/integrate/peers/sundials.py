@@ -30,12 +30,20 @@ def _solve(request: Request) -> Solution:
         write(result, time, y, request.numbers)
 
     solver = CVODE(rates, method="Adams", rtol=request.control, atol=request.control, max_num_steps=_MOST_STEPS)
-    run = solver.solve(numpy.concatenate([[0.0], request.times]), request.start)
     if len(request.times) == 1:
         # two times are a span: CVODE gives every step in between
+        run = solver.solve(numpy.array([0.0, *request.times]), request.start)
         return Solution(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
-    reached = abs(request.times) <= abs(run.t[-1])
-    return Solution(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
+    # the states of CVODE.solve to the bit, which does not count the steps between more times
+    run, end, steps, states = solver.init_step(0.0, request.start), request.times[-1], 0, list[Any]()
+    for time in request.times:
+        while abs(run.t) < abs(time) and run.success:
+            before, run = run.t, solver.step(time, method="onestep", tstop=end)
+            steps += run.t != before  # after a state within a step CVODE first returns to the end of that
+        if not run.success:
+            break
+        states.append(solver.step(time, tstop=end).y)
+    return Solution(states, run.t, int(steps), run.nfev, seconds)
 
 
 cvode = double_peer("sundials:CVODE", 12, _solve, attitude=True)
