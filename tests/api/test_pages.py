@@ -85,3 +85,9 @@ def test_on_a_terminal_a_page_is_laid_out(monkeypatch: pytest.MonkeyPatch, capsy
     printed = capsys.readouterr().out
     assert "Compare reports" in printed
     assert "| verdict |" not in printed
+
+
+def test_a_page_names_the_command_that_prints_a_table_of_the_site() -> None:
+    for name in pages.topics():
+        before, *rest = pages.page(name).split("(The site has a table here; the command above prints its numbers.)")
+        assert not rest or before.rstrip().splitlines()[-1].startswith("`heavytop "), name

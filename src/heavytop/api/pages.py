@@ -14,6 +14,7 @@ _INSTALLED = Path(__file__).parents[1] / "docs"
 _CHECKOUT = Path(__file__).parents[3] / "docs"
 _OF_THE_SITE = frozenset({"api", "audited-claims", "command-line", "contributing", "gallery", "index"})
 """Pages that are made when the site is built."""
+_TABLE = "(The site has a table here; the command above prints its numbers.)\n"
 
 
 def topics() -> dict[str, str]:
@@ -31,7 +32,7 @@ def page(topic: str) -> str:
     return re.sub(
         r"\$\$\n(.*?)\$\$",
         lambda formula: f"```text\n{plain_formula(formula[1])}\n```",
-        re.sub(r"```\{include\} .*\n```\n", "(Here the site has a table.)\n", files[name].read_text("utf-8")),
+        re.sub(r"```\{include\} .*\n```\n", _TABLE, files[name].read_text("utf-8")),
         flags=re.DOTALL,
     )
 

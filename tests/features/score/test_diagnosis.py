@@ -8,8 +8,8 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.features.score.diagnose.diagnosis import diagnose
-from heavytop.features.score.diagnose.samples import motion
-from heavytop.features.score.text import diagnosis_text
+from heavytop.features.score.diagnose.samples import Diagnosis, motion
+from heavytop.features.score.text import diagnosis_text, sentence
 from heavytop.measure.scalar import roundings
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
@@ -374,3 +374,14 @@ def test_a_motion_that_starts_again_is_told_from_rows_that_are_late(again_at: in
     exact = [[Fraction(value) for value in row] for row in again]
     (diagnosis,) = diagnose(top, fast, HEAVY_TOP, times, exact, DOUBLE, float(relative))
     assert diagnosis.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (1.19e-15, "to less than 1e-13, so that 13.0 digits or more are right."),
+        (2e-12, "to 2.00e-12, so that 11.7 digits are right."),
+    ],
+)
+def test_the_digits_are_those_of_the_error_that_is_printed_beside_them(left: float, said: str) -> None:
+    assert sentence(Diagnosis("gamma_down", error=2.0, left=left)).endswith(said)

@@ -143,7 +143,8 @@ def sentence(fit: Diagnosis) -> str:
         return f"{said}: they differ by {fit.left:.2e} of Ω with it, by {fit.error:.2e} without."
     digits = -math.log10(max(fit.left, FLOOR))
     more = " or more" if fit.left < FLOOR else ""
-    fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {fit.left:.2e}"
+    left = f"less than {FLOOR:.0e}" if more else f"{fit.left:.2e}"
+    fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {left}"
     text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
     return text + (f" As well fits: {numbers['or'].replace('_', ' ')}." if "or" in numbers else "")
 

@@ -104,9 +104,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
             "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
             "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
-            "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
-            "exponential, over the span that was fitted, and the 95 % interval as a fan. A shade around a curve is the "
-            "interval in which rounding noise alone moves it.",
+            "A shade around a curve is the interval in which rounding noise alone moves it.",
         ],
         columns=["case", "run", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
         place=30,
@@ -125,6 +123,10 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             section.pictures.append(finish(axes, title, spoken(alternative, 24), name, ends=ends))
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
+        section.notes.append(
+            "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
+            "exponential, over the span that was fitted, and the 95 % interval as a fan."
+        )
     return section
 
 

@@ -189,7 +189,8 @@ def _claim_curve(
     if x:
         draw(axes, key, x, y)
     at_one = next((v for t, v in zip(x, y, strict=True) if abs(t) < 1e-6), None)
-    largest = scientific(max(y)) if y else "none finite"
+    exact = bool(series.values) and all(value == "0" for value in series.values)
+    largest = scientific(max(y)) if y else "0 (exact)" if exact else "none finite"
     section.rows.append(
         [
             clip(case, 40),
