@@ -14,7 +14,7 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.measure.motion import motion_texts
 from heavytop.measure.rounding_noise import FACTORS, factor, scaled
-from heavytop.precision import dot
+from heavytop.precision import dot, exact_text
 from heavytop.top.equations import GYROSTAT, VARIABLES
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 
@@ -120,12 +120,17 @@ def _python(data: dict[str, Any]) -> str:
 
 
 def _python_of_body(case: Case) -> str:
+    start = case.given_start or case.start
+    spin = ("omega", start.omega) if start.omega_space is None else ("omega_space", start.omega_space)
+    parts = [spin, ("gamma", start.gamma)] if start.attitude is None else [spin]
+    vectors = [f"{name}=({', '.join(repr(exact_text(value)) for value in vector)})" for name, vector in parts]
+    rest = [] if start.attitude is None else [f"attitude=ht.{start.attitude!r}"]
     return "\n".join(
         [
             "import heavytop as ht",
             "",
             f"body = ht.{case.body!r}",
-            f"start = ht.{case.given_start!r}".replace("attitude=", "attitude=ht."),
+            f"start = ht.State({', '.join(vectors + rest)})",
             f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)",
             "run.quaternions(), run.positions()",
         ]

@@ -162,7 +162,7 @@ def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
             said = f"for {clip(_SYSTEMS.get(row.system, row.system), 40)}{smooth}: "
             said += f"{held} of {len(row.metrics)} equations proven"
             if refuted:
-                names = dict.fromkeys(q.name for q in [q for q in refuted if q.branch == _SMOOTH] or refuted)
+                names = sorted({quantity.name for quantity in refuted})
                 said += f", {len(refuted)} refuted: {clip(', '.join(names), 120)}"
             yield Note(said, Word(verdict))
 

@@ -599,13 +599,14 @@ def _begins_so(given: Examined, allowed: float) -> bool:
     field has to be compiled for that.
     """
     p = given.system.parameters(given.top, given.start).mapped(float)
-    y, time, states = numpy.array([float(value) for value in given.start.flat]), 0.0, []
+    y, time = numpy.array([float(value) for value in given.start.flat]), 0.0
 
     def rates(y: Array) -> Array:
         return numpy.array(given.system.field(p, y.tolist()))
 
-    early = given.at(given.rows[: FIRST[0]])
-    for end in map(float, early.times):
+    for row in given.rows[: FIRST[0]]:
+        sample = given.at([row])
+        end = float(sample.times[0])
         count = ceil(abs(end - time) * given.rate / _STEP)
         for h in [(end - time) / max(count, 1)] * count:
             a = rates(y)
@@ -613,8 +614,9 @@ def _begins_so(given: Examined, allowed: float) -> bool:
             c = rates(y + h / 2 * b)
             y = y + h / 6 * (a + 2 * b + 2 * c + rates(y + h * c))
         time = end
-        states.append(y)
-    return early.error((numpy.array(states).reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)) <= allowed
+        if not sample.error((y.reshape(-1, 2, 3) @ given.frame.axes.T).reshape(-1, 6)) <= allowed:
+            return False
+    return True
 
 
 def _axes_of_space(run: Examined, truth: Array) -> Iterator[Hypothesis]:

@@ -24,6 +24,7 @@ from heavytop.features.score.trajectories.observed import (
     AnyBody,
     GivenTrajectory,
     RawStart,
+    in_principal_axes,
     named,
     observed,
     require_states,
@@ -249,6 +250,18 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
     if at_start is not None:
         rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
         said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
+    _require_alike(said, case)
+
+
+def require_body(case: Case, body: Body) -> None:
+    """Raises InputError where a body, in whatever axes, has other principal moments or weight than the case."""
+    top, _ = in_principal_axes(body, 64)
+    moments = zip(sorted(top.inertia), sorted(case.top.inertia), strict=True)
+    said = [("weight", top.weight, case.top.weight)]
+    _require_alike([*said, *((f"principal moment {i}", new, old) for i, (new, old) in enumerate(moments, 1))], case)
+
+
+def _require_alike(said: Sequence[tuple[str, Any, Any]], case: Case) -> None:
     for what, new, old in said:
         if new != old and (isinstance(new, str) or abs(new - old) > max(abs(old), Fraction(1)) / 1000):  # three digits
             texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
@@ -414,6 +427,8 @@ def _observed(document: dict[str, Any], stem: str, case: Case | None, normalize:
     require_system(which)
     if case is not None and isinstance(body, HeavyTop):
         require_case(case, body, case.start, which, None)
+    elif case is not None and isinstance(body, Body):
+        require_body(case, body)
     raw = _raw_start(document, table, not times[0], said, case, not body.weight)
     precision = _precision(document, table.texts)
     quantities, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
