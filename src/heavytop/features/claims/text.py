@@ -155,12 +155,6 @@ def _table(report: Audit) -> Table:
     return table
 
 
-_SYMBOLS = (
-    "The residual of (1.1) is that of Omega', of the others left minus right side; omega1, gamma1: components of the "
-    "claimed Omega, gamma; ': d/dt."
-)
-
-
 def _in_lines(expression: str) -> str:
     """The expression in lines of at most 20 characters, broken behind an operator or a space, never inside a name."""
     lines = [""]
