@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.api.integrators import LANGUAGES, METHODS, new_integrator
+from heavytop.api.integrators import LANGUAGES, METHODS, engines, new_integrator
 from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.features.kinds import KINDS
@@ -204,3 +204,8 @@ def test_from_nothing_to_a_gate_on_the_command_line(tmp_path: Path) -> None:
     program = tmp_path / "mine" / "mine.py"
     program.write_text(program.read_text().replace("map(repr, y)", 'map("{:.6g}".format, y)'))
     assert heavytop("check-integrator", "mine/mine.toml") == 1
+
+
+def test_a_question_mark_lists_the_engines() -> None:
+    run = in_process.heavytop("new", "--engine", "?")
+    assert (run.returncode, run.stdout.split()) == (0, engines())

@@ -67,8 +67,11 @@ def new(
     at once: mine.toml (engine.toml) describes the program, gate.toml is the plan that measures it, and a workflow runs
     `heavytop gate` on GitHub.
     """
-    from heavytop.api.integrators import LANGUAGES, new_integrator
+    from heavytop.api.integrators import LANGUAGES, engines, new_integrator
 
+    if engine == "?":
+        print("\n".join(engines()))
+        return ExitCode.GOOD
     if folder is None and into is None:
         raise InputError("A folder must be named.", "Give DIR, or --into a repository.")
     made = (into or Path()) / (folder or "heavytop")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -82,7 +82,8 @@ def read_body(path: Path, link: str | None = None) -> BodyInFile:
     if not chosen:
         raise InputError(f"{path} holds no mass properties.", "A body needs its mass and its inertia tensor.")
     if len(chosen) > 1:
-        remedy = "Choose one with --link NAME." if link is None else "Give each of them another name."
+        remedy = f'Choose one: --link NAME, or link="{links[0][0]}" in Python.'
+        remedy = remedy if link is None else "Give each of them another name."
         raise InputError(f"{path} holds {len(chosen)} bodies: {names}.", remedy)
     body = chosen[0][1]()
     if body.mass <= 0:
@@ -185,6 +186,10 @@ class _Numbers:
         """Three numbers."""
         return vector(self._of(text, what, 3, default), what)
 
+    def four(self, text: str, what: str) -> list[Fraction]:
+        """Four numbers."""
+        return self._of(text, what, 4, None)
+
     def one(self, text: str | None, what: str) -> Fraction:
         """One number."""
         return self._of(text, what, 1, None)[0]
@@ -195,14 +200,31 @@ class _Numbers:
             raise InputError(f"{self.where}: {what} has {len(values)} numbers.", f"Give {count}.")
         return values
 
-    def tensor(self, texts: Sequence[str | None], what: Sequence[str]) -> tuple[Six, Fraction]:
+    def require_known(self, names: Iterable[str], element: Element, known: Sequence[str], what: str) -> None:
+        """Raises InputError for a name that is not of the format, unless it is of another namespace."""
+        for name in names:
+            if name not in known and not name.startswith("{"):
+                remedy = f"It has {', '.join(known)}." if known else "It has none."
+                raise InputError(f"{self.where}: unknown {what} {name} of <{element.tag}>.", remedy)
+
+    def attributes(self, element: Element | None, *known: str) -> Mapping[str, str]:
+        """Those of an element, all of them ``known``; none where it is not there."""
+        if element is None:
+            return {}
+        self.require_known(element.attrib, element, known, "attribute")
+        return element.attrib
+
+    def tensor(
+        self, texts: Sequence[str | None], what: Sequence[str], products: str | None = None
+    ) -> tuple[Six, Fraction]:
         """Six numbers, and the slack of their printed digits: an entry of ½ tr J − J collects four halves of a unit.
 
         Zeros at the end may have been left out, so that the finest number says the unit; at most a part of the largest.
+        products: what the format takes for a product of inertia that is not there.
         """
         self.units = []
         a, b, c, d, e, f = (
-            self._of(text, name, 1, None if index < 3 else "0")[0]
+            self._of(text, name, 1, None if index < 3 else products)[0]
             for index, (text, name) in enumerate(zip(texts, what, strict=True))
         )
         return (a, b, c, d, e, f), min(2 * min(self.units, default=Fraction(0)), _MOST_SLACK * max(map(abs, (a, b, c))))
@@ -231,13 +253,26 @@ def _in_axes(axes: Tensor, six: Six) -> Six:
 
 def _urdf(name: str, link: Element, inertial: Element) -> BodyInFile:
     numbers = _Numbers(f"link {name}")
-    origin, tensor, mass = inertial.find("origin"), inertial.find("inertia"), inertial.find("mass")
-    pose = {} if origin is None else origin.attrib
-    six, slack = numbers.tensor([(tensor.attrib if tensor is not None else {}).get(k) for k in _SIX_URDF], _SIX_URDF)
-    axes, value = _rpy(numbers, pose.get("rpy")), numbers.one(None if mass is None else mass.get("value"), "mass")
-    centre = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
+    numbers.attributes(inertial)
+    numbers.require_known([part.tag for part in inertial], inertial, ("origin", "mass", "inertia"), "element")
+    tensor = numbers.attributes(inertial.find("inertia"), *_SIX_URDF)
+    six, slack = numbers.tensor([tensor.get(key) for key in _SIX_URDF], _SIX_URDF)
+    value = numbers.one(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
+    axes, centre = _origin(numbers, inertial)
     shape = _shape_of(numbers, _shapes_of_urdf(numbers, link), value, centre)
     return BodyInFile(name, value, centre, _in_axes(axes, six), slack, False, None, *shape)
+
+
+def _origin(numbers: _Numbers, element: Element) -> tuple[Tensor, Vector]:
+    """Rotation and place of an element of a URDF."""
+    pose = numbers.attributes(element.find("origin"), "xyz", "rpy", "quat_xyzw")
+    centre, quaternion = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0"), pose.get("quat_xyzw")
+    if quaternion is None:
+        return _rpy(numbers, pose.get("rpy")), centre
+    if "rpy" in pose:
+        raise InputError(f"{numbers.where}: origin has rpy and quat_xyzw.", "Give one of them.")
+    x, y, z, w = numbers.four(quaternion, "quat_xyzw")
+    return _turn(w, x, y, z), centre
 
 
 Shape = tuple[Tensor, Vector, Vector]
@@ -291,29 +326,33 @@ def _shapes_of_urdf(numbers: _Numbers, link: Element) -> list[Shape]:
     for tag in ("collision", "visual"):
         shapes = []
         for part in link.findall(tag):
-            geometry, origin = part.find("geometry"), part.find("origin")
-            pose = {} if origin is None else origin.attrib
+            geometry = part.find("geometry")
             moments = None if geometry is None else _primitive(numbers, geometry, lambda shape, key: shape.get(key))
             if moments is None:
                 return []
-            middle = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0")
-            shapes.append((_rpy(numbers, pose.get("rpy")), middle, moments))
+            shapes.append((*_origin(numbers, part), moments))
         if shapes:
             return shapes
     return []
 
 
+_SDF_INERTIAL = ("mass", "pose", "inertia", "density", "auto_inertia_params", "fluid_added_mass")
+
+
 def _sdf(name: str, link: Element, inertial: Element) -> BodyInFile:
     numbers = _Numbers(f"link {name}")
-    if inertial.get("auto") == "true":
+    numbers.require_known([part.tag for part in inertial], inertial, _SDF_INERTIAL, "element")
+    if numbers.attributes(inertial, "auto").get("auto") == "true":
         raise InputError(
             f'{numbers.where}: inertial auto="true" has Gazebo compute mass and tensor from the shapes.',
             "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
         )
     axes, centre = _pose(numbers, inertial.find("pose"))
     tensor = inertial.find("inertia")
+    if tensor is not None:
+        numbers.require_known([part.tag for part in tensor], tensor, _SIX_URDF, "element")
     texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
-    six, slack = numbers.tensor(texts, _SIX_URDF)
+    six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
     mass = numbers.one(inertial.findtext("mass"), "mass")
     shapes: list[Shape] = []
     for part in link.findall("collision") or link.findall("visual"):
@@ -333,7 +372,8 @@ def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
     if pose is None:
         return _rpy(numbers, None), _ZERO
     values = numbers.read(pose.text, "pose", "0 0 0 0 0 0")
-    quaternion = pose.get("rotation_format") == "quat_xyzw"
+    form = numbers.attributes(pose, "rotation_format", "degrees", "relative_to", "frame")
+    quaternion = form.get("rotation_format") == "quat_xyzw"
     if len(values) != (7 if quaternion else 6):
         raise InputError(f"{numbers.where}: pose has {len(values)} numbers.", "Give x y z roll pitch yaw.")
     position = (values[0], values[1], values[2])
@@ -341,7 +381,7 @@ def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
         x, y, z, w = values[3:]
         return _turn(w, x, y, z), position
     text = " ".join(str(value) for value in values[3:])
-    return _rpy(numbers, text, pose.get("degrees") == "true"), position
+    return _rpy(numbers, text, form.get("degrees") == "true"), position
 
 
 def _mjcf(path: Path, root: Element) -> Iterator[Link]:
@@ -362,7 +402,8 @@ def _mjcf(path: Path, root: Element) -> Iterator[Link]:
 
 def _mjcf_body(name: str, body: Element, inertial: Element, frames: _MjcfFrames, defaults: _Defaults) -> BodyInFile:
     numbers = _Numbers(f"body {name}")
-    axes = frames.rotation(numbers, inertial.attrib)
+    known = ("pos", "mass", "diaginertia", "fullinertia", *_ORIENTATIONS)
+    axes = frames.rotation(numbers, numbers.attributes(inertial, *known))
     six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
     centre, mass = numbers.three(inertial.get("pos"), "pos"), numbers.one(inertial.get("mass"), "mass")
     joints = [defaults.attributes(joint) for joint in body.findall("joint")]

@@ -68,12 +68,14 @@ class MassProperties:
 class Slip:
     """A mistake in writing a tensor down that makes this one right.
 
-    inertia: the mended six numbers, None for one that the file does not hold.
+    inertia: the mended six numbers, None for one that the file does not hold.  mass, centre: mended, None where right.
     """
 
     name: str
     sentence: str
     inertia: tuple[Fraction | None, ...]
+    mass: Fraction | None = None
+    centre: Vector | None = None
 
 
 def rows(six: Sequence[Fraction]) -> Tensor:
@@ -185,6 +187,9 @@ def slips(body: MassProperties) -> list[Slip]:
 
 
 def _rod(body: MassProperties) -> Slip:
+    if not any(six_of(body.central)):
+        sentence = "All moments are 0, as of a point mass: its rotation has no equation. Give the body its moments."
+        return Slip("point_mass", sentence, body.six)
     return Slip(
         "rod",
         "A principal moment is 0, as of a rod without thickness: the rotation about it has no equation. "
@@ -218,9 +223,14 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     if body.at_pivot:
         slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
         yield slip, replace(body, at_pivot=False)
-        shrunk = [value / 1000 for value in body.centre]
-        slip = Slip("millimetres", "The centre of mass is in millimetres, and the tensor in metres.", n)
-        yield slip, replace(body, centre=(shrunk[0], shrunk[1], shrunk[2]))
+        centre = _metres(body.centre)
+        sentence = "The centre of mass is in millimetres, and the tensor in metres."
+        yield Slip("millimetres", sentence, n, centre=centre), replace(body, centre=centre)
+
+
+def _metres(centre: Vector) -> Vector:
+    x, y, z = (value / 1000 for value in centre)
+    return x, y, z
 
 
 def _mend(body: MassProperties, name: str, sentence: str, six: Sequence[Fraction]) -> tuple[Slip, MassProperties]:
@@ -271,18 +281,19 @@ def _of_units(body: MassProperties) -> Iterator[Slip]:
         return
     if dot(body.centre, body.centre) > (_FAR_CENTRE * size) ** 2:
         sentence = "The centre of mass is in millimetres: it lies more than a hundred sizes of the body away."
-        yield Slip("millimetres", sentence, body.six)
+        yield Slip("millimetres", sentence, body.six, centre=_metres(body.centre))
     density = float(body.mass) / size**3
     if 5 * density > _DENSEST:  # the box of this diagonal has at most its cube / 3√3
         only_mass = replace(body, mass=body.mass / 1000)
         if _PLAUSIBLE[0] < 5 * float(only_mass.mass) / _size(only_mass) ** 3 < _PLAUSIBLE[1]:
-            yield Slip("grams", "The mass is in grams: no material is as dense as this body.", body.six)
+            sentence = "The mass is in grams: no material is as dense as this body."
+            yield Slip("grams", sentence, body.six, only_mass.mass)
             return
     for name, length, mass, sentence in _UNITS:
         mended = _scaled(body, length, mass)
         wrong = 5 * density > _DENSEST if length == 1 else density < _THINNEST
         if wrong and _PLAUSIBLE[0] < 5 * float(mended.mass) / _size(mended) ** 3 < _PLAUSIBLE[1]:
-            yield Slip(name, sentence, mended.six)
+            yield Slip(name, sentence, mended.six, None if mass == 1 else mended.mass)
 
 
 def _of_products(body: MassProperties) -> Iterator[Slip]:
@@ -305,7 +316,7 @@ def _against_geometry(body: MassProperties) -> Iterator[Slip]:
         return
     for slip, mended in (*_conjugated(body), *_mends(body), *_about_pivot(body), *_of_scale(body)):
         if _distance(mended.central, mended.geometry or shape) * _ROUND < min(apart, Fraction(1, 5)):
-            yield slip
+            yield slip if mended.mass == body.mass else replace(slip, mass=mended.mass)
             return
 
 

@@ -172,7 +172,7 @@ def test_a_tensor_multiplied_in_double_is_read_by_its_upper_entries(tmp_path: Pa
 
 def test_no_mass_anywhere_is_no_body(tmp_path: Path) -> None:
     code, document = judged(tmp_path / "a.urdf", urdf(["0.0"] * 6))
-    assert (code, document["slips"][0]["name"]) == (1, "rod")  # type: ignore[index]
+    assert (code, document["slips"][0]["name"]) == (1, "point_mass")  # type: ignore[index]
 
 
 def test_a_plate_in_printed_digits_is_a_body(tmp_path: Path) -> None:
@@ -435,3 +435,73 @@ def test_angles_of_mjcf_are_of_its_sequence_and_a_ball_joint_of_its_class(tmp_pa
         found = read_body(path)
         assert found.six[:3] == moments
         assert found.joint == (0, 0, -1)
+
+
+INERTIAL = '<inertial><origin xyz="0.1 0 0.2"/><mass value="2"/><inertia ixx="1" iyy="1" izz="1" {}/></inertial>'
+PRODUCTS = 'ixy="0" ixz="0.1" iyz="0"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("ixz=", "Ixz=", "unknown attribute Ixz of <inertia>"),
+        ('ixz="0.1"', "", "ixz is missing"),
+        (PRODUCTS, "", "ixy is missing"),
+        ("xyz=", "xzy=", "unknown attribute xzy of <origin>"),
+        ("value=", "Value=", "unknown attribute Value of <mass>"),
+        ("<inertial>", '<inertial auto="true">', "unknown attribute auto of <inertial>"),
+        ('<origin xyz="0.1 0 0.2"/>', '<Origin xyz="0.1 0 0.2"/>', "unknown element Origin of <inertial>"),
+        ('xyz="0.1 0 0.2"', 'rpy="0 0 0" quat_xyzw="0 0 0 1"', "origin has rpy and quat_xyzw"),
+    ],
+)
+def test_what_a_urdf_misspells_or_leaves_out_is_named(tmp_path: Path, old: str, new: str, fault: str) -> None:
+    text = f'<robot name="r"><link name="leg">{INERTIAL.format(PRODUCTS)}</link></robot>'
+    path = tmp_path / "a.urdf"
+    path.write_text(text)
+    assert ht.Body.from_file(path).tensor[0][2] != 0
+    path.write_text(text.replace(old, new))
+    run = heavytop("body", path)
+    assert (run.returncode, fault in run.stderr) == (2, True), run.stderr
+
+
+def test_misspelt_numbers_of_sdf_and_mjcf_are_named_and_the_defaults_of_sdf_hold(tmp_path: Path) -> None:
+    path = tmp_path / "a.sdf"
+    path.write_text(sdf(SIX).replace("<ixz>-0.02</ixz>", ""))
+    assert read_body(path).six == (*map(Fraction, SIX[:4]), 0, Fraction(SIX[5]))
+    path.write_text(sdf(SIX).replace("ixz>", "Ixz>"))
+    with pytest.raises(ht.InputError, match="unknown element Ixz of <inertia>"):
+        read_body(path)
+    path.write_text(sdf(SIX).replace("<pose>", '<pose degree="true">'))
+    with pytest.raises(ht.InputError, match="unknown attribute degree of <pose>"):
+        read_body(path)
+    path.write_text(mjcf(SIX).replace("pos=", 'Quat="0 1 0 0" pos='))
+    with pytest.raises(ht.InputError, match="unknown attribute Quat of <inertial>"):
+        read_body(path)
+
+
+def test_attributes_of_the_schema_and_of_namespaces_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.urdf"
+    turned = urdf(SIX).replace('rpy="0 0 0"', 'quat_xyzw="0 0 1 0" x:note="1"').replace("<robot", '<robot xmlns:x="x"')
+    path.write_text(turned)
+    assert read_body(path).six[3:] == (Fraction("0.05"), Fraction("0.02"), Fraction("-0.04"))
+
+
+def test_corrected_mass_and_centre_are_printed_and_nothing_is_null(tmp_path: Path) -> None:
+    path = tmp_path / "a.urdf"
+    for text, expected in (
+        (urdf(SIX, mass="1e4"), 'corrected: mass = "10"'),
+        (urdf(SIX, centre="100 0 200"), 'corrected: centre = ["0.1", "0", "0.2"]'),
+        (urdf(SLIPS["row_major"][0]), "corrected: I11 = 0.31, I22 = 0.28, I12 = 0.05, I13 = -0.02, I23 = 0.04"),
+    ):
+        path.write_text(text)
+        output = heavytop("body", path).stdout
+        assert expected in output
+        assert "null" not in output
+
+
+def test_a_link_is_chosen_from_python_as_the_message_says(tmp_path: Path) -> None:
+    path = tmp_path / "a.urdf"
+    path.write_text(urdf(SIX).replace("</robot>", f'<link name="leg">{INERTIAL.format(PRODUCTS)}</link></robot>'))
+    with pytest.raises(ht.InputError, match='link="arm" in Python'):
+        ht.Body.from_file(path)
+    assert ht.Body.from_file(path, link="leg").mass == 2

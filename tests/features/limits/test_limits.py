@@ -132,3 +132,9 @@ def test_pictures_show_each_fault_each_method_and_each_axis() -> None:
         words = [text.get_text() for text in ht.plot.stability(body).texts]
         assert len(words) == 6
         assert sum(word.endswith(": unstable 0.577") for word in words) == 2
+
+
+def test_a_spacing_that_is_reduced_is_said_to_be() -> None:
+    words = ("propagate", "--case", "generic", "--times", "1", "--between")
+    assert "0.25 apart (0.3, reduced to a divisor of the last time)" in heavytop(*words, "0.3").stdout
+    assert "reduced" not in heavytop(*words, "0.25").stdout

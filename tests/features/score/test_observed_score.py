@@ -104,6 +104,16 @@ def test_the_sentence_says_what_fits_and_the_digits_that_are_right_with_it(tmp_p
     assert "so that 13.0 digits or more are right" in said or told.left > 1e-13
 
 
+@pytest.mark.slow
+def test_what_fits_as_well_is_named_with_its_numbers(tmp_path: Path) -> None:
+    conjugate = conventions.columns(quaternion=lambda q: q * np.array([1, -1, -1, -1]))
+    found = scored(conventions.as_csv(*BODY, Written(("quaternion",)), conjugate), tmp_path)
+    (told,) = found.diagnoses
+    assert [other.kind for other in told.others] == told.numbers["or"].split(", ") == ["column_scaled"]
+    sentence = to_json(found)["diagnosis"][0]["sentence"]
+    assert sentence.endswith("As well fits: w of the quaternion is −1 times what fits.")
+
+
 def lines(**changes: str) -> str:
     """A short right file of a top in principal axes, with some of its lines other."""
     said = {

@@ -113,8 +113,7 @@ class BodyAssessment:
             yield f"{self.name}: no rigid body has this tensor: {_reason(principal.moments)}"
         for slip in self.slips:
             yield f"  {slip.name}: {slip.sentence}"
-            if slip.inertia != self.given.six:
-                yield f"    corrected: inertia = {json.dumps(_mended(slip.inertia))}"
+            yield from (f"    corrected: {numbers}" for numbers in _corrected(slip, self.given))
         yield ""
         yield f"mass                {_decimal(self.given.mass)}"
         yield f"centre of mass      {', '.join(map(_decimal, self.given.centre))}   from the pivot"
@@ -130,7 +129,8 @@ class BodyAssessment:
             for axis, rotation in enumerate(self.rotations):
                 rate = f", rate {rotation.rate:.4g} of the angular velocity" if rotation.rate else ""
                 yield f"{'' if axis else 'free rotation':<20}about axis {axis + 1}: {rotation.verdict}{rate}"
-            yield from ("", self.toml, f"Its free tumble:\n  {self.command}")
+            as_given = () if self.sound else ("", "With the numbers of the file, not corrected:")
+            yield from (*as_given, "", self.toml, f"Its free tumble:\n  {self.command}")
 
 
 def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> BodyAssessment:
@@ -154,6 +154,19 @@ def _decimal(value: Fraction) -> str:
     """An exact decimal where at most 20 digits do, else 17 digits."""
     text = decimal_text(value, 20)
     return text if Fraction(text) == value else decimal_text(value, _DIGITS)
+
+
+def _corrected(slip: Slip, given: MassProperties) -> Iterator[str]:
+    """The numbers that a slip changes."""
+    if None in slip.inertia:
+        pairs = zip(_NAMES, slip.inertia, strict=True)
+        yield ", ".join(f"{name} = {_decimal(value)}" for name, value in pairs if value is not None)
+    elif slip.inertia != given.six:
+        yield f"inertia = {json.dumps(_mended(slip.inertia))}"
+    if slip.mass is not None:
+        yield f"mass = {json.dumps(_decimal(slip.mass))}"
+    if slip.centre is not None:
+        yield f"centre = {json.dumps([*map(_decimal, slip.centre)])}"
 
 
 def _mended(inertia: Sequence[Fraction | None]) -> list[str | None]:

@@ -44,6 +44,7 @@ class BetweenSamples(Tabular):
     errors: dict[str, float | None]
     within: float | None
     largest: dict[str, Fraction | None]
+    asked: Fraction
 
     def to_json(self) -> dict[str, Any]:
         """The entry ``between`` of a document."""
@@ -59,6 +60,8 @@ class BetweenSamples(Tabular):
         head = ("method", "largest error")
         wanted = () if self.within is None else (f"largest Δt for {self.within:.1e}",)
         title = f"Between samples {decimal_text(self.spacing, 6)} apart"
+        if self.asked != self.spacing:
+            title += f" ({decimal_text(self.asked, 6)}, reduced to a divisor of the last time)"
         return TitledTable(title, (*head, *wanted), [row(name) for name in METHODS])
 
 
@@ -75,7 +78,7 @@ def between_samples(
 
     Arguments:
         top, start, system: as in :func:`heavytop.propagate`.
-        until, spacing: exact, positive; samples are equally spaced, at most ``spacing`` apart, the last at ``until``.
+        until, spacing: exact, positive; of samples, ``spacing`` being reduced to a divisor of ``until``.
         within: the error wanted, above 1e-12.
 
     Returns:
@@ -97,7 +100,7 @@ def between_samples(
         raise InputError(f"{count} intervals are more than {_MOST}.", "Give a larger spacing, or an earlier time.")
     errors = lru_cache(maxsize=None)(_Sampled(body, state, about, end).errors)
     largest = {} if wanted is None else {name: _largest(errors, name, wanted, end, count) for name in METHODS}
-    return BetweenSamples(end, end / count, errors(count), wanted, largest)
+    return BetweenSamples(end, end / count, errors(count), wanted, largest, step)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,11 @@ Ends = Annotated[
     typer.Option("--digits-end", help="Also the times by which one rounding costs the first digit, and all digits."),
 ]
 Between = Annotated[
-    str | None, typer.Option(metavar="DT", help="Also the error of interpolation between samples DT apart.")
+    str | None,
+    typer.Option(
+        metavar="DT",
+        help="Also the error of interpolation between samples DT apart, reduced to a divisor of the last time.",
+    ),
 ]
 Within = Annotated[str | None, typer.Option(metavar="ERROR", help="With --between: the largest DT for this error.")]
 

@@ -128,15 +128,7 @@ def sentence(fit: Diagnosis) -> str:
     if fit.kind == "columns_disagree":
         apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
         return f"Columns contradict each other: {apart}."
-    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
-    said += f" ({numbers['entries']} alone)" if "entries" in numbers else ""
-    said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
-    where = {
-        "columns": ", in the columns but not in the start",
-        "start": ", in the start but not in the columns",
-        "rates": ". Found by comparing Ω with the rate at which the attitude turns, which needs no reference",
-    }
-    said += where.get(numbers.get("of", ""), "")
+    said = _mistake(fit)
     if fit.error is None or fit.left is None:
         return f"{said}."
     if numbers.get("of") == "rates":
@@ -146,7 +138,20 @@ def sentence(fit: Diagnosis) -> str:
     left = f"less than {FLOOR:.0e}" if more else f"{fit.left:.2e}"
     fall = f"the largest error relative to the size of each quantity falls from {fit.error:.2e} to {left}"
     text = f"{said}. Found by computing the motion that follows: {fall}, so that {digits:.1f} digits{more} are right."
-    return text + (f" As well fits: {numbers['or'].replace('_', ' ')}." if "or" in numbers else "")
+    return text + (f" As well fits: {'. Or: '.join(map(_mistake, fit.others))}." if fit.others else "")
+
+
+def _mistake(fit: Diagnosis) -> str:
+    numbers = fit.numbers
+    said = "; ".join(_CONVENTION_SENTENCES[kind].format(**numbers) for kind in fit.kind.split("+"))
+    said += f" ({numbers['entries']} alone)" if "entries" in numbers else ""
+    said += f" ({numbers['steps']} of the method)" if "steps" in numbers else ""
+    where = {
+        "columns": ", in the columns but not in the start",
+        "start": ", in the start but not in the columns",
+        "rates": ". Found by comparing Ω with the rate at which the attitude turns, which needs no reference",
+    }
+    return said + where.get(numbers.get("of", ""), "")
 
 
 # What explains the error of a motion, in a sentence each.

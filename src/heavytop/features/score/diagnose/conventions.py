@@ -253,13 +253,19 @@ class Suppositions:
         best = min(max(left, FLOOR) for _, left in explained)
         alike = [(attempt, left) for attempt, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
         first, _ = alike[0]
-        # of one kind the number that fits best
-        first, left = min((pair for pair in alike if pair[0].kind == first.kind), key=lambda pair: max(pair[1], FLOOR))
+        first, left = _of_kind(first.kind, alike)
         # with a number that was fitted more can be explained
-        equal = [attempt for attempt, _ in alike if attempt.drop <= first.drop]
-        others = list(dict.fromkeys(attempt.kind for attempt in equal if attempt.kind != first.kind))[:_MOST_OTHERS]
-        numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(others)} if others else {})
-        return replace(self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)])), likely=bool(drop))
+        equal = [pair for pair in alike if pair[0].drop <= first.drop and pair[0].kind != first.kind]
+        kinds = list(dict.fromkeys(attempt.kind for attempt, _ in equal))[:_MOST_OTHERS]
+        others = tuple(Diagnosis(kind, {"of": DATA, **_of_kind(kind, equal)[0].numbers}) for kind in kinds)
+        numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(kinds)} if kinds else {})
+        diagnosis = self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)]))
+        return replace(diagnosis, likely=bool(drop), others=others)
+
+
+def _of_kind(kind: str, tried: Sequence[tuple[_Try, float]]) -> tuple[_Try, float]:
+    """The attempt of a kind whose number fits best, and the error that it leaves."""
+    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: max(pair[1], FLOOR))
 
 
 def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:

@@ -72,7 +72,7 @@ class Diagnosis:
     error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
     of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
     looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
-    likely: whether the error falls by less than a statement asks for.
+    likely: whether the error falls by less than a statement asks for.  others: what explains them as well.
     """
 
     kind: str
@@ -81,6 +81,7 @@ class Diagnosis:
     left: float | None = None
     looked_at: tuple[int, int, str] | None = None
     likely: bool = False
+    others: tuple[Diagnosis, ...] = ()
 
 
 class Hypothesis(NamedTuple):
