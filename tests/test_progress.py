@@ -143,10 +143,12 @@ def test_nothing_is_written_where_there_is_no_terminal(capfd: pytest.CaptureFixt
 @pytest.mark.slow
 def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
     master, slave = pty.openpty()
-    line = [sys.executable, "-m", "heavytop", "reference", "--inertia", "3,5/2,3/2", "--weight", "3/2"]
-    line += ["--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10", "--gamma", "3/5,0,4/5", "--times", "100"]
+    # drawn a hundred times a second: a fast machine is through in less than the half second between two draws
+    script = "from heavytop.cli import output; from heavytop.__main__ import main; output._EVERY = 0.01; main()"
+    line = [sys.executable, "-c", script, "reference", "--inertia", "3,5/2,3/2", "--weight", "3/2"]
+    line += ["--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10", "--gamma", "3/5,0,4/5", "--times", "300"]
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
-    line += ["--digits", "20", "--json"]
+    line += ["--digits", "60", "--json"]
     done = subprocess.run(line, stdout=subprocess.PIPE, stderr=slave, env=environment, timeout=120, check=True)
     os.close(slave)
     written = b""
