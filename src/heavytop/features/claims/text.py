@@ -128,7 +128,8 @@ def audit_text(report: Audit) -> RenderableType:
         parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
     parts += _entry(report)
     solved = ", ".join(report.solves) or "none of the systems known here"
-    parts += [Text(), Text(f"{_PROVEN[report.kind]}: {solved}")]
+    where = f", where {' and '.join(f'{text} = 0' for text in report.where)}" if report.where and report.solves else ""
+    parts += [Text(), *map(Text, _folded(f"{_PROVEN[report.kind]}: {solved}{where}", 0))]
     return Group(*parts)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from heavytop.errors import ExitCode, InputError
 from heavytop.features.score.api import Score, read_trajectory, scored
+from heavytop.features.score.text import requirement
 from heavytop.measure.scalar import RELATIVE, digits_text
 from heavytop.precision import DOUBLE, exact, exact_text
 from heavytop.processes import ChildContext
@@ -30,6 +31,7 @@ class ScoredFile:
     """A file with its score, or why it is missing.
 
     method: what files have in common that differ in their step alone; step: 0 where the file does not say it.
+    required: whether it has the digits that were required, in a sentence.
     """
 
     path: str
@@ -40,6 +42,7 @@ class ScoredFile:
     method: tuple[str, ...] = ()
     step: Fraction = Fraction(0)
     error: float | None = None
+    required: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +76,9 @@ def _scored_file(path: str, case: str | None, require: str | None, normalize: bo
     document = {"file": path, **score.to_json()}
     digits = "-" if score.digits_kept is None else digits_text(score.digits_kept)
     said = "; ".join(diagnosis.kind for diagnosis in score.assessment.diagnoses)
-    return ScoredFile(
-        path, document, score.exit_code, digits, said, (motion.integrator, *body), _step(motion.flags), _error(score)
-    )
+    method, step = (motion.integrator, *body), _step(motion.flags)
+    required = "" if needed is None else requirement(score.row, needed)
+    return ScoredFile(path, document, score.exit_code, digits, said, method, step, _error(score), required)
 
 
 def _step(flags: dict[str, str]) -> Fraction:
@@ -113,7 +116,7 @@ def text(files: Sequence[ScoredFile]) -> str:
     for order in orders(files):
         said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *(f"{clip(file.path, width)}: {file.required}" for file in files if file.required)])
 
 
 def exit_code(files: Sequence[ScoredFile]) -> int:

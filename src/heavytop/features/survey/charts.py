@@ -23,7 +23,7 @@ _NAMES = {
     "error_omega": "error of Ω",
     "error_gamma": "error of γ",
     "error_scaled": "error in eps T^1.5",
-    "drift_gamma_squared": "drift of γ²",
+    "drift_gamma_squared": "drift of |γ|²",
     "drift_area": "drift of M·γ",
     "drift_energy": "drift of the energy",
     "drift_further": "drift of further integrals",
@@ -41,13 +41,14 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
     rows = [(source, row) for source, report in sources for row in report.rows if isinstance(row.spread, Spread)]
     if not rows:
         return None
+    drawn = " and ".join(dict.fromkeys(short(min(row.horizon, str(_LONGEST), key=exact)) for _, row in rows))
     section = Section(
         "surveys",
         "Surveys of many motions",
         [
             "A distribution is the part of the motions in each quarter of a decade. In the map a stronger colour "
             "means fewer digits right (the median). Each of the worst motions is drawn as the path of the "
-            f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {_LONGEST}; dashed behind.",
+            f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {drawn}; dashed behind.",
         ],
         columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
         across=2,

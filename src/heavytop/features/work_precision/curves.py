@@ -16,6 +16,8 @@ from heavytop.report.document.document import Headline, In, Table, clip, scienti
 _MOST_CASES = 2
 _ABOVE_ROUNDING = 100
 """Times the roundings of all steps: an error from which an order is read."""
+_APART = 1.2
+"""Times the finer of two steps: less says nothing of an order."""
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 
@@ -59,11 +61,15 @@ class WorkPrecisionLine:
 
     @property
     def order(self) -> float | None:
-        """The order that whole runs show: between the two finest steps whose errors are more than rounding."""
+        """The order that whole runs show: between the two finest steps whose errors are more than rounding; None where
+        these are nearly equal or the error does not fall.
+        """
         finest = sorted((point for point in self.points if point.step), key=lambda point: point.step)[:2]
-        if len({point.step for point in finest}) < 2:
+        if len(finest) < 2:
             return None
         fine, coarse = finest
+        if coarse.step < _APART * fine.step or coarse.log10 <= fine.log10:
+            return None
         return (coarse.log10 - fine.log10) / math.log10(coarse.step / fine.step)
 
     @property
@@ -120,7 +126,7 @@ class Lead:
 
     @property
     def ratio(self) -> float | None:
-        """How many times faster heyoka is."""
+        """How many times as fast as the fastest other heyoka is."""
         return self._ratio(self.ours)
 
     def _ratio(self, seconds: float | None) -> float | None:
@@ -154,7 +160,7 @@ class Lead:
             parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
         else:
             pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
-            parts = [f"{goal} is {_speed(self.ratio)} than the best other integrator, {self.other} ({pair})"]
+            parts = [f"{goal} is {_speed(self.ratio)} as the best other integrator, {self.other} ({pair})"]
         if self.general is not None:
             parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
         if self.lanes is not None:
@@ -196,8 +202,8 @@ def panels(rows: Sequence[Row]) -> dict[str, list[WorkPrecisionLine]]:
 
 def _step(row: Row, log10: float) -> float:
     """The step of a row, mean where a tolerance sets it, whose error is more than its roundings, in one direction, come
-    to as the motion amplifies them; else 0, as where samples bound the steps, and of heyoka, whose order is another for
-    each tolerance.
+    to as the motion amplifies them; else 0, as where samples bound the steps, and of heyoka and multiword, whose order
+    is another for each tolerance.
     """
     factor = max(_ABOVE_ROUNDING, row.amplification or 1)
     rounding = math.log10(factor * max(row.steps, 1) * float(parse(row.precision).eps))
@@ -206,7 +212,8 @@ def _step(row: Row, log10: float) -> float:
     subject = row.key.subject
     if subject.step not in ("", FINEST):
         return float(exact(subject.step))
-    adaptive = subject.tolerance and row.order and subject.name not in (OURS, CONSTANTS, LANES)
+    own = subject.name in INTEGRATORS and INTEGRATORS[subject.name].own
+    adaptive = subject.tolerance and row.order and not own
     return float(exact(row.horizon)) / row.steps if adaptive and row.steps > 4 * row.samples else 0.0
 
 
@@ -287,7 +294,7 @@ def _quickest(lines: Sequence[WorkPrecisionLine], log10: float) -> tuple[float |
 
 
 def _speed(ratio: float) -> str:
-    return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
+    return f"{ratio:.1f} × as fast" if ratio >= 1 else f"{ratio:.2g} × as fast"
 
 
 def seconds_text(seconds: float, digits: int = 3) -> str:

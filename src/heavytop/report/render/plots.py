@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -12,7 +13,7 @@ from heavytop.display import plural
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import Law, Metric, Quantity, Report, Row, Series
+from heavytop.records import Law, Metric, Quantity, Report, Row, RowKey, Series
 from heavytop.report.document.document import (
     DASHED,
     MOST_PLOTS,
@@ -102,11 +103,12 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "Errors over time",
         [
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
-            "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
-            "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
+            "that six digits are lost. Of the first integrals the one that drifts farthest at any sample is drawn. A first "
+            "integral that holds does not prove that the motion is right: the distance from the true motion stands "
+            "beside it.",
             "A shade around a curve is the interval in which rounding noise alone moves it.",
         ],
-        columns=["case", "run", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
+        columns=["case", "run", "quantity", "largest", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
         place=30,
     )
     wanted = set(first)
@@ -136,13 +138,15 @@ def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple
     decades(axes.xaxis)
     decades(axes.yaxis)
     chart = _Chart(axes, f"{clip(case, 40)}: {column.label}", [], [])
-    lacking = []
+    lacking, rows_of = [], defaultdict[RowKey, list[Row]](list)
+    for _, row in members:
+        rows_of[row.key].append(row)
     for key, row in members:
-        largest = _largest(column.of(row))
-        if largest is None:
+        largest = _largest(column, rows_of[row.key])
+        if largest is None or largest not in (series := column.of(row)):
             lacking.append(key.label)
         else:
-            _curve(section, chart, clip(case, 40), key, row, *largest)
+            _curve(section, chart, clip(case, 40), key, row, largest, series[largest])
     if not axes.lines:
         return None
     if lacking and column is _COLUMNS[-1]:
@@ -170,17 +174,21 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
     what = quantity.component.replace("_", " ")
     chart.alternative.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
     named = f"{'drift of' if quantity.name == DRIFT else 'error'} {what}"
-    section.rows.append([case, key.label, named, short(held.times[-1]), short(held.values[-1]), *_law_words(law)])
+    most = row.metrics.get(quantity.over("max").text)
+    last = [short(held.times[-1]), short(held.values[-1])]
+    section.rows.append([case, key.label, named, short(most.value) if most else "", *last, *_law_words(law)])
 
 
-def _largest(series: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
-    """The series whose last number is the largest."""
-
-    def end(pair: tuple[Quantity, Series]) -> float:
-        size = logarithm(pair[1].values[-1])
-        return -math.inf if size is None else size
-
-    return max(((q, series) for q, series in series.items() if series.values), key=end, default=None)
+def _largest(column: _Column, rows: Sequence[Row]) -> Quantity | None:
+    """The quantity with a series whose largest number over all samples of one of the rows is the largest."""
+    sizes: dict[Quantity, float] = {}
+    for row in rows:
+        for quantity, series in column.of(row).items():
+            if series.values:
+                most = row.metrics.get(quantity.over("max").text)
+                size = most.log10 if most else logarithm(series.values[-1])
+                sizes[quantity] = max(sizes.get(quantity, -math.inf), -math.inf if size is None else size)
+    return max(sizes, key=sizes.__getitem__, default=None)
 
 
 def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:

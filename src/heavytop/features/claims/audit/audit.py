@@ -163,7 +163,8 @@ def audit_claim(
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
-    return Audit(*said, deciding, claim.unused if isinstance(claim, Assuming) else ())
+    unused = claim.unused if isinstance(claim, Assuming) else ()
+    return Audit(*said, deciding, unused, claim.conditions if isinstance(claim, UserIntegral) else ())
 
 
 def _rows(

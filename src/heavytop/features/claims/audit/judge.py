@@ -106,7 +106,7 @@ class Audit(Tabular):
     satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
     constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
     deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
-    unused: parameters of a file that stand in its assumptions at most.
+    unused: parameters of a file that stand in its assumptions at most.  where: what is 0 where an integral is claimed.
     """
 
     claim: str
@@ -120,6 +120,7 @@ class Audit(Tabular):
     entry: Entry | None = None
     deciding: tuple[tuple[str, str], ...] = ()
     unused: tuple[str, ...] = ()
+    where: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -146,7 +147,7 @@ class Audit(Tabular):
         }
         if self.entry is not None:
             document["entry"] = msgspec.to_builtins(self.entry)
-        document |= {"unused": list(self.unused)} if self.unused else {}
+        document |= {name: list(texts) for name, texts in (("unused", self.unused), ("where", self.where)) if texts}
         return document | ({"would_decide": dict(self.deciding)} if self.deciding else {})
 
     def _table(self) -> TitledTable:

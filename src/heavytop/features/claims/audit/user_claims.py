@@ -375,6 +375,11 @@ class UserIntegral(FileClaim):
         return self.content.integral
 
     @property
+    def conditions(self) -> tuple[str, ...]:
+        """The formulas of ``where`` as they are written."""
+        return tuple(self._table.where)
+
+    @property
     def setting(self) -> Setting:
         """That of the states."""
         return self.at_states

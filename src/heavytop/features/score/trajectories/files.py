@@ -399,14 +399,19 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     rows = _list(document, "states")
     require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
-    precision = _precision(document, [str(value) for row in texts for value in row])
+    labels = document.get("numbers") or [f"states[{index}]" for index in range(len(texts))]
+    numbers = [
+        [observed_columns.cell_of(v, f"{label.capitalize()}, {name}") for v, name in zip(row, VARIABLES, strict=True)]
+        for label, row in zip(labels, texts, strict=True)
+    ]
+    precision = _precision(document, [value for row in texts for value in row])
     from_row = at_start is not None and start == at_start
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
     if normalize:
         start = start.normalized()
     start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
-    states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
+    states = [rounded_state(row, precision) for row in numbers]
     about = _about(document, stem, case, None in states)
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
 
