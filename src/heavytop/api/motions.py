@@ -448,6 +448,7 @@ class Integrator:
             and named(integrator) == "heyoka"
             and self._system is not GYROSTAT
             and isinstance(self._top, HeavyTop)
+            and "step" not in self._options  # refused by a call
         )
         if self._is_plain:
             self._prepare()

@@ -722,6 +722,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
     if not integrator.ensemble:
         require(integrator)
         raise InputError(f"The integrator {integrator.name} runs one motion at a time.", "Call propagate for each.")
+    _with(loaded(integrator.function), integrator.name, dict.fromkeys(options.keys() - {"threads"}))  # refuses unknown
     run = _with(loaded(integrator.ensemble), integrator.name, options)
 
     def call(problems: Sequence[Problem], times: Sequence[OrderedRing], **more: Any) -> Any:
