@@ -80,6 +80,10 @@ class InputError(HeavyTopError):
     """Bad input: a number, a top, a start, a plan, a file."""
 
 
+class MissingFunction(InputError):
+    """A name that a Python file does not define; names the functions that it has."""
+
+
 class MissingExtra(InputError):
     """A package of an extra that is not installed; names the extra and the command that installs it."""
 

@@ -10,6 +10,7 @@ from time import monotonic, sleep
 
 import pytest
 
+from heavytop.errors import MissingFunction
 from heavytop.harness import integrator_check
 from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
@@ -83,6 +84,12 @@ def test_noise_of_the_size_of_the_error_moves_a_top_at_rest(
     (tmp_path / "mine.py").write_text(program)
     contract = integrator_check._Contract(named(f"{tmp_path / 'mine.py'}:solve"))
     assert integrator_check._judged("rest", contract._rest).verdict == verdict
+
+
+def test_a_name_that_the_file_lacks_is_no_broken_contract(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", "pass"))
+    with pytest.raises(MissingFunction, match=r"mine.py has no absent.\n  Its functions: solve\."):
+        integrator_check._part(named(f"{tmp_path / 'mine.py'}:absent"), 0)
 
 
 @pytest.mark.slow

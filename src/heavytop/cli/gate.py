@@ -72,7 +72,9 @@ def gate(
         print_json(differences.to_json())
     else:
         print(f"{ended.summary}\n")
-        show_on_terminal(comparison(differences))
+        by_rules = f" --policy {quote(str(rules))}" if rules else ""
+        show = f"heavytop compare {quote(str(baseline))} {quote(str(out))}{by_rules} --full"
+        show_on_terminal(comparison(differences, for_full=show))
     return differences.exit_code
 
 

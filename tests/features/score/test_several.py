@@ -43,6 +43,10 @@ def test_files_are_scored_in_parallel_and_a_bad_one_does_not_stop_the_others(tmp
         (tmp_path / f"{name}.csv").write_text(HEAD.format("mine", step) + ROWS.format(off))
     (tmp_path / "bad.csv").write_text("none\n")
     paths = [str(tmp_path / f"{name}.csv") for name in ("coarse", "bad", "fine")]
+    done = heavytop("score", paths[0], paths[2], "--require", "4.3")
+    assert done.returncode == ExitCode.FINDING
+    assert done.stdout.splitlines()[-2].endswith("coarse.csv: 4.3 digits are required: 4 are right.")
+    assert done.stdout.splitlines()[-1].endswith("fine.csv: 4.3 digits are required: they are right.")
     done = heavytop("score", *paths, "--json")
     assert done.returncode == ExitCode.BAD_INPUT
     document = json.loads(done.stdout)

@@ -116,7 +116,7 @@ def text(files: Sequence[ScoredFile]) -> str:
     for order in orders(files):
         said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")
-    return "\n".join([*lines, *(f"{clip(file.path, width)}: {file.required}" for file in files if file.required)])
+    return "\n".join([*lines, *(f"{clip(file.path, 400)}: {file.required}" for file in files if file.required)])
 
 
 def exit_code(files: Sequence[ScoredFile]) -> int:

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from heavytop.integrate.registry import INTEGRATORS
 from heavytop.measure.scorer import ERRORS
 from heavytop.precision import exact, parse
-from heavytop.records import FINEST, UNMEASURED, UNRESOLVED_SECONDS, Row
+from heavytop.records import FINEST, MULTIWORD, UNMEASURED, UNRESOLVED_SECONDS, Row
 from heavytop.report.document.document import Headline, In, Table, clip, scientific
 
 _MOST_CASES = 2
 _ABOVE_ROUNDING = 100
 """Times the roundings of all steps: an error from which an order is read."""
 _APART = 1.2
-"""Times the finer of two steps: less says nothing of an order."""
+"""Times the finer of two steps that show an order: roundings move that of nearer ones."""
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 
@@ -61,16 +61,14 @@ class WorkPrecisionLine:
 
     @property
     def order(self) -> float | None:
-        """The order that whole runs show: between the two finest steps whose errors are more than rounding; None where
-        these are nearly equal or the error does not fall.
+        """The order that whole runs show: between the finest step whose error is more than rounding and the next one
+        that is not nearly equal; None where a coarser one has no larger error.
         """
-        finest = sorted((point for point in self.points if point.step), key=lambda point: point.step)[:2]
-        if len(finest) < 2:
+        points = sorted((point for point in self.points if point.step), key=lambda point: point.step)
+        coarse = next((point for point in points if point.step >= _APART * points[0].step), None)
+        if coarse is None or min(point.log10 for point in points[1:]) <= points[0].log10:
             return None
-        fine, coarse = finest
-        if coarse.step < _APART * fine.step or coarse.log10 <= fine.log10:
-            return None
-        return (coarse.log10 - fine.log10) / math.log10(coarse.step / fine.step)
+        return (coarse.log10 - points[0].log10) / math.log10(coarse.step / points[0].step)
 
     @property
     def order_text(self) -> str:
@@ -212,8 +210,7 @@ def _step(row: Row, log10: float) -> float:
     subject = row.key.subject
     if subject.step not in ("", FINEST):
         return float(exact(subject.step))
-    own = subject.name in INTEGRATORS and INTEGRATORS[subject.name].own
-    adaptive = subject.tolerance and row.order and not own
+    adaptive = subject.tolerance and row.order and subject.name not in (OURS, CONSTANTS, LANES, MULTIWORD)
     return float(exact(row.horizon)) / row.steps if adaptive and row.steps > 4 * row.samples else 0.0
 
 

@@ -11,13 +11,15 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, MissingFunction, PeerFailed
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
+_MOST_NAMED = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +41,17 @@ class PythonFile:
             status = path.stat()
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror}.", "Give FILE.py:FUNCTION.") from None
-        module: Any = _module(path, (status.st_mtime_ns, status.st_size))
-        for part in self.function.split("."):
-            try:
-                module = getattr(module, part)
-            except AttributeError:
-                raise InputError(f"{self.path} has no {self.function}.", "Give FILE.py:FUNCTION.") from None
-        return as_peer(module, self.name)
+        module = _module(path, (status.st_mtime_ns, status.st_size))
+        try:
+            call = attrgetter(self.function)(module)
+        except AttributeError:
+            functions = (name for name, value in vars(module).items() if inspect.isfunction(value))
+            own = ", ".join(
+                [name for name in functions if vars(module)[name].__module__ == module.__name__][:_MOST_NAMED]
+            )
+            remedy = f"Its functions: {own}." if own else "Give FILE.py:FUNCTION."
+            raise MissingFunction(f"{self.path} has no {self.function}.", remedy) from None
+        return as_peer(call, self.name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,15 +21,15 @@ _MOST = 200
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
 
 
-def comparison(result: Differences, full: bool = False) -> RenderableType:
+def comparison(result: Differences, full: bool = False, for_full: str = "--full") -> RenderableType:
     """Verdict and findings first, then a line for each row that changed, the worst first, then what else differs.
 
-    full: every metric that changed in place of a line for each row.
+    full: every metric that changed in place of a line for each row.  for_full: the option or command that shows them.
     """
     parts: list[RenderableType] = [Text(headline(result), style="bold")]
     parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
     if result.rows:
-        parts += [Text(), *(_metrics(result) if full else _rows(result))]
+        parts += [Text(), *(_metrics(result) if full else _rows(result, for_full))]
     for motions in result.motions:
         parts += _motions(motions)
     if result.environment:
@@ -39,7 +39,7 @@ def comparison(result: Differences, full: bool = False) -> RenderableType:
     return Group(*parts)
 
 
-def _rows(result: Differences) -> Iterator[RenderableType]:
+def _rows(result: Differences, for_full: str) -> Iterator[RenderableType]:
     """A line for each row, the worst first; broken between words alone."""
     for change in result.rows[:_MOST]:
         verdict = change.verdict.value
@@ -50,7 +50,8 @@ def _rows(result: Differences) -> Iterator[RenderableType]:
             yield shown
     if len(result.rows) > _MOST:
         yield Text(f"and {len(result.rows) - _MOST} more: --json lists all, --html FILE draws them")
-    yield Text("Every metric that changed: --full", style="dim")
+    lines = wrapped(printable(f"Every metric that changed: {for_full}"), "    ", "", 78)
+    yield Text(" \\\n".join(lines), style="dim")
 
 
 def _motions(motions: WorseMotions) -> Iterator[RenderableType]:

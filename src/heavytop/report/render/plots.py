@@ -103,12 +103,11 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "Errors over time",
         [
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
-            "that six digits are lost. Of the first integrals the one that drifts farthest at any sample is drawn. A first "
-            "integral that holds does not prove that the motion is right: the distance from the true motion stands "
-            "beside it.",
+            "that six digits are lost. Of the first integrals the one that drifts farthest at any sample is drawn. One "
+            "that holds does not prove that the motion is right: the distance from the true motion stands beside it.",
             "A shade around a curve is the interval in which rounding noise alone moves it.",
         ],
-        columns=["case", "run", "quantity", "largest", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
+        columns=["case", "run", "quantity", "largest", "last |t|", "last", "law", "exponent", "digits gone at |t|"],
         place=30,
     )
     wanted = set(first)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -83,7 +84,8 @@ def title(text: str) -> Text:
 @dataclass(slots=True)
 class Lines:
     """A table without lines, as wide as where it is printed; where its words do not fit beside each other, a block for
-    each row: its first cell, and then every other one behind the name of its column.  No word is broken.
+    each row, below the name of the first column: its first cell, and then every other one behind the name of its
+    column.  No word is broken.
 
     words: how many first columns are words; the others are numbers.  left: the last column is words too.
     head: stands above the first column.
@@ -102,18 +104,17 @@ class Lines:
         rows = [[_styled(cell) for cell in row] for row in self.rows]
         cells = [columns, *([cell.plain for cell in row] for row in rows)]
         widths = [
-            max(cell_len(word) for row in cells for word in [*row[i].split(" "), ""]) for i in range(len(columns))
+            max(cell_len(word) for row in cells for word in [*_glued(row[i]).split(" "), ""])
+            for i in range(len(columns))
         ]
         wides = [max(cell_len(row[index]) for row in cells) for index in range(len(columns))]
         edge = not self.head
         room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
         if sum(widths) + 2 * len(widths) > options.max_width or (self.head and room < widths[0]):
-            yield from ([Text(self.head)] if self.head else [])
+            yield from ([Text(columns[0], style="" if self.head else "dim")] if columns[0] else [])
             yield from _blocks(columns, rows, options.max_width)
             return
         if widths[0] + 2 <= room < wides[0]:
-            for row in rows:  # what is broken is indented
-                row[0] = Text("\n".join(wrapped(row[0].plain, "  ", "", room)), style=row[0].style)
             wides[0] = room
         while sum(wides) + 2 * len(wides) > options.max_width:  # the widest is made narrower, no cell than its words
             wides[max(range(len(wides)), key=lambda index: (wides[index] > widths[index], wides[index]))] -= 1
@@ -121,9 +122,22 @@ class Lines:
         for index, (column, wide) in enumerate(zip(columns, wides, strict=True)):
             words = index < self.words or (self.left and index == len(columns) - 1)
             made.add_column(Text(column), justify="left" if words else "right", width=wide)
+        indent = "  " if widths[0] + 2 <= wides[0] else ""  # of what is broken
         for row in rows:
-            made.add_row(*row)
+            made.add_row(_broken(row[0], wides[0], indent), *map(_broken, row[1:], wides[1:]))
         yield made
+
+
+def _glued(text: str) -> str:
+    """The text with other spaces where no line is broken: beside ±, and inside parts that two spaces separate."""
+    return re.sub(r"(?<! ) (?! )" if "  " in text else r" (?=±)|(?<=±) ", "\u00a0", text)
+
+
+def _broken(cell: Text, width: int, indent: str = "") -> Text:
+    """The cell in lines of at most that width."""
+    if cell_len(cell.plain) <= width:
+        return cell
+    return Text("\n".join(wrapped(_glued(cell.plain), indent, "", width)).replace("\u00a0", " "), style=cell.style)
 
 
 def _styled(cell: Cell | Text) -> Text:
@@ -137,8 +151,8 @@ def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) 
     for first, *rest in rows:
         yield first
         pairs = zip(columns[1:], rest, strict=True)
-        said = ";  ".join(f"{column} {cell.plain}".strip() for column, cell in pairs if cell.plain.strip())
-        yield from map(Text, wrapped(said, "    ", "    ", width - 4))
+        said = ";  ".join(f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip())
+        yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(said, "    ", "    ", width - 4))
 
 
 def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:

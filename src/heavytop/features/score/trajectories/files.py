@@ -399,9 +399,10 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     rows = _list(document, "states")
     require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
-    labels = document.get("numbers") or [f"states[{index}]" for index in range(len(texts))]
+    labels = [f"{line.capitalize()}, column" for line in document.get("numbers", ())]
+    labels = labels or [f"states[{index}]," for index in range(len(texts))]
     numbers = [
-        [observed_columns.cell_of(v, f"{label.capitalize()}, {name}") for v, name in zip(row, VARIABLES, strict=True)]
+        [observed_columns.cell_of(v, f"{label} {name}") for v, name in zip(row, VARIABLES, strict=True)]
         for label, row in zip(labels, texts, strict=True)
     ]
     precision = _precision(document, [value for row in texts for value in row])
