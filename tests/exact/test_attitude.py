@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import permutations
 
 import pytest
 from flint import fmpq_mpoly_ctx
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.exact.closed_form import renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.measure.reference import Ball
 from heavytop.top.attitude import perpendicular
@@ -48,20 +46,6 @@ def test_the_attitude_starts_across_gamma_and_is_that_of_the_enclosure(name: str
         mantissa, exponent = truth.mid().man_exp()
         assert _holds(int(mantissa) * Fraction(2) ** int(exponent), ball)
         assert Fraction(ball.radius) < Fraction(1, 10**30)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", list(permutations(range(3))))
-def test_the_attitude_under_every_naming_of_the_axes(axes: tuple[int, int, int]) -> None:
-    case = CASES["lagrange"]
-    top, start = renamed_top(case.top, axes), renamed_state(case.start, axes)
-    known = ht.reference(top, start, [1], 30, attitude=True)
-    assert known.attitude_method is not None
-    assert "validated" not in known.attitude_method
-    assert known.attitude is not None
-    for truth, ball in zip(Validated(top, start).attitude(Fraction(1), 140), known.attitude[0], strict=True):
-        mantissa, exponent = truth.mid().man_exp()
-        assert _holds(int(mantissa) * Fraction(2) ** int(exponent), ball)
 
 
 def test_no_attitude_is_given_that_nobody_asked_for() -> None:
