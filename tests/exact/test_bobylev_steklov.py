@@ -12,10 +12,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import bobylev_steklov_motion
 from support.proofs import (
     assert_attitude,
-    assert_meets,
     assert_narrow,
     assert_solves,
-    attitude_of,
     positive,
     rational,
 )
@@ -93,16 +91,6 @@ def test_the_attitude_turns_with_the_body(seed):
     assert_attitude(motion, rational(rng, size=30))
     for a, b in zip(motion.attitude(Fraction(0), 200), initial_xi(motion.start.gamma), strict=True):
         assert a.overlaps(b)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_the_attitude_is_that_of_the_enclosure(seed):
-    rng = random.Random(seed)
-    inertia = (positive(rng) + 2, positive(rng) + 1)
-    motion = bobylev_steklov_motion(inertia, Fraction(1), positive(rng, size=2), rational(rng), rational(rng))
-    assert attitude_of(motion, Fraction(1), 170)[0] == motion.method
-    assert_meets(motion, (Fraction(1), Fraction(-5, 3)))
 
 
 # γ = (0, 0, ±1): axis 3 is vertical, the pole of its azimuth; γ2 = 0, γ1/γ3 = 2p/x: M ∥ γ at a turning point;

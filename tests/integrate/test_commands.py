@@ -62,6 +62,8 @@ FAILURES = {
     "comma": "which is not a number: write a decimal point, not a comma",
     "a word": "wrote 'zero', which is not a number",
     "five numbers": "wrote a state of 5 numbers after its time instead of 6",
+    "underscores": "wrote '1_0.5', which is not a number",
+    "seven numbers": "wrote a state of 7 numbers after its time instead of 6",
     "wrong order": "wrote the state at 1 where that at 0.5",
     "times off by one": "wrote the state at 0 where that at 0.5",
     "one state short": "said done after 1 of 2 states",

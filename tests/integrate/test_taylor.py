@@ -5,14 +5,13 @@ from fractions import Fraction
 import numpy
 import pytest
 
-from heavytop.errors import InputError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import Stepper, propagate
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State, check_times
+from heavytop.top.heavy_top import HeavyTop, State
 from support.helpers import VECTORS, start_of, top_of
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
@@ -118,12 +117,6 @@ def test_the_problem_is_rounded_once_and_the_rotor_comes_from_the_exact_data() -
     assert problem.parameters.rotor == exact(number(Fraction(1, 21 * 11), DOUBLE))
     assert problem.parameters.moment == (0, exact(number(Fraction(1, 21), DOUBLE)), 0)
     assert problem.top.moment == problem.parameters.moment
-
-
-@pytest.mark.parametrize("times", [[], [1, 1], [2, 1], [-1, 1], [1, -2], [0, 0], [-1, "-1/2"]])
-def test_times_out_of_order_are_refused(times) -> None:
-    with pytest.raises(InputError):
-        check_times(times)
 
 
 def test_the_body_of_a_sleeping_top_turns_though_omega_and_gamma_rest() -> None:

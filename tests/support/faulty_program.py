@@ -82,6 +82,10 @@ def shown(fault, values, place):
             texts = [text.replace(".", ",") for text in texts]
         case "a word":
             texts[3] = "zero"
+        case "underscores":
+            texts[0] = "1_0.5"
+        case "seven numbers":
+            texts.append("0")
         case "five numbers":
             texts.pop()
         case "six digits":
