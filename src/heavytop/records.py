@@ -6,6 +6,7 @@ Numbers that measure something are decimal text with their log10 beside them, so
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -275,7 +276,11 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 _LOST = ", and all significant digits are lost from t = "
-_FORMER_LOST = ", and no digit is left from t = "
+_FORMER = {
+    ", and no digit is left from t = ": _LOST,
+    r", radius below ([^;]+); ": r", error below \1 at every sample, and ",
+}
+"""Sentences of older reports, and how they are written now."""
 
 
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -307,7 +312,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
         said = ", for the first start; ".join(certificate.text for certificate in self.certificates)
-        return f"known: {self.method}, radius below {self.radius}; {said}"
+        return f"known: {self.method}, error below {self.radius} at every sample, and {said}"
 
     @property
     def brief(self) -> str:
@@ -447,7 +452,9 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
         derived = key.system, key.precision, key.horizon, key.kind, against
         if identity != derived:
             for name, old, new in zip(_DERIVED, identity, derived, strict=True):
-                if old.replace(_FORMER_LOST, _LOST) not in ("", new):
+                for former, now in _FORMER.items() if old != new else ():
+                    old = re.sub(former, now, old, count=1)
+                if old not in ("", new):
                     raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
                 msgspec.structs.force_setattr(self, name, new)
 
