@@ -6,7 +6,6 @@ Numbers that measure something are decimal text with their log10 beside them, so
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -276,11 +275,7 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 _LOST = ", and all significant digits are lost from t = "
-_FORMER = {
-    ", and no digit is left from t = ": _LOST,
-    r", radius below ([^;]+); ": r", error below \1 at every sample, and ",
-}
-"""Sentences of older reports, and how they are written now."""
+_FORMER_LOST = ", and no digit is left from t = "
 
 
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -311,8 +306,12 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             ends = f"{_LOST}{self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
-        said = ", for the first start; ".join(certificate.text for certificate in self.certificates)
-        return f"known: {self.method}, error below {self.radius} at every sample, and {said}"
+        return f"known: {self.method}, radius below {self.radius}; {self.certified}"
+
+    @property
+    def certified(self) -> str:
+        """Text of its certificates: at which time a second source agrees, and to how many digits."""
+        return ", for the first start; ".join(certificate.text for certificate in self.certificates)
 
     @property
     def brief(self) -> str:
@@ -452,9 +451,7 @@ class Row(msgspec.Struct, frozen=True, gc=False, kw_only=True):
         derived = key.system, key.precision, key.horizon, key.kind, against
         if identity != derived:
             for name, old, new in zip(_DERIVED, identity, derived, strict=True):
-                for former, now in _FORMER.items() if old != new else ():
-                    old = re.sub(former, now, old, count=1)
-                if old not in ("", new):
+                if old.replace(_FORMER_LOST, _LOST) not in ("", new):
                     raise ValueError(f"{name} = {quoted(old)} is not what follows from the key and the reference")
                 msgspec.structs.force_setattr(self, name, new)
 
