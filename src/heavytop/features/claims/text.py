@@ -105,8 +105,8 @@ _PROVEN = {
     "stability": "The constant solution is proven for",
 }
 _SYMBOLS = """\
-M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left minus
-right, of (1.1) in Omega', divided by I; omega, gamma there: as claimed.
+M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left side
+minus right, of (1.1) in Omega', divided by I; omega, gamma there: as claimed.
 Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
