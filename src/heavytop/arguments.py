@@ -242,7 +242,7 @@ def required(digits: Any) -> Fraction:
 def component(value: Any) -> Fraction | None:
     """An exact number out of a number of any format or text; None for NaN and infinities."""
     if isinstance(value, str):
-        return written_numbers.component(value)
+        return written_numbers.number(value, "a component of a state")
     try:
         return exact(value)
     except InputError:

@@ -72,15 +72,10 @@ def of_bits(bits: int) -> Precision:
     return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits <= form.bits), None) or real(bits)
 
 
-def component(value: Any) -> Fraction | None:
-    """As :func:`number`, of a state."""
-    return number(value, "a component of a state")
-
-
 def bits_of(text: str) -> int:
     """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
     if _HEX.fullmatch(text.strip()):
-        value = component(text) or Fraction(0)
+        value = number(text, "a number") or Fraction(0)
         return (value.numerator // (value.numerator & -value.numerator)).bit_length() if value else 0
     digits = digits_written(text)
     return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
@@ -95,7 +90,7 @@ def digits_written(text: str) -> int:
 
 def _is_printed_from(text: str, form: Precision) -> bool:
     """Whether the number, rounded to the format and written with as many digits, is the same text."""
-    value = component(text)
+    value = number(text, "a number")
     if not value:
         return True
     if _HEX.fullmatch(text.strip()) or "/" in text:

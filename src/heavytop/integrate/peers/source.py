@@ -19,7 +19,6 @@ from heavytop.errors import InputError, MissingFunction, PeerFailed
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
-_MOST_NAMED = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +44,9 @@ class PythonFile:
         try:
             call = attrgetter(self.function)(module)
         except AttributeError:
-            functions = (name for name, value in vars(module).items() if inspect.isfunction(value))
-            own = ", ".join(
-                [name for name in functions if vars(module)[name].__module__ == module.__name__][:_MOST_NAMED]
-            )
-            remedy = f"Its functions: {own}." if own else "Give FILE.py:FUNCTION."
+            own = inspect.getmembers(module, lambda v: inspect.isfunction(v) and v.__module__ == module.__name__)
+            names = ", ".join(name for name, _ in own[:12])
+            remedy = f"Its functions: {names}." if names else "Give FILE.py:FUNCTION."
             raise MissingFunction(f"{self.path} has no {self.function}.", remedy) from None
         return as_peer(call, self.name)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -13,7 +12,7 @@ from heavytop.display import plural
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
-from heavytop.records import Law, Metric, Quantity, Report, Row, RowKey, Series
+from heavytop.records import Law, Metric, Quantity, Report, Row, Series
 from heavytop.report.document.document import (
     DASHED,
     MOST_PLOTS,
@@ -137,11 +136,9 @@ def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple
     decades(axes.xaxis)
     decades(axes.yaxis)
     chart = _Chart(axes, f"{clip(case, 40)}: {column.label}", [], [])
-    lacking, rows_of = [], defaultdict[RowKey, list[Row]](list)
-    for _, row in members:
-        rows_of[row.key].append(row)
+    lacking = []
     for key, row in members:
-        largest = _largest(column, rows_of[row.key])
+        largest = _largest(column, [other for _, other in members if other.key == row.key])
         if largest is None or largest not in (series := column.of(row)):
             lacking.append(key.label)
         else:
@@ -179,15 +176,14 @@ def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quant
 
 
 def _largest(column: _Column, rows: Sequence[Row]) -> Quantity | None:
-    """The quantity with a series whose largest number over all samples of one of the rows is the largest."""
-    sizes: dict[Quantity, float] = {}
-    for row in rows:
-        for quantity, series in column.of(row).items():
-            if series.values:
-                most = row.metrics.get(quantity.over("max").text)
-                size = most.log10 if most else logarithm(series.values[-1])
-                sizes[quantity] = max(sizes.get(quantity, -math.inf), -math.inf if size is None else size)
-    return max(sizes, key=sizes.__getitem__, default=None)
+    """The quantity that is largest over all samples, of those with a series in one of the rows."""
+
+    def largest(pair: tuple[Row, Quantity]) -> float:
+        most = pair[0].metrics.get(pair[1].over("max").text)
+        return -math.inf if most is None or most.log10 is None else most.log10
+
+    drawn = ((row, quantity) for row in rows for quantity, series in column.of(row).items() if series.values)
+    return max(drawn, key=largest, default=(None, None))[1]
 
 
 def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:

@@ -103,11 +103,9 @@ class Lines:
         columns = [printable(self.head) or first, *others]
         rows = [[_styled(cell) for cell in row] for row in self.rows]
         cells = [columns, *([cell.plain for cell in row] for row in rows)]
-        widths = [
-            max(cell_len(word) for row in cells for word in [*_glued(row[i]).split(" "), ""])
-            for i in range(len(columns))
-        ]
-        wides = [max(cell_len(row[index]) for row in cells) for index in range(len(columns))]
+        indices = range(len(columns))
+        widths = [max(cell_len(word) for row in cells for word in _glued(row[i]).split(" ")) for i in indices]
+        wides = [max(cell_len(row[index]) for row in cells) for index in indices]
         edge = not self.head
         room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
         if sum(widths) + 2 * len(widths) > options.max_width or (self.head and room < widths[0]):

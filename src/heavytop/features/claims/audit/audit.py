@@ -164,7 +164,8 @@ def audit_claim(
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
     unused = claim.unused if isinstance(claim, Assuming) else ()
-    return Audit(*said, deciding, unused, claim.conditions if isinstance(claim, UserIntegral) else ())
+    table = claim.content.integral if isinstance(claim, UserIntegral) else None
+    return Audit(*said, deciding, unused, tuple(table.where) if table else ())
 
 
 def _rows(

@@ -375,11 +375,6 @@ class UserIntegral(FileClaim):
         return self.content.integral
 
     @property
-    def conditions(self) -> tuple[str, ...]:
-        """The formulas of ``where`` as they are written."""
-        return tuple(self._table.where)
-
-    @property
     def setting(self) -> Setting:
         """That of the states."""
         return self.at_states

@@ -434,12 +434,7 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
     rows = _list(document, "states")
     require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
-    labels = [f"{line.capitalize()}, column" for line in document.get("numbers", ())]
-    labels = labels or [f"states[{index}]," for index in range(len(texts))]
-    numbers = [
-        [observed_columns.cell_of(v, f"{label} {name}") for v, name in zip(row, VARIABLES, strict=True)]
-        for label, row in zip(labels, texts, strict=True)
-    ]
+    numbers = [_components(document, index, row) for index, row in enumerate(texts)]
     precision = _precision(document, [value for row in texts for value in row])
     from_row = at_start is not None and start == at_start
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
@@ -583,9 +578,14 @@ def _row_of_start(document: dict[str, Any]) -> State | None:
         return None
     if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
         return None
-    values = [written_numbers.component(value) for value in rows[0]]
-    numbers = [value for value in values if value is not None]
+    numbers = [value for value in _components(document, 0, rows[0]) if value is not None]
     return State(numbers[:3], numbers[3:]) if len(numbers) == 6 else None
+
+
+def _components(document: dict[str, Any], index: int, row: list[Any]) -> list[Fraction | None]:
+    """The numbers of a state; raises InputError that names its line and column."""
+    label = f"{document['numbers'][index].capitalize()}, column" if "numbers" in document else f"states[{index}],"
+    return [observed_columns.cell_of(value, f"{label} {name}") for value, name in zip(row, VARIABLES, strict=True)]
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
