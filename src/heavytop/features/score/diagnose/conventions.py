@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, other_axes
+from heavytop.features.score.diagnose.hypotheses import FALLS, UNITS_OF_OMEGA, other_axes
 from heavytop.features.score.diagnose.readings import (
     Beginning,
     BodyData,
@@ -45,6 +45,7 @@ from heavytop.features.score.diagnose.samples import (
     named,
     notable,
     principal,
+    refused,
 )
 from heavytop.measure.attitude_error import FORMS
 from heavytop.precision import decimal_text, plain_decimal
@@ -61,8 +62,6 @@ _CONTRADICTS = 0.1
 AS_LIKELY = 3.0
 """Of likely suppositions whose errors differ by less, the simplest is named."""
 _REFINED = 4
-_ANISOTROPY = 3.0
-"""Factor by which M may grow more than Ω."""
 _NO_SHIFT = Fraction(0)
 _FEWEST = 4
 """Samples to which the six numbers of a start, or one of the body, are fitted."""
@@ -207,23 +206,20 @@ class Suppositions:
         return Diagnosis(kind, numbers, own, left, until)
 
     @cached_property
-    def _refused(self) -> float:
-        """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω."""
+    def refused(self) -> float:
         largest = [
             max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
             if {"omega", "omega_space"} & seen.columns.keys()
             else 1.0
             for seen in (self.early.seen, self.seen)
         ]
-        own = float(self.own.max())
-        growth = _ANISOTROPY * largest[1] / largest[0] if largest[0] else numpy.inf
-        return growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP
+        return refused(*largest, float(self.own.max()))
 
     def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
         if attempt.start is not None or attempt.body is not None or attempt.shift or attempt.begin is not None:
             early = self._error(attempt, self.early)
-            if not float(early.max()) <= self._refused:
+            if not float(early.max()) <= self.refused:
                 return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
         return self._error(attempt, self.courses)
 
@@ -347,7 +343,7 @@ def _data(suppositions: Suppositions) -> Iterator[_Try]:
             scaled: dict[str, Any] = {key: getattr(seen.body, key) * (1.0 + part * x[0])}
             return replace(seen.body, **scaled), begin
 
-        x, left = _refined(suppositions, body_of, 1)
+        x, left = _refined(suppositions, body_of, 1, DROP)
         factor = named(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
         if notable(factor, Fraction(1)):
             body, _ = body_of(numpy.array([float(factor) - 1]))
@@ -364,7 +360,7 @@ def _start(suppositions: Suppositions) -> Iterator[_Try]:
     def start_of(x: Array) -> tuple[BodyData, Beginning]:
         return seen.body, Beginning(begin.rotation @ _turn(x[:3]), begin.omega + size * x[3:])
 
-    x, _ = _refined(suppositions, start_of, 6)
+    x, _ = _refined(suppositions, start_of, 6, _START_DROP)
     if _SAME < (off := float(numpy.abs(x).max())) < numpy.inf:
         elsewhere = start_of(x)[1]
         numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(elsewhere.omega)}
@@ -385,8 +381,12 @@ def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
             yield "top", {"number": f"Number {i + 1} of the centre"}, "centre", unit
 
 
-def _refined(suppositions: Suppositions, move: Move, count: int) -> tuple[Array, float]:
-    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves."""
+def _refined(suppositions: Suppositions, move: Move, count: int, drop: float) -> tuple[Array, float]:
+    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves.
+
+    drop: how far the error must fall at least; numbers that do not do that to the first samples are refined no more.
+    """
+    refused = suppositions.refused * LIKELY_DROP / drop
     x, here = numpy.zeros(count), numpy.zeros(1)
     for courses in (suppositions.early, suppositions.courses):
         seen = courses.seen
@@ -405,7 +405,11 @@ def _refined(suppositions: Suppositions, move: Move, count: int) -> tuple[Array,
             there = off(after)
             if not float(there @ there) < float(here @ here):
                 break
-            x, here = after, there
+            falls, x, here = float(here @ here) > FALLS * float(there @ there), after, there
+            if not falls:
+                break  # at the least of it
+        if float(here @ here) > len(here) * refused**2:
+            break
     return x, float(numpy.abs(here).max())
 
 

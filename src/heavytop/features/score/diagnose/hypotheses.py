@@ -221,7 +221,7 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     for kind, numbers, *body in other_axes(*own):
         if not all(map(numpy.array_equal, body, own)):
             supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
-            yield Hypothesis(kind, numbers, supposed.error(supposed.supposed(run.times)))
+            yield Hypothesis(kind, numbers, supposed.left())
 
 
 def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
@@ -242,7 +242,7 @@ def _tried(run: Examined, kind: str, top: HeavyTop | None = None, start: State |
     same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
     if same and (start is None or start == run.start) and kind != "system":
         return Hypothesis(kind, {}, float("inf"))
-    return Hypothesis(kind, {}, run.error(run.supposed(run.times, top, start)))
+    return Hypothesis(kind, {}, run.left(top, start))
 
 
 def _as_momentum(run: Examined, start: State) -> Hypothesis:
@@ -295,7 +295,7 @@ def another_weight(run: Examined) -> Hypothesis | None:
     fitted = ratio * float(old)
     candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
     tops = [(weight, replace(run.top, weight=weight)) for weight in candidates]
-    weight, error = _roundest([(weight, run.error(run.supposed(run.times, top))) for weight, top in tops])
+    weight, error = _roundest([(weight, run.left(top)) for weight, top in tops])
     if not notable(weight, old):
         return None
     return Hypothesis("weight", {"P": _text(weight * run.units.moment)}, error, FITTED_DROP)
@@ -315,7 +315,7 @@ def another_start(run: Examined) -> Hypothesis | None:
     if back is None or truth is None or not _shows_at_once(run, truth):
         return None
     start = run.in_file(run.start.flat)
-    error = run.error(run.starting(back[0]).supposed(times))
+    error = run.starting(back[0]).left()
     off = numpy.abs(back[0, :6] - start)
     magnified = float(numpy.abs(run.states[0] - truth[0]).max() / (off.max() or 1.0))
     sizes = [max(run.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
@@ -419,10 +419,9 @@ def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]
     for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
         tensor[i, j] = tensor[j, i] = value
     try:
-        supposed = run.with_body(tensor, floats(moment))
+        return run.with_body(tensor, floats(moment)).left()
     except InputError:  # a moment that is not positive
         return float("inf")
-    return supposed.error(supposed.supposed(run.times))
 
 
 _Numbers = TypeVar("_Numbers")
@@ -588,9 +587,7 @@ def _of_field(
     rotor = run.system.parameters(run.top, run.start).mapped(float).rotor
     axes = tuple(map(tuple, run.frame.axes.tolist()))
     other = replace(run, system=_altered(run.system, rotor, axes, changes, factor))
-    left = (
-        run.error(other.supposed(run.times)) if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
-    )
+    left = other.left() if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
     return Hypothesis(kind, numbers, left, FITTED_DROP)
 
 
@@ -657,7 +654,7 @@ _WITHIN = 0.3
 """A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
 _TRIED = 12
 _REFINED = 6
-_FALLS = 1.5
+FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
@@ -680,7 +677,7 @@ def clock(run: Examined, fitted: bool) -> Hypothesis | None:
     hypotheses = list(_of_rows(run))
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
-            error = run.error(run.supposed([factor * time for time in run.times]))
+            error = run.left(times=[factor * time for time in run.times])
             hypotheses.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
     if fitted and len(run.rows) >= 3:
         hypotheses += _fitted(run)
@@ -702,7 +699,7 @@ def _of_rows(run: Examined) -> Iterator[Hypothesis]:
         tried.append(("rows_reversed", run, [every[-1 - row] for row in run.rows]))
         tried.append(("rows_off_by_one", *_neighbours(run, 1, 2 * every[-1] - every[-2])))
         tried.append(("rows_late", *_neighbours(run, -1, 2 * every[0] - every[1])))
-    yield from (Hypothesis(kind, {}, at.error(at.supposed(times))) for kind, at, times in tried)
+    yield from (Hypothesis(kind, {}, at.left(times=times)) for kind, at, times in tried)
 
 
 def _neighbours(run: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
@@ -794,7 +791,7 @@ def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array
             return
         here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
         off = (run.states - here) / sizes
-        if not _FALLS * (size := float(numpy.nansum(off * off))) < before:
+        if not FALLS * (size := float(numpy.nansum(off * off))) < before:
             break  # at the least of it
         slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
         square = float((slope * slope)[~numpy.isnan(run.states)].sum())
@@ -803,4 +800,4 @@ def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array
         number += float(numpy.nansum(slope * off)) / square
         if not abs(_moved(kind, number, times)).max() * run.rate <= FARTHEST:
             return
-    yield number, run.error(run.supposed([Fraction(value) for value in _moved(kind, number, times)]))
+    yield number, run.left(times=[Fraction(value) for value in _moved(kind, number, times)])
