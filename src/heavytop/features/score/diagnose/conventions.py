@@ -41,6 +41,7 @@ from heavytop.features.score.diagnose.samples import (
     LIKELY_DROP,
     Array,
     Diagnosis,
+    floats,
     looked_at,
     named,
     notable,
@@ -139,7 +140,9 @@ class _Courses:
         parts = (which.tensor, which.centre, data, begin.rotation, begin.omega)
         key = (str(shift).encode(), *(part.tobytes() for part in parts))
         if key not in self.made:
-            self.made[key] = simulate(which, begin, [time + shift for time in seen.times])
+            self.made[key] = simulate(
+                which, begin, floats([time + shift for time in seen.times] if shift else seen.times)
+            )
         return self.made[key]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from math import floor, isfinite, log10
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import numpy
 
 from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
 from heavytop.measure.attitude_error import UPS, Convention
+from heavytop.precision import cross
 from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
@@ -28,7 +30,7 @@ _LEAST = 1e-12
 """A principal moment below this part of the largest is not that of a body."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class BodyData:
     """A body as a file describes it, in its own axes.
 
@@ -49,17 +51,22 @@ class BodyData:
         """The weight."""
         return self.gravity * (1.0 if self.mass is None else self.mass)
 
-    @property
+    @cached_property
     def steiner(self) -> Array:
         """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
         c = self.centre
         tensor: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
         return tensor
 
-    @property
+    @cached_property
     def tensor(self) -> Array:
         """About the fixed point."""
         return self.inertia + self.steiner if self.about_centre else self.inertia
+
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal moments about the fixed point, and axes as the columns of a rotation."""
+        return principal((self.tensor + self.tensor.T) / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +98,14 @@ def nearest_rotation(matrix: Array) -> Array:
     return rotation
 
 
-def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
+def simulate(body: BodyData, start: Beginning, times: Array) -> Course | None:
     """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
         return None
     if not (numpy.isfinite(start.rotation).all() and numpy.isfinite(start.omega).all()):
         return None
-    moments, axes = principal((tensor + tensor.T) / 2)
+    moments, axes = body.principal
     if not moments[0] > _LEAST * moments.max() or moments.min() <= 0:
         return None
     rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
@@ -107,11 +114,11 @@ def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Cou
     system = HEAVY_GYROSTAT if len(whirl) else HEAVY_TOP
     numbers = numpy.concatenate([moments / size, moment / size / rate / rate, whirl])
     first = numpy.concatenate([omega / rate, rows[2], rows[0]])
-    values = motion_in_double(system, numbers, first, rate * floats(times))
+    values = motion_in_double(system, numbers, first, rate * times)
     if values is None:
         return None
     gamma, along = values[:, 3:6], values[:, 6:9]
-    rotation = numpy.stack([along, numpy.cross(gamma, along), gamma], axis=1) @ axes.T
+    rotation = numpy.stack([along, numpy.array(cross(gamma.T, along.T)).T, gamma], axis=1) @ axes.T
     return Course(rotation, values[:, :3] @ axes.T * rate)
 
 
@@ -245,7 +252,7 @@ def upright_vectors(vectors: Array, up: str) -> Array:
     return upright
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class GivenStart:
     """The start as it was given.
 
@@ -260,6 +267,11 @@ class GivenStart:
 
     def begin(self, reading: Reading, inertia: Array) -> Beginning:
         """Where the motion begins if the start is to be read so."""
+        begin = _as_read(self, reading)
+        return replace(begin, omega=numpy.linalg.solve(inertia, begin.omega)) if reading.momentum else begin
+
+    def as_read(self, reading: Reading) -> Beginning:
+        """R and the columns of Ω in body axes, which may be M."""
         if self.form == "rows":
             rotation = self.values.reshape(3, 3)
             if reading.gamma < 0:
@@ -273,7 +285,10 @@ class GivenStart:
             omega = rotation.T @ reading.vectors(said, True)[0]
         else:
             omega = reading.body_vectors(said, True)[0]
-        return Beginning(rotation, numpy.linalg.solve(inertia, omega) if reading.momentum else omega)
+        return Beginning(rotation, omega)
+
+
+_as_read = lru_cache(maxsize=256)(GivenStart.as_read)
 
 
 @dataclass(frozen=True, slots=True)
