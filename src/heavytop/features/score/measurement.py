@@ -70,12 +70,6 @@ def exact_problem(trajectory: GivenTrajectory) -> Problem:
     return Problem(trajectory.system, trajectory.precision, parameters, posed.start, xi, (posed.top, posed.start))
 
 
-def observed_of(trajectory: GivenTrajectory) -> Observed:
-    """The columns that the trajectory gives."""
-    assert trajectory.observed is not None
-    return trajectory.observed
-
-
 @dataclass(frozen=True, slots=True)
 class Scored:
     """A scored trajectory: its row, what measured it, and the relative error of each sample with a reference."""
@@ -162,9 +156,8 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
     return said
 
 
-def used(trajectory: GivenTrajectory) -> str:
+def used(observed: Observed) -> str:
     """Which columns were scored, and how they were read."""
-    observed = observed_of(trajectory)
     said, parts = observed.said, []
     for name in observed.names:
         text = _WORDS[name]
@@ -292,7 +285,7 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
     single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
-    columns = "" if trajectory.observed is None else used(trajectory)
+    columns = "" if trajectory.observed is None else used(trajectory.observed)
     clock = [] if told is None else [told[0]]
     return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns)
 
@@ -314,11 +307,7 @@ def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored,
 def _measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
     """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes."""
     observed, rate = trajectory.observed, turning_rate(trajectory.top, trajectory.start)
-    problem = (
-        Problem.of(trajectory.top, trajectory.start, trajectory.precision, trajectory.system)
-        if observed is None
-        else exact_problem(trajectory)
-    )
+    problem = exact_problem(trajectory)
     times = [round_to(time, trajectory.precision.bits) for time in trajectory.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
     known = truth(problem, times, _REFERENCE_EFFORT)

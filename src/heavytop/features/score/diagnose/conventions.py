@@ -41,7 +41,6 @@ from heavytop.features.score.diagnose.samples import (
     LIKELY_DROP,
     Array,
     Diagnosis,
-    floats,
     looked_at,
     named,
     notable,
@@ -119,31 +118,17 @@ class _Try:
         return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
 
 
-class _Courses:
-    """The motions that were computed, by what they follow from."""
-
-    def __init__(self, seen: Seen) -> None:
-        self.seen = seen
-        self.made: dict[tuple[bytes, ...], Course | None] = {}
-
-    def of(
-        self,
-        start: Reading | None = None,
-        body: BodyData | None = None,
-        shift: Fraction = _NO_SHIFT,
-        begin: Beginning | None = None,
-    ) -> Course | None:
-        seen = self.seen
-        which = body or seen.body
-        begin = begin or seen.start.begin(start or seen.said, which.tensor)
-        data = numpy.array([which.force])
-        parts = (which.tensor, which.centre, data, begin.rotation, begin.omega)
-        key = (str(shift).encode(), *(part.tobytes() for part in parts))
-        if key not in self.made:
-            self.made[key] = simulate(
-                which, begin, floats([time + shift for time in seen.times] if shift else seen.times)
-            )
-        return self.made[key]
+def _course(
+    seen: Seen,
+    start: Reading | None = None,
+    body: BodyData | None = None,
+    shift: Fraction = _NO_SHIFT,
+    begin: Beginning | None = None,
+) -> Course | None:
+    """The motion of the file with another reading of its start, another body, other times, another start."""
+    body = body or seen.body
+    begin = begin or seen.start.begin(start or seen.said, body.tensor)
+    return simulate(body, begin, tuple(float(time + shift if shift else time) for time in seen.times))
 
 
 class Suppositions:
@@ -156,10 +141,9 @@ class Suppositions:
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         rate = turning(seen.body, self.start)
         self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
-        self.courses = _Courses(self.seen)
         first = FIRST[-1] + (not self.seen.times[0])
-        self.early = _Courses(self.seen.at(list(range(min(len(self.seen.times), first)))))
-        self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
+        self.early = self.seen.at(list(range(min(len(self.seen.times), first))))
+        self.own = errors(self.seen, _course(self.seen), seen.said, seen.body)
         self.tried: list[tuple[_Try, Array]] = []
 
     def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
@@ -214,9 +198,9 @@ class Suppositions:
             max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
             if {"omega", "omega_space"} & seen.columns.keys()
             else 1.0
-            for seen in (self.early.seen, self.seen)
+            for seen in (self.early, self.seen)
         ]
-        return refused(*largest, float(self.own.max()))
+        return refused(largest[0], largest[1], float(self.own.max()))
 
     def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
@@ -224,15 +208,15 @@ class Suppositions:
             early = self._error(attempt, self.early)
             if not float(early.max()) <= self.refused:
                 return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
-        return self._error(attempt, self.courses)
+        return self._error(attempt, self.seen)
 
     @staticmethod
-    def _error(attempt: _Try, courses: _Courses) -> Array:
-        seen, body = courses.seen, attempt.body or courses.seen.body
-        course = courses.of(attempt.start, body, attempt.shift, attempt.begin)
+    def _error(attempt: _Try, seen: Seen) -> Array:
+        body, plain = attempt.body or seen.body, _course(seen) if attempt.rates else None
+        course = _course(seen, attempt.start, body, attempt.shift, attempt.begin)
         if attempt.body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
-        if attempt.rates and course is not None and (plain := courses.of()) is not None:
+        if course is not None and plain is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
         if attempt.still:
@@ -282,7 +266,7 @@ def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
     yield from _positions(seen)
     yield from _renamed(seen)
     yield from _columns(seen)
-    course = suppositions.courses.of()
+    course = _course(seen)
     if course is not None:
         yield from _fitted(seen, course)
         yield from _early_rates(suppositions, course)
@@ -391,12 +375,11 @@ def _refined(suppositions: Suppositions, move: Move, count: int, drop: float) ->
     """
     refused = suppositions.refused * LIKELY_DROP / drop
     x, here = numpy.zeros(count), numpy.zeros(1)
-    for courses in (suppositions.early, suppositions.courses):
-        seen = courses.seen
+    for seen in (suppositions.early, suppositions.seen):
 
-        def off(x: Array, courses: _Courses = courses, seen: Seen = seen) -> Array:
+        def off(x: Array, seen: Seen = seen) -> Array:
             body, begin = move(x)
-            course = courses.of(body=body, begin=begin)
+            course = _course(seen, body=body, begin=begin)
             return numpy.full(1, numpy.inf) if course is None else residuals(seen, course, seen.said, body)
 
         here = off(x)
@@ -431,7 +414,7 @@ def _early_rates(suppositions: Suppositions, course: Course) -> Iterator[_Try]:
     values = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
     shift = Fraction(0)
     for _ in range(_REFINED):
-        here, there = (suppositions.courses.of(shift=at) for at in (shift, shift + small))
+        here, there = (_course(seen, shift=at) for at in (shift, shift + small))
         if here is None or there is None:
             return
         at_shift, later = (getattr(rates, name) for rates in (here, there))
@@ -596,7 +579,7 @@ def _positions(seen: Seen) -> Iterator[_Try]:
         yield _Try("position_unit", {"factor": name}, replace(said, scale=factor))
         yield _Try("position_unit", {"factor": name}, replace(said, scale=factor, displaced=True))
     if seen.body.centre.any() and not numpy.array_equal(seen.point, seen.body.centre):
-        yield _Try("position_of_centre", columns=replace(said, point=_triple(seen.body.centre)))
+        yield _Try("position_of_centre", columns=replace(said, point=tuple(seen.body.centre)))
 
 
 def _renamed(seen: Seen) -> Iterator[_Try]:
@@ -622,10 +605,6 @@ def _square(matrix: Array) -> Square:
     return tuple(map(tuple, matrix.tolist()))
 
 
-def _triple(vector: Array) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])
-
-
 def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
     """Constant rotations of space and body axes, another point, another place of the pivot, factors."""
     if len(seen.times) < 3:
@@ -643,12 +622,12 @@ def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
             "position_unit", "factor", float((positions * true).sum()) / size, lambda value: replace(said, scale=value)
         )
     offset = (positions - true).mean(axis=0)
-    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=_triple(offset)), drop=FITTED_DROP)
+    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=tuple(offset)), drop=FITTED_DROP)
     own = numpy.einsum("nji,nj->ni", course.rotation, positions).mean(axis=0)
-    yield _Try("point", {"point": _list(own)}, replace(said, point=_triple(own)), drop=FITTED_DROP)
+    yield _Try("point", {"point": _list(own)}, replace(said, point=tuple(own)), drop=FITTED_DROP)
     both = _point_and_offset(course, positions)
     if both is not None:
-        reading = replace(said, point=_triple(both[:3]), offset=_triple(both[3:]))
+        reading = replace(said, point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
         yield _Try("point_and_pivot", numbers, reading, drop=FITTED_DROP)
 

@@ -15,7 +15,7 @@ from heavytop.features.score.diagnose.samples import Array, floats, motion_in_do
 from heavytop.measure.attitude_error import UPS, Convention
 from heavytop.precision import cross
 from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
-from heavytop.top.bodies import Body
+from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -69,7 +69,7 @@ class BodyData:
         return principal((self.tensor + self.tensor.T) / 2)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Beginning:
     """Where a motion begins: R in canonical axes of space, shape (3, 3), and Ω in body axes."""
 
@@ -98,7 +98,8 @@ def nearest_rotation(matrix: Array) -> Array:
     return rotation
 
 
-def simulate(body: BodyData, start: Beginning, times: Array) -> Course | None:
+@lru_cache(maxsize=512)
+def simulate(body: BodyData, start: Beginning, times: tuple[float, ...]) -> Course | None:
     """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
@@ -114,11 +115,11 @@ def simulate(body: BodyData, start: Beginning, times: Array) -> Course | None:
     system = HEAVY_GYROSTAT if len(whirl) else HEAVY_TOP
     numbers = numpy.concatenate([moments / size, moment / size / rate / rate, whirl])
     first = numpy.concatenate([omega / rate, rows[2], rows[0]])
-    values = motion_in_double(system, numbers, first, rate * times)
+    values = motion_in_double(system, numbers, first, rate * numpy.array(times))
     if values is None:
         return None
     gamma, along = values[:, 3:6], values[:, 6:9]
-    rotation = numpy.stack([along, numpy.array(cross(gamma.T, along.T)).T, gamma], axis=1) @ axes.T
+    rotation = numpy.stack([along, numpy.array(cross([*gamma.T], [*along.T])).T, gamma], axis=1) @ axes.T
     return Course(rotation, values[:, :3] @ axes.T * rate)
 
 
@@ -175,8 +176,8 @@ class Reading:
     pseudo: bool = True
     scale: float = 1.0
     displaced: bool = False
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    point: tuple[float, float, float] | None = None
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)
+    point: tuple[float, ...] | None = None
 
     @classmethod
     def of(cls, said: Convention) -> Reading:
@@ -268,7 +269,10 @@ class GivenStart:
     def begin(self, reading: Reading, inertia: Array) -> Beginning:
         """Where the motion begins if the start is to be read so."""
         begin = _as_read(self, reading)
-        return replace(begin, omega=numpy.linalg.solve(inertia, begin.omega)) if reading.momentum else begin
+        if not reading.momentum:
+            return begin
+        omega: Array = numpy.linalg.solve(inertia, begin.omega)
+        return Beginning(begin.rotation, omega)
 
     def as_read(self, reading: Reading) -> Beginning:
         """R and the columns of Ω in body axes, which may be M."""
@@ -420,7 +424,7 @@ def of_states(
     try:
         columns = numpy.array(states, dtype=float)
         omega, gamma, along = (floats(part or ()) for part in (start.omega, start.gamma, xi))
-        body = _data_of(top)
+        body = body_data(top)
     except OverflowError:
         return None
     if not len(columns) or not numpy.isfinite(columns).all():
@@ -438,11 +442,14 @@ def of_states(
     return Seen(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
 
 
-def _data_of(top: HeavyTop) -> BodyData:
-    """The body of a top; with a mass its tensor is about the centre of mass, as a program is given it."""
-    rotor = numpy.zeros(3) if top.rotor is None else floats(top.rotor)
-    body = None if top.mass is None else Body.realising(top)
-    if body is None:
-        return BodyData(numpy.diag(floats(top.inertia)), floats(top.centre), None, float(top.weight), False, rotor)
-    tensor = numpy.array([floats(row) for row in body.central])
-    return BodyData(tensor, floats(body.centre), float(body.mass), float(body.gravity), True, rotor)
+def body_data(body: HeavyTop | Body) -> BodyData:
+    """The body in double; of a top with a mass about its centre of mass, as a program is given it."""
+    rotor = None if body.rotor is None else floats(body.rotor)
+    realised = body if isinstance(body, Body) else None if body.mass is None else Body.realising(body)
+    if isinstance(body, HeavyTop) and realised is None:
+        return BodyData(numpy.diag(floats(body.inertia)), floats(body.centre), None, float(body.weight), rotor=rotor)
+    assert realised is not None
+    about_centre = realised is not body or realised.about == CENTRE
+    tensor = numpy.array([floats(row) for row in (realised.central if about_centre else realised.tensor)])
+    mass, gravity = float(realised.mass), float(realised.gravity)
+    return BodyData(tensor, floats(realised.centre), mass, gravity, about_centre, rotor)
