@@ -394,7 +394,7 @@ def _refined(suppositions: Suppositions, move: Move, count: int, drop: float) ->
             falls, x, here = float(here @ here) > FALLS * float(there @ there), after, there
             if not falls:
                 break  # at the least of it
-        if float(here @ here) > len(here) * refused**2:
+        if float(numpy.linalg.norm(here)) > refused * len(here) ** 0.5:
             break
     return x, float(numpy.abs(here).max())
 

@@ -271,8 +271,7 @@ class GivenStart:
         begin = _as_read(self, reading)
         if not reading.momentum:
             return begin
-        omega: Array = numpy.linalg.solve(inertia, begin.omega)
-        return Beginning(begin.rotation, omega)
+        return Beginning(begin.rotation, numpy.linalg.solve(inertia, begin.omega).astype(float))
 
     def as_read(self, reading: Reading) -> Beginning:
         """R and the columns of Ω in body axes, which may be M."""
