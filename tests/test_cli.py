@@ -410,3 +410,10 @@ def test_an_integrator_that_is_none_and_a_format_that_heyoka_lacks_are_refused()
         assert done.returncode == 2
         assert "multiword" in done.stderr
         assert "Traceback" not in done.stderr
+
+
+def test_a_gate_without_a_baseline_names_the_command_that_makes_it(tmp_path: Path) -> None:
+    asked = ("gate", "--plan", "smoke", "--baseline", "my base")
+    done = run(*asked, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.endswith(" heavytop gate --plan smoke --baseline 'my base' --bless\n")

@@ -67,8 +67,7 @@ def said(order: int = 4, size: float = 0.01, **fault) -> str:
     return found.text if found else ""
 
 
-CHANGES = [(place, 1.00001) for place in range(len(TERMS))]
-CHANGES += [(place, float(place % 2 - 1)) for place in range(0, len(TERMS), 3)]
+CHANGES = [(place, (1.00001, 0.0, -1.0)[place % 3]) for place in range(0, len(TERMS), 2)]
 
 
 @pytest.mark.parametrize(("place", "factor"), CHANGES)
@@ -87,6 +86,9 @@ def test_a_moment_of_inertia_and_a_component_of_the_centre_are_named(axis: int) 
         wrong = [value * (1.00001 if i == axis else 1) for i, value in enumerate(numbers)]
         letter = "I" if name == "inertia" else "r"
         assert f"field: {letter}{axis + 1} is 1.00001 times what it is" in said(**{name: wrong})
+
+
+def test_a_factor_of_all_terms_is_named() -> None:
     assert "the weight P is 1.001 times what it is" in said(moment=[1.001 * value for value in MOMENT])
     assert "the length of each step is 1.001 times" in said(factors=numpy.full(len(TERMS), 1.001))
     assert "γ' is 1.001 times" in said(factors=numpy.array([1.0] * 12 + [1.001] * 6))

@@ -15,29 +15,29 @@ from law_coverage import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, 
 @pytest.mark.parametrize("kind", NAMES)
 def test_every_power_is_recognised(kind: str) -> None:
     rng = numpy.random.default_rng(5)
-    found = collections.Counter(law(Ensemble(TIMES, synthetic(kind, rng), STEP)).growth for _ in range(40))
-    assert found[NAMES[kind]] >= 38, found
+    found = collections.Counter(law(Ensemble(TIMES, synthetic(kind, rng), STEP)).growth for _ in range(20))
+    assert found[NAMES[kind]] >= 19, found
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "starts"), [("walk", 24), ("integrated", 64)])
-def test_the_interval_holds_the_exponent_in_95_of_100_trials(kind: str, starts: int) -> None:
+def test_the_interval_holds_the_exponent_in_95_of_100_trials() -> None:
+    """Of every law, and in more trials: `validation/law_coverage.py`."""
     rng = numpy.random.default_rng(11)
-    laws = [law(Ensemble(TIMES, synthetic(kind, rng, starts), STEP)) for _ in range(100)]
-    inside = sum(each.low <= EXPONENT[kind] <= each.high for each in laws)
-    assert 90 <= inside <= 99
-    assert sum(each.growth == NAMES[kind] for each in laws) >= 95
+    laws = [law(Ensemble(TIMES, synthetic("walk", rng, 24), STEP)) for _ in range(60)]
+    inside = sum(each.low <= EXPONENT["walk"] <= each.high for each in laws)
+    assert 54 <= inside <= 59
+    assert sum(each.growth == "t^0.5" for each in laws) >= 57
     # and it is not wide for nothing
-    assert numpy.mean([each.high - each.low for each in laws]) / 2 < 0.06 * (64 / starts) ** 0.5
+    assert numpy.mean([each.high - each.low for each in laws]) / 2 < 0.06 * (64 / 24) ** 0.5
 
 
 @pytest.mark.slow
 def test_chaos_is_exponential_though_it_saturates_early_and_its_rate_is_covered() -> None:
     rng = numpy.random.default_rng(3)
-    laws = [law(Ensemble(TIMES, chaotic(rng, 64), STEP)) for _ in range(100)]
-    assert sum(each.growth == "exponential" for each in laws) >= 95
+    laws = [law(Ensemble(TIMES, chaotic(rng, 64), STEP)) for _ in range(60)]
+    assert sum(each.growth == "exponential" for each in laws) >= 57
     inside = sum(each.low <= 0.15 <= each.high for each in laws)
-    assert 90 <= inside <= 99
+    assert 54 <= inside <= 59
     # 0.1 = EPS e^(0.15 t)
     reached = numpy.log(0.1 / EPS) / 0.15
     for each in laws:
@@ -157,13 +157,12 @@ def test_zeros_are_not_growth() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["walk", "integrated"])
-def test_a_fault_above_the_detection_power_is_told_and_one_well_below_is_not(kind: str) -> None:
+@pytest.mark.parametrize("order", [1, 2], ids=["walk", "integrated"])
+def test_a_fault_above_the_detection_power_is_told_and_one_well_below_is_not(order: int) -> None:
     rng = numpy.random.default_rng(8)
-    order = 2 if kind == "integrated" else 1
     n = TIMES[-1] / STEP
     told = {3.0: 0, 0.2: 0}
-    for _ in range(50):
+    for _ in range(20):
         healthy, *others = (walks(rng, 64)[order - 1, :, -1] for _ in range(3))
         errors = numpy.abs(numpy.tile(healthy[:, None], len(TIMES)) * (TIMES / TIMES[-1]) ** (order - 0.5))
         power = float(law(Ensemble(TIMES, errors, STEP, accumulates=order)).detects)
@@ -171,8 +170,8 @@ def test_a_fault_above_the_detection_power_is_told_and_one_well_below_is_not(kin
             faulty = numpy.abs(other + factor * power * n**order / order)
             apart = numpy.log10(_rms(faulty) / _rms(healthy))
             told[factor] += apart > band(numpy.abs(healthy)) + band(faulty)
-    assert told[3.0] >= 45, told
-    assert told[0.2] <= 3, told
+    assert told[3.0] >= 18, told
+    assert told[0.2] <= 2, told
 
 
 def _rms(values) -> float:
@@ -199,13 +198,12 @@ def test_the_same_starts_give_the_same_bits() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("starts", [16, 64])
-@pytest.mark.parametrize("spread", [0.05, 0.12])
+@pytest.mark.parametrize(("starts", "spread"), [(16, 0.12), (64, 0.05)])
 def test_the_interval_of_a_rate_holds_the_median_of_rates_that_scatter(starts: int, spread: float) -> None:
     rng, times = numpy.random.default_rng(31), 10 ** (numpy.arange(32 * 4 + 1) / 32)
-    laws = [law(Ensemble(times, chaotic(rng, starts, 0.15, times, spread), STEP)) for _ in range(50)]
+    laws = [law(Ensemble(times, chaotic(rng, starts, 0.15, times, spread), STEP)) for _ in range(40)]
     assert all(each.growth == "exponential" for each in laws)
-    assert sum(each.low <= 0.15 <= each.high for each in laws) >= 46
+    assert sum(each.low <= 0.15 <= each.high for each in laws) >= 36
     assert all(each.low <= each.exponent <= each.high for each in laws)
 
 

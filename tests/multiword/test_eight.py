@@ -1,9 +1,14 @@
 """Eight motions in lanes: each is right, and none of its bits depends on its neighbours."""
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
+from heavytop.multiword.codegen.machine_code import Processor
 from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, OrderSchedule
 from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
 from heavytop.multiword.problem import Scaled, Status
@@ -13,6 +18,8 @@ from support.words_helpers import LEVELS
 
 FINE = OrderSchedule.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)
+COARSE = OrderSchedule.of(Fraction(1, 10**20), FALL_IN_LANES)
+PATH = os.pathsep.join(map(str, Path(__file__).parents[:2]))
 
 
 def problems(system) -> list[Scaled]:
@@ -37,8 +44,11 @@ def samples(eight: Eight, lanes=range(8)) -> dict[int, tuple[Fraction, ...]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("forwards", [True, False], ids=["forwards", "backwards"])
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize(
+    ("system", "forwards"),
+    [(HEAVY_TOP, True), (GYROSTAT, False), (HEAVY_GYROSTAT, True)],
+    ids=lambda v: getattr(v, "name", v),
+)
 def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> None:
     given = problems(system)
     found = samples(in_lanes(system, given, forwards=forwards))
@@ -89,6 +99,18 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
-    given, schedule = list(problems(HEAVY_TOP)), OrderSchedule.of(Fraction(1, 10**20), FALL_IN_LANES)
-    own, other = (samples(in_lanes(HEAVY_TOP, given, schedule, 16, each)) for each in (None, processor))
+    own, other = (coarse_samples(each) for each in (None, processor))
     assert own == other
+
+
+def coarse_samples(processor: Processor | None) -> dict[int, tuple[Fraction, ...]]:
+    return samples(in_lanes(HEAVY_TOP, list(problems(HEAVY_TOP)), COARSE, 16, processor))
+
+
+@pytest.mark.slow
+def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
+    """glibc masks FMA and AVX2, so that its own fma, which code for x86-64 calls, is computed in software."""
+    script = "import test_eight as t; print(*t.coarse_samples(t.Processor('x86-64'))[3])"
+    environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": PATH}
+    masked = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert masked.stdout.split() == list(map(str, coarse_samples(None)[3]))

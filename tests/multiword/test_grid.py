@@ -130,7 +130,7 @@ def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: G
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("words", "count"), [(3, 20), (6, 20), (12, 5)])
+@pytest.mark.parametrize(("words", "count"), [(3, 20), (6, 8)])
 def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: int) -> None:
     random, grid, span = Random(words), grid_of(words), Fraction(HORIZON)
     for _ in range(count):
@@ -146,12 +146,12 @@ def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int, count: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bits", [48, 49, 50, 51, 52])
+@pytest.mark.parametrize("bits", [48, 50, 52])
 def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
     """Each run is right, if need be with shorter steps, or its outcome says that it is not."""
     random, grid, span = Random(bits), Grid(3, bits), Fraction(HORIZON)
     redone = 0
-    for _ in range(30):
+    for _ in range(20):
         scaled = random_problem(random)
         known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
         assert known.advance(span, 10**4) is Status.OK

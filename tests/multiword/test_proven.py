@@ -77,10 +77,6 @@ def used(motion: ScaledMotion, certified: CertifiedSeries, centre: list[int], ha
     [
         (3, HEAVY_TOP, False),
         (4, GYROSTAT, False),
-        (6, HEAVY_TOP, True),
-        (3, GYROSTAT, True),
-        (12, HEAVY_TOP, False),
-        (3, HEAVY_GYROSTAT, False),
         (6, HEAVY_GYROSTAT, True),
         (12, HEAVY_GYROSTAT, False),
     ],

@@ -56,10 +56,9 @@ def turning_over(part: str, until: str) -> tuple[HeavyTop, State, Fraction]:
 @pytest.mark.parametrize(
     ("top", "start", "horizon"),
     [
-        *((case.top, case.start, Fraction(t)) for case, t in ((GENERIC, 10), (CASES["kovalevskaya"], -9))),
-        *map(drawn, range(2)),
+        (CASES["kovalevskaya"].top, CASES["kovalevskaya"].start, Fraction(-9)),
+        drawn(1),
         turning_over("1e-3", "2.5"),
-        turning_over("1e-6", "5"),
     ],
 )
 def test_it_is_that_of_runs_from_states_changed_at_any_time(top: HeavyTop, start: State, horizon: Fraction) -> None:
@@ -135,9 +134,8 @@ def near_a_separatrix(seed: int) -> tuple[HeavyTop, State]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_where_all_digits_are_said_to_be_lost_no_integrator_has_one_right(seed: int) -> None:
-    top, start = near_a_separatrix(seed)
+def test_where_all_digits_are_said_to_be_lost_no_integrator_has_one_right() -> None:
+    top, start = near_a_separatrix(2)
     p, until = HEAVY_TOP.parameters(top, start), Fraction(4)
     while loss(HEAVY_TOP, p, tuple(start.flat), until)[0] < 2.0**57:
         until *= Fraction(5, 4)

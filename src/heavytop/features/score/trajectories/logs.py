@@ -265,11 +265,11 @@ _SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYR
 
 def is_ephemeris(text: str) -> bool:
     """Whether a text is an attitude ephemeris message."""
-    return text.lstrip().startswith("CCSDS_AEM_VERS")
+    return re.match(r"(\s|#.*\n)*CCSDS_AEM_VERS", text) is not None
 
 
 def of_ephemeris(text: str) -> str:
-    """An attitude ephemeris message of quaternions as a table; its COMMENT lines are comments.
+    """An attitude ephemeris message of quaternions as a table; lines of COMMENT or # are comments.
 
     Raises InputError for several segments, another kind of attitude, and an invalid epoch.
     """
@@ -289,11 +289,11 @@ def of_ephemeris(text: str) -> str:
         axes = "omega_space" if frame and bool(of_a) != body_first else "omega"
         order += [f"{axes}_{axis} [deg/s]" for axis in "xyz"]
     inertial_first = (meta.get("ATTITUDE_DIR", "A2B").upper() == "A2B") != body_first
-    lines = [f"# {line.strip()[7:].strip()}" for line in text.splitlines() if line.strip().startswith("COMMENT")]
+    lines = [f"# {line}" for line in re.findall(r"^\s*(?:COMMENT|#)[ \t]*(.*?)\s*$", text, re.MULTILINE)]
     if not inertial_first:
         lines.append("# quaternion: space_to_body")
     data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
-    rows = [line.split() for line in data if line.strip() and not line.strip().startswith("COMMENT")]
+    rows = [line.split() for line in data if line.strip() and not line.lstrip().startswith(("COMMENT", "#"))]
     start = _epoch(meta.get("START_TIME") or rows[0][0]) if rows else Fraction(0)
     lines.append(",".join(["timestamp", *order]))
     lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
