@@ -13,7 +13,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import HeavyTopError, InputError
+from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.diagnosis import diagnose, rounded
 from heavytop.features.score.diagnose.readings import Seen, disagreement
@@ -82,7 +82,7 @@ class Scored:
 
 def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
     """Explanations of the error: the digits written, lengths off 1, a convention, or another mistake."""
-    about: dict[str, Any] = {"step": _step(trajectory)}
+    about: dict[str, Any] = {"step": trajectory.step}
     count = len(_finite(trajectory))
     times, states = trajectory.times[:count], _finite(trajectory)
     said: list[Diagnosis] = []
@@ -241,18 +241,9 @@ def _is_number(metric: Metric) -> bool:
     return metric.log10 is not None or metric.value == "0"
 
 
-def _step(trajectory: GivenTrajectory) -> Fraction | None:
-    """The step of the method, where the file says it in a number."""
-    try:
-        step = exact(trajectory.flags.get("step", "0"))
-    except InputError:
-        return None
-    return step if step > 0 else None
-
-
 def _on_multiples(trajectory: GivenTrajectory) -> GivenTrajectory | None:
     """The trajectory at multiples of its step, where its times are all but these; None where they are, or are not."""
-    step = _step(trajectory)
+    step = trajectory.step
     if step is None:
         return None
     times = [round(time / step) * step for time in trajectory.times]

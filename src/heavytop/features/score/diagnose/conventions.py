@@ -194,13 +194,12 @@ class Suppositions:
 
     @cached_property
     def refused(self) -> float:
-        largest = [
-            max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
-            if {"omega", "omega_space"} & seen.columns.keys()
-            else 1.0
-            for seen in (self.early, self.seen)
+        """The error of the first samples beyond which a motion explains nothing."""
+        rates = [
+            [v for name, v in seen.columns.items() if name.startswith("omega")] for seen in (self.early, self.seen)
         ]
-        return refused(largest[0], largest[1], float(self.own.max()))
+        early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
+        return refused(early, largest, float(self.own.max()))
 
     def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""

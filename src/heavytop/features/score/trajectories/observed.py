@@ -23,6 +23,7 @@ from heavytop.precision import (
     cross,
     decimal_text,
     dot,
+    exact,
     number,
     round_to,
     shown,
@@ -292,6 +293,15 @@ class GivenTrajectory:
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
     observed: Observed | None = None
+
+    @property
+    def step(self) -> Fraction | None:
+        """That of the method, where the file says it in a number."""
+        try:
+            step = exact(self.flags.get("step", "0"))
+        except InputError:
+            return None
+        return step if step > 0 else None
 
     def warnings(self) -> list[str]:
         """Data that no rigid body can have, and γ so far off the unit sphere that columns may be in another order."""
