@@ -86,6 +86,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
         groups=_by_kind(rows),
+        kinds=kinds,
         left_out=left_out,
         environment=report.environment,
         commands=[] if report.beside else commands(report),
@@ -182,8 +183,10 @@ def _badness(row: Row) -> tuple[bool, bool, float]:
     return row.outcome == "success", row.finite, float("inf") if kept is None else kept
 
 
-def main_metric(row: Row) -> str:
-    """Beginning of a line about a row: an error if it has one that is a number, else what its kind is about."""
+def main_metric(row: Row, kinds: Kinds) -> str:
+    """Beginning of a line about a row: what its kind says, else an error if it has one that is a number."""
+    if row.metrics and (said := kind_of(row, kinds).line(row)):
+        return said
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
     errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
     name = next(iter(errors or row.metrics), None)

@@ -318,6 +318,8 @@ def of_arrays(content: bytes, suffix: str) -> str:
     Numbers are written so that they are read back the same.  Arrays that have not a row for each time, and what a
     Parquet table says of itself, stand for comments.  Raises InputError for other shapes.
     """
+    import numpy
+
     columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
     lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
     count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
@@ -326,11 +328,14 @@ def of_arrays(content: bytes, suffix: str) -> str:
     parts: list[Any] = []
     comments = []
     for name, array in columns.items():
-        if array.ndim == 0 or array.dtype.kind in "US" or (len(array) != count and array.size <= 9):
+        if array.ndim == 0 or (array.size <= 9 and (array.dtype.kind in "US" or len(array) != count)):
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
         elif array.ndim <= 3 and array.size and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
             names += _names_of(name, parts[-1].shape[1], last)
+        elif array.ndim == 1 and len(array) == count:  # a cell of text has no separators
+            parts.append(numpy.array([[re.sub(r"[^\w.+/-]+|^/+", " ", str(value))] for value in array]))
+            names.append(name)
     if not parts or len({len(part) for part in parts}) != 1:
         counts = ", ".join(str(len(part)) for part in parts) or "none"
         raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
