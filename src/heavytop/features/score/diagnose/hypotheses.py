@@ -210,7 +210,7 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     k = top.rotor or (Fraction(0),) * 3
     momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
     yield _tried(run, "start_momentum", start=momentum)
-    yield _as_momentum(run, momentum)
+    yield Hypothesis("all_momentum", {}, _restated(run, momentum, lambda omega: omega @ run.tensor + run.in_file(k)))
     for unit, factor in UNITS_OF_OMEGA.items():
         yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
     other = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
@@ -245,19 +245,16 @@ def _tried(run: Examined, kind: str, top: HeavyTop | None = None, start: State |
     return Hypothesis(kind, {}, run.left(top, start))
 
 
-def _as_momentum(run: Examined, start: State) -> Hypothesis:
-    """Start and states give M in place of Ω."""
+def _restated(run: Examined, start: State, omega: Callable[[Array], Array]) -> float:
+    """The error where the start is another, and the states give something else in place of Ω."""
     truth = run.supposed(run.times, start=start)
-    if truth is not None:
-        truth[:, :3] = truth[:, :3] @ run.tensor + run.in_file(run.top.rotor or (Fraction(0),) * 3)
-    return Hypothesis("all_momentum", {}, run.error(truth))
+    return run.error(None if truth is None else numpy.hstack([omega(truth[:, :3]), truth[:, 3:]]))
 
 
 def _all_times(run: Examined, factor: float) -> float:
     """The error where start and states give Ω times ``factor``."""
     start = State([w / Fraction(factor) for w in run.start.omega], run.start.gamma)
-    truth = run.supposed(run.times, start=start)
-    return run.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
+    return _restated(run, start, lambda omega: omega * factor)
 
 
 def all_scaled(run: Examined) -> Hypothesis | None:
