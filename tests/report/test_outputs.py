@@ -162,7 +162,8 @@ def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps(monkeypatc
     names, reports = three()
     tracks = history(reports, Policy())
     page = history_page([HOSTILE, *names[1:]], reports, tracks)
-    assert page == history_page([HOSTILE, *names[1:]], reports, tracks)
+    one, other = (history_page(names, reports, tracks[:2]) for _ in range(2))
+    assert one == other
     assert "<script" not in page
     drawn = {t.row for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1}
     assert page.count("<figure class") == len(drawn) > 3
@@ -176,10 +177,10 @@ def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps(monkeypatc
     quiet = history_page(names, reports, missing)
     assert "<figure class" not in quiet
     assert "missing" in quiet
-    rows = [msgspec.structs.replace(t, row=t.row._replace(case=f"{i}")) for i in range(6) for t in tracks[:1]]
-    monkeypatch.setattr("heavytop.report.render.history.MOST_PICTURES", 5)
+    rows = [msgspec.structs.replace(t, row=t.row._replace(case=f"{i}")) for i in range(3) for t in tracks[:1]]
+    monkeypatch.setattr("heavytop.report.render.history.MOST_PICTURES", 2)
     many = history_page(names, reports, rows)
-    assert many.count("<figure class") == 5
+    assert many.count("<figure class") == 2
     assert "more in the table alone" in many
 
 
