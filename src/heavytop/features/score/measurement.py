@@ -255,21 +255,12 @@ def _on_multiples(trajectory: GivenTrajectory) -> GivenTrajectory | None:
     return None if same or not increasing or max(off) > _CLOCK * step else replace(trajectory, times=times)
 
 
-def score(trajectory: GivenTrajectory) -> Row:
-    """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
-
-    The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
-    the first that is not finite on are not scored; the outcome says so.
-    """
-    return _measured(trajectory).row
-
-
 def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
-    """The row of :func:`score`, heyoka beside it, and what explains the error.
+    """The row of :func:`measured`, heyoka beside it, and what explains the error.
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
-    scored = _measured(trajectory, progress)
+    scored = measured(trajectory, progress)
     count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
     explained = scored if told is None else told[1]
     said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
@@ -286,7 +277,7 @@ def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored,
     exactly = _on_multiples(trajectory)
     if exactly is None:
         return None
-    scored = _measured(exactly)
+    scored = measured(exactly)
     kept, with_exact = digits_kept(row), digits_kept(scored.row)
     if kept is None or with_exact is None or with_exact < kept + _NOTICED:
         return None
@@ -295,8 +286,12 @@ def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored,
     return Diagnosis("clock", numbers, _size(row), _size(scored.row)), scored, exactly
 
 
-def _measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
-    """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes."""
+def measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
+    """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes.
+
+    The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
+    the first that is not finite on are not scored; the outcome says so.
+    """
     observed, rate = trajectory.observed, turning_rate(trajectory.top, trajectory.start)
     problem = exact_problem(trajectory)
     times = [round_to(time, trajectory.precision.bits) for time in trajectory.times]
