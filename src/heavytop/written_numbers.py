@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, real, round_to
 
 _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
@@ -33,6 +33,12 @@ def number(value: Any, what: str) -> Fraction | None:
         return exact(text)
     if _NOT_FINITE.fullmatch(text):
         return None
+    with prefixed(what):
+        return _unusual(text)
+
+
+def _unusual(text: str) -> Fraction:
+    """A number in hexadecimal, as Fortran writes it, or of many digits."""
     hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
     if hexadecimal is not None:
         sign, whole, part, power = hexadecimal.groups()
@@ -40,7 +46,7 @@ def number(value: Any, what: str) -> Fraction | None:
     else:
         fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
     if fraction and abs(fraction.numerator.bit_length() - fraction.denominator.bit_length()) > _WIDEST:
-        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
+        raise InputError(f"{text[:60]!r} is too large or too small.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
     return fraction
 
 

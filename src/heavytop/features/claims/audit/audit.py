@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
+from heavytop.errors import HeavyTopError, InputError, did_you_mean, invalid, prefixed
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
@@ -26,7 +26,7 @@ from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, Sta
 from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
-from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, library, split
 from heavytop.files import cache_folder
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
@@ -129,7 +129,7 @@ def _path(name: str) -> Path:
     chosen = file_of(name)
     if chosen is None:
         remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
-        raise InputError(f"Unknown claim {name[:60]!r}.", remedy)
+        raise InputError(f"Unknown claim {name[:60]!r}.", did_you_mean(name, [*PAPER, *library()]) + remedy)
     return chosen
 
 
