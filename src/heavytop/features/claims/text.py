@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from textwrap import fill, wrap
 
 from rich.console import Group, RenderableType
@@ -119,7 +119,7 @@ def audit_text(report: Audit) -> RenderableType:
     parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
     if report.kind == "value":
         return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
-    parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
+    parts += [Text(), _table(report), *_witnesses(report), *_conditions(report)]
     parts += [Text(f'With assume = [..., "{bound}"] the verdict is: {verdict}.') for bound, verdict in report.deciding]
     if report.unused:
         parts.append(Text(f"No formula uses {', '.join(report.unused)} of [parameters]."))
@@ -143,8 +143,7 @@ def _entry(report: Audit) -> list[RenderableType]:
 
 def _table(report: Audit) -> Table:
     """A line a statement; branch and domain stand in it where the claim has more than the smooth one and all times."""
-    usual = {"branch": {"smooth"}, "domain": {"all"}}
-    own = [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
+    own = _own(report)
     table = Table(box=None, pad_edge=False)
     for name in ("equation", *own, "verdict", "residual", "statement"):
         table.add_column(name, overflow="fold", no_wrap=name not in ("residual", "statement"))
@@ -152,6 +151,21 @@ def _table(report: Audit) -> Table:
         verdict = Text(VERDICTS[row.holds], style=_AUDIT_STYLES[row.holds])
         cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in own)))
         table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
+    return table
+
+
+def _own(report: Audit) -> list[str]:
+    """Of branch and domain those of which the claim has others than the smooth one and all times."""
+    usual = {"branch": {"smooth"}, "domain": {"all"}}
+    return [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
+
+
+def _indented(lines: Iterable[tuple[str | Text, str]]) -> Table:
+    """Texts behind their labels, each of whose lines starts below its first."""
+    table = Table.grid(padding=(0, 1))
+    table.add_column(no_wrap=True)
+    for label, text in lines:
+        table.add_row(Text("  ").append(label).append(":"), Text(text, overflow="fold"))
     return table
 
 
@@ -170,34 +184,37 @@ def _label(row: StatementVerdict) -> str:
     return f"{number} {row.component}"
 
 
-def _witnesses(report: Audit) -> list[Text]:
+def _witnesses(report: Audit) -> list[RenderableType]:
     """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
     refuted = [row for row in report.rows if row.witness is not None]
-    lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
+    points = []
     for row in refuted:
         witness = dict(row.witness or {})
         parameters = witness.pop("parameters")
         ball = f"{witness.pop('value')} +/- {witness.pop('radius')}" if "value" in witness else row.residual
-        point = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
-        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {ball} at {point}"))
-    notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
-    if notes:
-        lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]
+        point = ", ".join(f"{name}={number}" for name, number in {**parameters, **witness}.items())
+        points.append((" ".join([_label(row), *(getattr(row, name) for name in _own(report))]), f"{ball} at {point}"))
+    lines: list[RenderableType] = []
+    if points:
+        lines += [Text("\nWitnesses, with the residual as a ball that excludes 0:"), _indented(points)]
+    if notes := sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note}):
+        lines += [Text("\nThe domains:"), _indented(notes)]
     return lines
 
 
-def _conditions(report: Audit) -> list[Text]:
+def _conditions(report: Audit) -> list[RenderableType]:
     """The conditions of the proofs, each once: first what is not discharged, with the rows that it leaves open."""
     rows: dict[tuple[bool, str, str], list[str]] = {}
     for row in report.rows:
         if row.holds is not False:
             for c in row.conditions:
                 rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
-    lines = [Text("Conditions of the proofs (domain: moments of inertia > 0, and `assume`):")] if rows else []
+    lines: list[tuple[Text, str]] = []
     for (discharged, text, reason), labels in sorted(rows.items()):
         state = Text(
             "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]
         )
         where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
-        lines.append(Text("  ").append(state).append(f": {text} ({reason}){where}"))
-    return lines
+        lines.append((state, f"{text} ({reason}){where}"))
+    title = Text("\nConditions of the proofs (domain: moments of inertia > 0, and `assume`):")
+    return [title, _indented(lines)] if rows else []

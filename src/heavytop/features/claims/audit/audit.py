@@ -91,7 +91,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)
-    return made(content)
+    with prefixed(where):
+        return made(content)
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
