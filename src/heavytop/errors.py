@@ -68,7 +68,7 @@ def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str:
     return next((names[near] for near in get_close_matches(name.lower(), names, 1, alike)), "")
 
 
-def did_you_mean(name: str, known: Iterable[str], alike: float = 0.6) -> str:
+def meant(name: str, known: Iterable[str], alike: float = 0.6) -> str:
     """``Did you mean NAME? `` of the nearest name, to begin a remedy; "" where none is near."""
     near = nearest(name, known, alike)
     return f"Did you mean {near}? " if near else ""

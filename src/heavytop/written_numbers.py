@@ -33,20 +33,15 @@ def number(value: Any, what: str) -> Fraction | None:
         return exact(text)
     if _NOT_FINITE.fullmatch(text):
         return None
-    with prefixed(what):
-        return _unusual(text)
-
-
-def _unusual(text: str) -> Fraction:
-    """A number in hexadecimal, as Fortran writes it, or of many digits."""
     hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
     if hexadecimal is not None:
         sign, whole, part, power = hexadecimal.groups()
         fraction = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
     else:
-        fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
+        with prefixed(what):
+            fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
     if fraction and abs(fraction.numerator.bit_length() - fraction.denominator.bit_length()) > _WIDEST:
-        raise InputError(f"{text[:60]!r} is too large or too small.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
+        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
     return fraction
 
 

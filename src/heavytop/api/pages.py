@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from heavytop.api.formulas import plain_formula
-from heavytop.errors import InputError, did_you_mean, quoted
+from heavytop.errors import InputError, meant, quoted
 
 _INSTALLED = Path(__file__).parents[1] / "docs"
 """Where hatch_build.py puts the pages of a wheel."""
@@ -25,7 +25,7 @@ def page(topic: str) -> str:
     """The page in Markdown, formulas as text, without tables that the site makes; raises InputError for no page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
-        remedy = did_you_mean(name, files) + "`heavytop docs` lists the topics."
+        remedy = meant(name, files) + "`heavytop docs` lists the topics."
         raise InputError(f"topic must name a page; got {quoted(topic)}.", remedy)
     return re.sub(
         r"\$\$\n(.*?)\$\$",

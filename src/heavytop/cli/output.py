@@ -20,7 +20,7 @@ from heavytop.errors import HeavyTopError
 
 _LOSSY = {"strict": "replace", "surrogateescape": "replace"}
 _own: TextIO | None = None
-_WHOLE: Any = {"break_long_words": False, "break_on_hyphens": False, "replace_whitespace": False}
+WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False, "replace_whitespace": False}
 _CAUSES = {errno.EBADF: "it is closed"}
 
 
@@ -102,7 +102,7 @@ def messages() -> TextIO:
 def say(text: str) -> None:
     """A message for people, wrapped where the width of a terminal is known."""
     width = get_terminal_size((0, 0)).columns or len(text) + 12
-    lines = (fill(line, width, subsequent_indent="  ", **_WHOLE) for line in f"heavytop: {text}".splitlines())
+    lines = (fill(line, width, subsequent_indent="  ", **WHOLE_WORDS) for line in f"heavytop: {text}".splitlines())
     print("\n".join(lines), file=messages(), flush=True)
 
 

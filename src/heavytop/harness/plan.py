@@ -21,7 +21,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, did_you_mean, invalid, nearest, prefixed, quoted, why
+from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted, why
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole
 from heavytop.harness import BUILT_IN, OF_FEATURES
@@ -145,7 +145,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"The plan {name} cannot be read: {why(error)}.", _READABLE) from None
     else:
-        remedy = did_you_mean(name, BUILT_IN) + "`heavytop list` shows the plans; your own is a file ending in .toml."
+        remedy = meant(name, BUILT_IN) + "`heavytop list` shows the plans; your own is a file ending in .toml."
         raise InputError(f"Unknown plan {name[:60]!r}.", remedy)
     try:
         plan = of_document(document_of(text), kinds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from textwrap import fill, wrap
 
 from rich.console import Group, RenderableType
@@ -161,18 +161,18 @@ def _table(report: Audit) -> Table:
 
 
 def _own(report: Audit) -> list[str]:
-    """Of branch and domain those of which the claim has others than the smooth one and all times."""
+    """The columns branch and domain, where the claim has more than the smooth one and all times."""
     usual = {"branch": {"smooth"}, "domain": {"all"}}
     return [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
 
 
-def _indented(lines: Iterable[tuple[str | Text, str]]) -> Table:
-    """Texts behind their labels, each of whose lines starts below its first."""
+def _indented(title: str, lines: Sequence[tuple[str | Text, str]]) -> list[RenderableType]:
+    """Texts behind their labels, below a title; nothing where there are none."""
     table = Table.grid(padding=(0, 1))
     table.add_column(no_wrap=True)
     for label, text in lines:
         table.add_row(Text("  ").append(label).append(":"), Text(text, overflow="fold"))
-    return table
+    return [Text(f"\n{title}:"), table] if lines else []
 
 
 def _in_lines(expression: str) -> str:
@@ -200,12 +200,9 @@ def _witnesses(report: Audit) -> list[RenderableType]:
         ball = f"{witness.pop('value')} +/- {witness.pop('radius')}" if "value" in witness else row.residual
         point = ", ".join(f"{name}={number}" for name, number in {**parameters, **witness}.items())
         points.append((" ".join([_label(row), *(getattr(row, name) for name in _own(report))]), f"{ball} at {point}"))
-    lines: list[RenderableType] = []
-    if points:
-        lines += [Text("\nWitnesses, with the residual as a ball that excludes 0:"), _indented(points)]
-    if notes := sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note}):
-        lines += [Text("\nThe domains:"), _indented(notes)]
-    return lines
+    notes = sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note})
+    title = "Witnesses, with the residual as a ball that excludes 0"
+    return _indented(title, points) + _indented("The domains", notes)
 
 
 def _conditions(report: Audit) -> list[RenderableType]:
@@ -215,12 +212,11 @@ def _conditions(report: Audit) -> list[RenderableType]:
         if row.holds is not False:
             for c in row.conditions:
                 rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
-    lines: list[tuple[Text, str]] = []
+    lines = []
     for (discharged, text, reason), labels in sorted(rows.items()):
         state = Text(
             "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]
         )
         where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
         lines.append((state, f"{text} ({reason}){where}"))
-    title = Text("\nConditions of the proofs (domain: moments of inertia > 0, and `assume`):")
-    return [title, _indented(lines)] if rows else []
+    return _indented("Conditions of the proofs (domain: moments of inertia > 0, and `assume`)", lines)

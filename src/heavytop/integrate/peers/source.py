@@ -15,7 +15,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, NoSuchFunction, PeerFailed, did_you_mean
+from heavytop.errors import InputError, NoSuchFunction, PeerFailed, meant
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
@@ -46,7 +46,7 @@ class PythonFile:
         except AttributeError:
             functions = (item for item in vars(module).values() if inspect.isfunction(item))
             own = [item.__name__ for item in functions if item.__module__ == module.__name__]
-            remedy = f"{did_you_mean(self.function, own)}It has {', '.join(own) or 'no function'}."
+            remedy = f"{meant(self.function, own)}It has {', '.join(own) or 'no function'}."
             raise NoSuchFunction(f"{self.path} has no {self.function}.", remedy) from None
         return as_peer(call, self.name)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, did_you_mean, invalid, prefixed
+from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
@@ -130,7 +130,7 @@ def _path(name: str) -> Path:
     chosen = file_of(name)
     if chosen is None:
         remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
-        raise InputError(f"Unknown claim {name[:60]!r}.", did_you_mean(name, [*PAPER, *library()]) + remedy)
+        raise InputError(f"Unknown claim {name[:60]!r}.", meant(name, [*PAPER, *library()]) + remedy)
     return chosen
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, did_you_mean, nearest, quoted, why
+from heavytop.errors import InputError, meant, nearest, quoted, why
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -66,7 +66,7 @@ _LIKE = 0.75
 
 def unknown(key: str, known: Sequence[str]) -> InputError:
     """Error text for an unknown key."""
-    return InputError(f"Unknown key {quoted(key)}.", did_you_mean(key, known, _LIKE).rstrip() or REMEDY)
+    return InputError(f"Unknown key {quoted(key)}.", meant(key, known, _LIKE).rstrip() or REMEDY)
 
 
 class TextTable:
