@@ -225,8 +225,14 @@ def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
-@pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
+@pytest.mark.parametrize(
+    ("integrate", "precision", "case"),
+    [
+        pytest.param(*form.values, case, id=f"{form.id}-{case}")
+        for case in ("forward", "backward", "attitude", "resting")
+        for form in EVERY_FORMAT[:: 1 if case == "forward" else 3]
+    ],
+)
 def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(integrate, precision, case: str) -> None:
     """Samples lie closer than steps and farther apart; -0 and rest are kept."""
     top, start, sign, options = TOP, START, 1, {}
