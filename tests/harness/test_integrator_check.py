@@ -10,7 +10,7 @@ from time import monotonic, sleep
 
 import pytest
 
-from heavytop.errors import MissingFunction
+from heavytop.errors import NoSuchFunction
 from heavytop.harness import integrator_check
 from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
@@ -86,12 +86,6 @@ def test_noise_of_the_size_of_the_error_moves_a_top_at_rest(
     assert integrator_check._judged("rest", contract._rest).verdict == verdict
 
 
-def test_a_name_that_the_file_lacks_is_no_broken_contract(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", "pass"))
-    with pytest.raises(MissingFunction, match=r"mine.py has no absent.\n  Its functions: solve\."):
-        integrator_check._part(named(f"{tmp_path / 'mine.py'}:absent"), 0)
-
-
 @pytest.mark.slow
 def test_the_check_ends_where_a_forked_process_is_left_behind(tmp_path: Path) -> None:
     """It holds the pipes of the process that forked it."""
@@ -154,3 +148,10 @@ def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:
         part = integrator_check._judged("attitude", contract._attitude)
         assert part.verdict == "violated"
         assert "With the attitude its state at t = " in part.text
+
+
+def test_a_function_that_a_file_does_not_have_is_no_violation(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def solve(request): pass\n")
+    solve = named(f"{tmp_path}/mine.py:solv")
+    with pytest.raises(NoSuchFunction, match=r"has no solv\.\n  Did you mean solve\? It has solve\."):
+        integrator_check._judged("start", solve.load)

@@ -286,7 +286,7 @@ def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     assert table.rows == [
         ["step 1/10", "1.0e-04", "12 ms", "1 s"],
         ["step 1/30", "2.0e-10", "123 s", "1.8 s"],
-        ["order seen", "11.9", "", ""],
+        ["order, finest two", "11.9", "", ""],
     ]
     assert second.rows == [["step 1/30", "1.0e-13", "2 s", "not reached"]]
     # beside integrators of this program too: theirs are the plan's own curves
@@ -297,7 +297,7 @@ def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     assert alone.rows == [
         ["step 1/10", "1.0e-04", "12 ms"],
         ["step 1/30", "2.0e-10", "123 s"],
-        ["order seen", "11.9", ""],
+        ["order, finest two", "11.9", ""],
     ]
 
 

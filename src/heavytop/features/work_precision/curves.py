@@ -124,7 +124,7 @@ class Lead:
 
     @property
     def ratio(self) -> float | None:
-        """How many times as fast as the fastest other heyoka is."""
+        """How many times as fast heyoka is."""
         return self._ratio(self.ours)
 
     def _ratio(self, seconds: float | None) -> float | None:
@@ -233,7 +233,7 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                     if (curve.integrator, curve.precision) == (OURS, line.precision)
                 ]
                 cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
-                cells += [] if line.order is None else [["order seen", line.order_text, "", ""][: 3 + beside]]
+                cells += [] if line.order is None else [["order, finest two", line.order_text, "", ""][: 3 + beside]]
             columns = [f"{name}, {case}", "error", "time", "heyoka's time"][: 3 + beside]
             tables.append(Table("", columns, cells, shown=In.SHORT))
     return tables

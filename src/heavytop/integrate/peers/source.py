@@ -15,7 +15,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, MissingFunction, PeerFailed
+from heavytop.errors import InputError, NoSuchFunction, PeerFailed, meant
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
@@ -40,14 +40,14 @@ class PythonFile:
             status = path.stat()
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror}.", "Give FILE.py:FUNCTION.") from None
-        module = _module(path, (status.st_mtime_ns, status.st_size))
+        module: Any = _module(path, (status.st_mtime_ns, status.st_size))
         try:
             call = attrgetter(self.function)(module)
         except AttributeError:
-            own = inspect.getmembers(module, lambda v: inspect.isfunction(v) and v.__module__ == module.__name__)
-            names = ", ".join(name for name, _ in own[:12])
-            remedy = f"Its functions: {names}." if names else "Give FILE.py:FUNCTION."
-            raise MissingFunction(f"{self.path} has no {self.function}.", remedy) from None
+            functions = (item for item in vars(module).values() if inspect.isfunction(item))
+            own = [item.__name__ for item in functions if item.__module__ == module.__name__]
+            remedy = f"{meant(self.function, own)}It has {', '.join(own) or 'no function'}."
+            raise NoSuchFunction(f"{self.path} has no {self.function}.", remedy) from None
         return as_peer(call, self.name)
 
 
