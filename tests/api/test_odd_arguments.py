@@ -240,7 +240,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads = 0"),
         (lambda: ht.reference(TOP, START, [1], 0), "digits must be from 1 to 20000; got 0"),
         (lambda: ht.reference(TOP, START, []), "No times"),
-        (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states has the shape (1, 9)"),
+        (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states[0] has 9 numbers, not 6"),
         (lambda: ht.score([1, 2], np.zeros((1, 6)), top=TOP, start=START), "2 times and 1 states"),
         (lambda: ht.score([1], [[1, 2, 3]], top=TOP, start=START), "states[0] has 3 numbers"),
         (lambda: ht.compare("nowhere", "nowhere"), "holds no report"),

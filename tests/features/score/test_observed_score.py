@@ -160,7 +160,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"start_quaternion": "0, 0, 0, 0"}, "must have length 1|must not be zero"),
         ({"start_quaternion": "", "start_matrix": "1,0,0,0,1,0,0,0,-1"}, "is a reflection, not a rotation"),
         ({"start_quaternion": "", "start_matrix": "1,0.5,0,0,1,0,0,0,1"}, "is not orthogonal: R R.T is off"),
-        ({"start_quaternion": "", "start_matrix": "1,0,0,0,1,0"}, "start_matrix has 6 numbers, not 9"),
+        ({"start_quaternion": "", "start_matrix": "1,0,0,0,1,0"}, "start_matrix must be 9 numbers; got '1,0,0,0,1,0'"),
         ({"gamma": "0, 0.6, 0.8"}, "gamma and start_quaternion contradict each other"),
         ({"start_matrix": "1,0,0,0,1,0,0,0,1"}, "both give the attitude at t = 0"),
         ({"start_quaternion": ""}, "The attitude at t = 0 is missing"),
@@ -186,7 +186,7 @@ def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
         ({"mass": "1", "weight": ""}, "The key gravity is missing"),
         ({"mass": "1", "gravity": "9.81", "weight": ""}, "which point the inertia tensor is about"),
         ({"system": "gyrostat"}, "not scored in the system gyrostat"),
-        ({"pivot": "1, 2"}, "pivot has 2 numbers"),
+        ({"pivot": "1, 2"}, "pivot must be 3 numbers; got '1, 2'"),
         ({"inertia": "1, 1, nan"}, "nan"),
     ],
 )
