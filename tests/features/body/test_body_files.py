@@ -521,7 +521,7 @@ TWICE = (0.075 - 0.18, 0.37 / 6 - 0.18, 1 / 60)
         (TWICE, "", ["about_centre", "negative_moment"]),
         ([2 * TWICE[0] / 3, 2 * TWICE[1] / 3, 0.02], SHAPE, ["about_centre"]),
         ([1e4 * value for value in UNIFORM], SHAPE, ["centimetres"]),
-        ([1e4 * value for value in UNIFORM], "", ["centimetres", "grams", "grams"]),
+        ([1e4 * value for value in UNIFORM], "", ["centimetres", "grams"]),
         ([value / 0.0254**2 for value in UNIFORM], SHAPE, ["inches"]),
         ([value / 0.0254**2 / 0.45359237 for value in UNIFORM], SHAPE, ["inches"]),
         ([1e7 * value for value in UNIFORM], SHAPE, ["grams"]),
