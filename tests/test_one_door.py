@@ -24,6 +24,7 @@ DATA = {
     "omega": "1/10,2/5,9/10",
     "gamma": "3/5,0,4/5",
 }
+FIXED = f"{Path(__file__).parent / 'support' / 'methods_with_memory.py'}:ab4"
 GOOD: Mapping[str, dict[str, str]] = {
     "plain": {"times": "1,2.5"},
     "backward": {"times": "-1,-2"},
@@ -32,6 +33,7 @@ GOOD: Mapping[str, dict[str, str]] = {
     "tolerance": {"times": "4", "tolerance": "1e-9"},
     "step limit": {"times": "1,40", "max-steps": "7"},
     "multiword": {"times": "3", "integrator": "multiword", "precision": "double-double"},
+    "fixed steps": {"times": "1,2.5", "step": "1/3", "integrator": FIXED},
     "rotor": {"times": "1", "rotor": "0,0,1/3"},
     "gyrostat": {"times": "1", "system": "gyrostat", "gamma": "0,1,0", "omega": "0,1,0", "centre": "0,1,0"},
     "gamma of decimals": {"times": "1", "gamma": "0.5773502691896257,0.5773502691896257,0.5773502691896257"},
@@ -60,6 +62,8 @@ BAD: Mapping[str, dict[str, str]] = {
     "tolerance above 1": {"tolerance": "2", "times": "1"},
     "tolerance of an integrator without": {"tolerance": "1e-9", "integrator": "splitting2", "times": "1"},
     "no step": {"max-steps": "0", "times": "1"},
+    "step 0": {"step": "0", "integrator": FIXED, "times": "1"},
+    "step of an integrator without": {"step": "1/9", "times": "1"},
     "system unknown": {"system": "kite", "times": "1"},
     "rotor of a heavy top": {"rotor": "0,0,1", "system": "heavy_top", "times": "1"},
     "gyrostat with Mγ = 0": {"system": "gyrostat", "omega": "0,0,0", "times": "1"},
@@ -131,6 +135,7 @@ def test_good_input_propagates_to_the_same_numbers(name: str) -> None:
     printed, run = of_command("propagate", given), of_python(ht.propagate, given)
     assert printed["states"] == run.texts()
     assert (printed["outcome"], printed["steps"]) == (run.outcome.value, run.steps)
+    assert "step" not in given or run.steps == 3 + 5
     assert (printed["system"], printed["integrator"]) == (run.problem.system.name, run.integrator)
     metrics = {name: number["value"] for name, number in printed["metrics"].items()}
     drifts = {name: (each.max, each.rms, each.final) for name, each in ht.drift(run).items()}
@@ -312,7 +317,6 @@ def test_the_page_of_a_comparison_is_the_same(tmp_path: Path) -> None:
 
 SCORED: Mapping[str, tuple[list[str], Mapping[str, Any]]] = {
     "as it is": ([], {}),
-    "enough digits": (["--require", "5"], {"require": 5}),
     "too few digits": (["--require", "15.5"], {"require": "15.5"}),
     "a case": (["--case", "generic"], {"case": "generic"}),
     "another case": (["--case", "euler"], {"case": "euler"}),

@@ -69,14 +69,10 @@ def assert_said(done: subprocess.CompletedProcess[bytes], *codes: int) -> None:
         assert "heavytop: " in errors
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
-def test_characters_that_an_encoding_lacks_are_replaced(encoding: str) -> None:
-    name = encoding.partition(":")[0]
-    text = shell("heavytop " + " ".join(PROPAGATE), PYTHONIOENCODING=encoding)
+def test_characters_that_an_encoding_lacks_are_replaced() -> None:
+    text = shell("heavytop " + " ".join(PROPAGATE), PYTHONIOENCODING="ascii")
     assert_said(text, 0)
-    known = text.stdout.decode(name)
-    assert "3  0.96912566428666425" in known
-    assert ("γ3" in known) == (encoding == "utf-16")
+    assert "3  0.96912566428666425" in text.stdout.decode("ascii")
 
 
 def test_json_loses_nothing_in_any_encoding(tmp_path: Path) -> None:
@@ -131,8 +127,7 @@ def test_a_removed_folder_is_an_answer_or_exit_2(tmp_path: Path) -> None:
 def test_a_home_and_a_cache_that_cannot_be_written_are_no_matter(tmp_path: Path) -> None:
     nowhere = "/proc/nowhere"
     everywhere = {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "XDG_CONFIG_HOME": nowhere, "NUMBA_CACHE_DIR": nowhere}
-    for what in (f"{' '.join(PROPAGATE)} --json", f"show {results()} --html {tmp_path / 'page.html'}"):
-        assert_said(shell(f"heavytop {what}", **everywhere), 0)
+    assert_said(shell(f"heavytop show {results()} --html {tmp_path / 'page.html'}", **everywhere), 0)
 
 
 def results() -> Path:

@@ -361,8 +361,8 @@ def _equal(left: str | None, text: str, right: str = "") -> str:
 
 
 def _comparison(text: str) -> str:
-    parts = re.split(r"(<|>)", text)
-    return " ".join(escape(part) if part in "<>" else typeset(part) for part in parts)
+    parts = re.split(r"(<|>|!=)", text)
+    return " ".join({"<": "&lt;", ">": "&gt;", "!=": "≠"}.get(part) or typeset(part) for part in parts)
 
 
 def _italic(letter: str) -> str:

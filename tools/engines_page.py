@@ -141,16 +141,15 @@ def summary(found: Sequence[Curve]) -> Iterator[str]:
 
 def table(found: Sequence[Curve], body: str) -> Iterator[str]:
     """The lines of a body."""
-    heads = "order, claimed", "seen", "steps", "digits at each", "at T", "3 digits", "6 digits"
+    heads = "order, claimed", "seen", "1/step or tolerance", "digits at each", "at T", "3 digits", "6 digits"
     yield f"| integrator | {' | '.join(heads)} | energy | joint | float32 |"
     yield f"|{'---|' * (len(heads) + 4)}"
     own = {curve.label: curve for curve in found if curve.body == body}
     for label, curve in own.items():
         if SINGLE in label:
             continue
-        points = (
-            ", ".join(each) for each in zip(*((control(row), f"{digits(row):.1f}") for row in curve.rows), strict=True)
-        )
+        pairs = [(control(row).removeprefix("1/"), f"{digits(row):.1f}") for row in curve.rows]
+        points = map(" ".join, zip(*pairs, strict=True))
         single = own.get(label.replace(curve.name, curve.name + SINGLE))
         cells = [label, str(curve.line.declared), curve.order(), *points, f"{at_end(curve.rows[-1]):.1f}"]
         cells += [curve.seconds(3), curve.seconds(6), curve.drift(), curve.joint()]

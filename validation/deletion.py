@@ -4,8 +4,8 @@
 
 Copies the checkout, removes the package of a feature, its line in the registry, its tables and rows in the plans and
 reports that ship, and the tests that name it or what it adds.  In the copy every module is imported, the smoke plan is
-run, and the quick tests that are left pass; with --few some of the rooms that all share.  --plant lets a shared room
-import the feature first, which has to be found.  Exit 1 where one cannot be deleted.
+run, and the quick tests that are left pass; with --few two short rows and some tests of the rooms that all share.
+--plant lets a shared room import the feature first, which has to be found.  Exit 1 where one cannot be deleted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,18 @@ from heavytop.report.store import store
 
 ROOT = Path(__file__).parents[1]
 _LINKED = ("docs", "examples", "benchmarks", "validation", "tools", "constraints", "pyproject.toml")
-_FEW = ("test_layers.py", "test_cli_help.py", "report/test_compare.py", "harness/test_plan.py")
+_FEW = ("test_cli_help.py", "report/test_compare.py", "harness/test_plan.py")
+_FEW_ROWS = """name = "few"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "2", samples = 4 }]
+[[measure]]
+kind = "local_error"
+cases = ["euler"]
+precisions = ["double"]
+horizon = "1"
+"""
 _IMPORTS = """
 import importlib, pathlib, pkgutil, sys, heavytop
 assert pathlib.Path(heavytop.__file__).is_relative_to(sys.argv[1]), heavytop.__file__
@@ -61,9 +72,12 @@ def problems_without(name: str, few: bool = True, plant: bool = False) -> list[s
                 file.write(f"\nfrom {feature.package} import FEATURE\n")
         tests = [str(copy / "tests" / each) for each in _FEW] if few else [str(copy / "tests")]
         tests = [test for test in tests if Path(test).exists()]
+        plan = "smoke"
+        if few:
+            (copy / (plan := "few.toml")).write_text(without_kinds(_FEW_ROWS, kinds_of(feature)), "utf-8")
         checks = {
             "imports": ["-c", _IMPORTS, str(copy)],
-            "smoke plan": ["-m", "heavytop", "run", "--plan", "smoke", "--out", str(copy / "smoke"), "--workers", "1"],
+            "run": ["-m", "heavytop", "run", "--plan", plan, "--out", str(copy / "out"), "--workers", "1"],
             "tests": ["-m", "pytest", "-q", "-x", "-m", "not slow", "-p", "no:cacheprovider", *tests],
         }
         found = []
@@ -83,14 +97,22 @@ def problems_without(name: str, few: bool = True, plant: bool = False) -> list[s
         return found
 
 
+def kinds_of(feature: Feature) -> set[str]:
+    """The names of the kinds of measurement that a feature adds."""
+    return {feature.load(kind).name for kind in feature.kinds}
+
+
 def added(feature: Feature) -> set[str]:
     """The kinds, commands and Python names of a feature."""
-    kinds = {feature.load(kind).name for kind in feature.kinds}
     text = "".join(
         Path(str(feature.load(module).__file__)).read_text("utf-8") for module in (*feature.commands, "__init__")
     )
     commands = re.findall(r"^@command\n(?:@\w+\n)*def (\w+)", text, re.M)
-    return kinds | {*feature.plans, *commands, *(name for names in feature.python.values() for name in names)}
+    return kinds_of(feature) | {
+        *feature.plans,
+        *commands,
+        *(name for names in feature.python.values() for name in names),
+    }
 
 
 def delete(copy: Path, name: str, feature: Feature) -> None:
@@ -104,7 +126,7 @@ def delete(copy: Path, name: str, feature: Feature) -> None:
     shutil.rmtree(package / name)
     registry = package / "__init__.py"
     registry.write_text(registry.read_text("utf-8").replace(f'    "{name}",\n', ""), "utf-8")
-    kinds = {feature.load(kind).name for kind in feature.kinds}
+    kinds = kinds_of(feature)
     for plan in (copy / "src/heavytop/harness/plans").glob("*.toml"):
         plan.write_text(without_kinds(plan.read_text("utf-8"), kinds), "utf-8")
     for report in (ROOT / "results").iterdir():

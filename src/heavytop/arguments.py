@@ -142,6 +142,14 @@ def tolerance(value: Number | None, form: Precision) -> Fraction | None:
     return None if value is None else usable_tolerance(value, form)
 
 
+def positive(value: Number | None, what: str) -> Fraction | None:
+    """A positive number, or None."""
+    number = None if value is None else physical(value, what)
+    if number is not None and number <= 0:
+        raise InputError(f"{what} must be positive; got {shown(number)}.", "Give a number above 0.")
+    return number
+
+
 def count(value: int | None, what: str) -> int | None:
     """A positive integer, or None."""
     if value is None:

@@ -286,7 +286,9 @@ def _from_decimal(text: str, original: str) -> Fraction:
         raise InputError(f"A number of {len(text)} characters is too long.", f"At most {_MAX_TEXT} are read.")
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
-        raise InputError(f"{quoted(original)} is not a finite number.", _REMEDY)
+        with_point = text.replace(",", ".", 1)
+        remedy = f"Write a decimal point: {with_point}." if _DECIMAL.fullmatch(with_point) else _REMEDY
+        raise InputError(f"{quoted(original)} is not a finite number.", remedy)
     exponent = match[3].lstrip("eE+-").lstrip("0") if match[3] else ""
     if len(exponent) > len(str(_MAX_TEXT)) or int(exponent or 0) > _MAX_TEXT:
         raise _too_large(original)

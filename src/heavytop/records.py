@@ -306,8 +306,12 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             ends = f"{_LOST}{self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
             return f"computed, not proven: {self.method}{agreed}{ends}{why}"
-        said = ", for the first start; ".join(certificate.text for certificate in self.certificates)
-        return f"known: {self.method}, radius below {self.radius}; {said}"
+        return f"known: {self.method}, radius below {self.radius}; {self.certified}"
+
+    @property
+    def certified(self) -> str:
+        """Text of its certificates: at which time a second source agrees, and to how many digits."""
+        return ", for the first start; ".join(certificate.text for certificate in self.certificates)
 
     @property
     def brief(self) -> str:

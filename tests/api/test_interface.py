@@ -13,6 +13,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.precision import exact
+from support import in_process
 
 ROOT = Path(__file__).parents[2]
 TOP = ht.HeavyTop((2, 2, 1), 1, (0, 0, "1/2"))
@@ -111,8 +112,7 @@ def test_arrays_are_scored_as_the_command_line_scores_them(tmp_path: Path) -> No
         "states": run.texts(),
     }
     (tmp_path / "motion.json").write_text(json.dumps(document))
-    command = [sys.executable, "-m", "heavytop", "score", str(tmp_path / "motion.json"), "--json"]
-    row = json.loads(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout)
+    row = json.loads(in_process.heavytop("score", tmp_path / "motion.json", "--json").stdout)
     assert row["digits_kept"] == score.digits_kept > 17
     for name, drift in score.drift.items():
         assert row["metrics"][f"drift_{name}_max"]["value"] == drift.max.value == ht.drift(run)[name].max.value
@@ -210,8 +210,7 @@ def test_a_finished_run_is_read_again_and_a_plan_of_odd_moments_warns(tmp_path: 
         report = ht.run(plan, out=tmp_path / "out", workers=1)
     with pytest.warns(UserWarning, match=warned):
         assert ht.run(plan, out=tmp_path / "out", workers=1, resume=True).rows == report.rows
-    command = [sys.executable, "-m", "heavytop", "run", "--plan", str(plan), "--out", str(tmp_path / "again")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = in_process.heavytop("run", "--plan", plan, "--out", tmp_path / "again", "--workers", 1)
     assert done.returncode == 0
     assert done.stderr.startswith(f"heavytop: warning: {warned}")
 

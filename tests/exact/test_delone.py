@@ -6,20 +6,14 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from flint import arb
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
-from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
-from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
     assert_attitude,
-    assert_meets,
     assert_narrow,
     assert_solves,
-    attitude_of,
     positive,
     rational,
 )
@@ -36,7 +30,7 @@ def delone(omega, gamma3, moment, i3=Fraction(1)):
     return Delone(HeavyTop((2 * i3, 2 * i3, i3), 1, (n1, n2, 0)), State(omega, gamma))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(20))
 def test_every_random_motion_solves_all_six_equations(seed):
     rng = random.Random(seed)
     omega = [rational(rng) for _ in range(3)]
@@ -62,24 +56,6 @@ def test_the_limit_of_the_class_is_the_homoclinic_form():
         for a, b in zip(special.state(time, 200), general.state(time, 200), strict=True):
             assert a.overlaps(b)
     assert_attitude(special, Fraction(1, 3))
-
-
-def test_the_reference_state_lies_in_the_balls():
-    vector = next(v for v in VECTORS if v["name"].startswith("delone"))
-    top, start = (
-        HeavyTop(vector["inertia"], vector["weight"], vector["centre"]),
-        State(vector["omega"], vector["gamma"]),
-    )
-    with working_precision(300):
-        for motion in (Delone(top, start), DeloneHomoclinic(Fraction(1), Fraction(1))):
-            assert (motion.top, motion.start) == (top, start)
-            for value, text in zip(motion.state(Fraction(vector["time"]), 210), vector["state"], strict=True):
-                assert abs(value - arb(text)).abs_upper() < arb("1e-59")
-
-
-def test_fifty_digits_come_out_at_any_time():
-    motion = delone((Fraction(1, 2), Fraction(1, 3), Fraction(1)), Fraction(2, 3), (1, Fraction(1, 2)))
-    assert_narrow(motion, Fraction(10**9))
 
 
 def test_beside_the_permanent_rotation_every_digit_comes_out():
@@ -125,25 +101,6 @@ def test_the_attitude_at_turning_points_poles_and_without_area(omega, gamma3):
     motion = delone(tuple(map(Fraction, omega)), Fraction(gamma3), (Fraction(1), Fraction(0)))
     for time in (Fraction(0), Fraction(7, 3), Fraction(-30)):
         assert_attitude(motion, time)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", ALL)
-def test_the_attitude_meets_the_enclosure_and_reaches_a_million_in_every_naming(axes):
-    named = find(renamed_top(UNIT.top, axes), renamed_state(UNIT.start, axes))
-    method, attitude = attitude_of(named, Fraction(10**6), 180)
-    assert method.startswith("closed form: Delone")
-    assert max(x.rad() for x in attitude(Fraction(10**6), 180)) < arb("1e-50")
-    assert_meets(named, (Fraction(2), Fraction(-20)))
-
-
-def test_the_attitude_does_not_know_the_units():
-    slow = Fraction(10) ** 100
-    small = delone(tuple(w / slow for w in UNIT.start.omega), Fraction(4, 5), (Fraction(3, 5) / slow**2, 0))
-    pairs = zip(UNIT.attitude(Fraction(7), 170), small.attitude(7 * slow, 170), strict=True)
-    for value, same in pairs:
-        assert value.overlaps(same)
-        assert same.rad() < arb("1e-45")
 
 
 # 2A, Ω3 along |g|, γ3, so that e = 0, γ along axis 3 among them; a double root of the cubic

@@ -44,8 +44,7 @@ def motion_of(name):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "time"),
-    [(name, Fraction(-1) if place % 2 else Fraction(7, 3)) for place, name in enumerate(MOTIONS)]
-    + [("generic", Fraction(-1))],
+    [(name, Fraction(-1) if place % 2 else Fraction(7, 3)) for place, name in enumerate(MOTIONS)],
 )
 def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
     motion = motion_of(name)
@@ -54,7 +53,7 @@ def test_the_laws_of_the_flow_hold_as_narrow_balls(name, time):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["generic", "lagrange", "gyrostat", "heavy gyrostat"])
+@pytest.mark.parametrize("name", ["generic", "heavy gyrostat"])
 def test_central_differences_of_references_are_inside(name):
     motion, time = motion_of(name), Fraction(7, 3)
     found = of(motion, time, data=True)
@@ -202,7 +201,6 @@ def test_balls_of_few_digits_hold_those_of_many():
     [
         (2.0**20, 256, 256),
         (2.0**90, 270, 270),
-        *((2.0**20, bits, 440) for bits in (184, 192)),
         (2.0**-120, 184, 440),
         (2.0**100, 270, 184),
     ],
@@ -232,7 +230,7 @@ def test_the_bound_of_a_step_holds_at_every_corner_of_its_set_of_errors(size, pr
     own = step_derivatives(tangent, along, Fraction(1))
     fine = module._tangent(motion, scaled, 512, False, tuple(SIX))
     rng, worst, shift = random.Random(1), Fraction(0), 512 - of_motion
-    for _ in range(4):
+    for _ in range(2):
         centre = [(int(c) + rng.choice((-1, 1)) * radius) << shift for c in node.centre]
         beside = Node(Fraction(0), centre, Errors(np.eye(6), np.zeros(6), 0), along.node.halvings)
         true = step_derivatives(fine, step(scaled.field, beside, 512), Fraction(1))

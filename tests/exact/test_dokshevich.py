@@ -102,16 +102,6 @@ def test_momentum_is_level_and_its_share_along_r_is_not_0():
     assert dot(start.gamma, start.gamma) == (F(3, 5) / 7 * size * w * 4 / b) ** 2
 
 
-@pytest.mark.parametrize("axes", ALL)
-def test_it_is_found_under_every_naming_of_the_axes(axes):
-    top, start = motion(2)
-    named = renamed_top(top, axes), renamed_state(start, axes)
-    found = find(*named)
-    assert isinstance(getattr(found, "solution", found), Dokshevich)
-    assert (found.top, found.start) == named
-    assert_solves(found, F(7, 3))
-
-
 def test_a_turning_point_is_a_start_like_any_other():
     case = Dokshevich(*motion(1))
     assert case.start.omega[1] == 0
@@ -166,23 +156,6 @@ def test_moments_on_the_edge_of_what_a_body_has_are_no_harder():
 def test_moments_that_no_body_has_may_be_too_far_apart_and_the_refusal_names_the_level():
     with pytest.raises(OutOfReach, match="degenerate but for"):
         dokshevich_motion((1, F(1, 10**10), F(1, 10**20))).state(F(1), 170)
-
-
-@pytest.mark.parametrize("power", [100, -100])
-def test_units_do_not_matter(power):
-    unit = F(10) ** power
-    plain = Dokshevich(*motion(0))
-    other = Dokshevich(*motion(0, None, unit))  # momentum, and so time
-    for one, same, factor in zip(
-        plain.state(F(7, 3), 170), other.state(F(7, 3) / unit, 900), [unit] * 3 + [unit * unit] * 3, strict=True
-    ):
-        assert abs(midpoint(one) - midpoint(same) / factor) < F(1, 10**45)
-
-
-def test_the_case_of_the_plans_is_one():
-    start = State(("8/7", "-17/14", "6/7"), ("23/49", "24/49", "36/49"))
-    found = find(HeavyTop(("3/10", "4/5", "1/2"), 1, ("25/18", "-25/24", 0)), start)
-    assert isinstance(getattr(found, "solution", found), Dokshevich)
 
 
 def test_what_is_outside_is_refused_with_the_equality_that_failed():

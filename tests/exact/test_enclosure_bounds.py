@@ -48,15 +48,15 @@ def node_with(precision, size, seed=0, field=FIELD, start=START.flat):
     return Node(node.time, node.centre, Errors(frame, size * (0.5 + rng.random(6)), 0), node.halvings)
 
 
-STEPS = [(precision, size) for precision in (64, 128, 400) for size in (0.5, 1e4, 2.0 ** (precision - 30))]
+STEPS = [(64, 0.5), (64, 2.0**34), (128, 1e4), (400, 2.0**370)]
 
 
-@pytest.fixture(params=FIELDS)
+@pytest.fixture(params=FIELDS, scope="module")
 def field(request):
     return FIELDS[request.param]
 
 
-@pytest.fixture(params=STEPS, ids=lambda case: f"{case[0]} bits, errors {case[1]:.1g}")
+@pytest.fixture(params=STEPS, scope="module", ids=lambda case: f"{case[0]} bits, errors {case[1]:.1g}")
 def made(request, field):
     precision, size = request.param
     motion = IN_WORDS.get(id(field))
@@ -318,7 +318,7 @@ def true_motion(displaced, time, bits=300):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [2.0**-18, 2.0**-24, 2.0**-40])
+@pytest.mark.parametrize("size", [2.0**-18, 2.0**-40])
 def test_motions_from_the_edge_of_the_set_stay_inside(size):
     """Displaced as far as the set goes, and so that one component moves most: the linear part alone is too small."""
     precision = 128

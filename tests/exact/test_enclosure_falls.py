@@ -82,7 +82,6 @@ CASES = {
     "chaotic": (TOP, START, HEAVY_TOP),
     "gyrostat": (TOP, START, GYROSTAT),
     "heavy gyrostat": (replace(TOP, rotor=("1/2", "-2", "1/3")), START, HEAVY_GYROSTAT),
-    "lagrange": (HeavyTop((2, 2, 1), 1, (0, 0, 1)), START, HEAVY_TOP),
     "next to an unstable axis": (HeavyTop((3, 2, 1), 1, (0, 0, 0)), State(("1/1000", 1, 0), TILTED), HEAVY_TOP),
     "next to a separatrix": (HeavyTop((3, 2, 1), 1, (0, 1, 0)), State(("1/1000", 0, "1/500"), (0, 1, 0)), HEAVY_TOP),
 }
@@ -94,8 +93,8 @@ def test_balls_hold_the_motion_however_early_the_precision_falls(name, early):
     """Errors that grow, shrink and grow again, in both directions of time; many times of one run."""
     top, start, system = CASES[name]
     rotor = Fraction(2, 3) if system is GYROSTAT else None
-    times = [Fraction(t) for t in (30, 13, -20)]
-    true = [Validated(top, start, system, rotor=rotor).state(t, 300) for t in times]
+    times = [Fraction(t) for t in (12, 5, -8)]
+    true = [Validated(top, start, system, rotor=rotor).state(t, 200) for t in times]
     early(2)
     falling = Validated(top, start, system, rotor=rotor)
     for time, values in zip(times, true, strict=True):
@@ -118,10 +117,10 @@ def test_a_homoclinic_motion_is_held_by_its_closed_form(early):
 @pytest.mark.slow
 def test_attitude_and_uncertain_data_fall_too(early):
     off = (Fraction(1, 2**200),) * 9
-    exact = Validated(TOP, START).with_attitude(Fraction(25), 240)
+    exact = Validated(TOP, START).with_attitude(Fraction(10), 200)
     early(2)
     falling = Validated(TOP, START, uncertainty=run.Uncertainty(off, Fraction(0)))
-    balls = falling.with_attitude(Fraction(25), 90)
+    balls = falling.with_attitude(Fraction(10), 90)
     require_overlap(balls, exact)
     assert falls_of(falling)
 
@@ -160,7 +159,7 @@ def test_the_model_of_the_cost_counts_the_falls(monkeypatch):
 def test_steps_and_falls_depend_on_the_node_alone(early):
     early(4)
     used = Validated(TOP, START)
-    for time in map(Fraction, (40, 15, 40)):
+    for time in map(Fraction, (12, 5, 12)):
         one, other = used.state(time, 90), Validated(TOP, START).state(time, 90)
         for a, b in zip(one, other, strict=True):
             assert (midpoint(a), radius(a)) == (midpoint(b), radius(b))

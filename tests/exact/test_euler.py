@@ -6,11 +6,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from flint import arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.euler import Euler
-from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
@@ -33,7 +31,7 @@ def random_case(rng, k):
     return euler(inertia, omega, triple(rng))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(20))
 def test_every_random_motion_solves_all_six_equations(seed):
     rng = random.Random(seed)
     assert_solves(random_case(rng, seed), rational(rng, size=30))
@@ -83,25 +81,6 @@ def test_a_body_at_rest_stays_at_rest():
     motion = euler((3, 2, 1), (0, 0, 0))
     assert [int(w.unique_fmpz()) for w in motion.state(Fraction(10**9), 100)[:3]] == [0, 0, 0]
     assert_solves(motion, Fraction(5))
-
-
-@pytest.mark.parametrize("time", [10**6, 10**9, -(10**9) - Fraction(1, 3)])
-@pytest.mark.parametrize("inertia", [(3, 2, 1), (1, 2, 3), (2, 2, 1), SEPARATRIX_INERTIA])
-def test_fifty_digits_come_out_at_any_time(inertia, time):
-    motion = euler(inertia, (Fraction(1, 3), Fraction(1, 5), Fraction(1)))
-    for value in motion.state(Fraction(time), 200):
-        assert value.rad() < arb("1e-50")
-    assert_solves(motion, Fraction(time))
-
-
-def test_the_reference_state_lies_in_the_balls():
-    vector = next(v for v in VECTORS if v["name"] == "euler")
-    motion = Euler(
-        HeavyTop(vector["inertia"], vector["weight"], vector["centre"]), State(vector["omega"], vector["gamma"])
-    )
-    with working_precision(300):
-        for value, text in zip(motion.state(Fraction(vector["time"]), 210), vector["state"], strict=True):
-            assert abs(value - arb(text)).abs_upper() < arb("1e-59")
 
 
 def test_a_moment_of_the_weight_is_refused_with_its_value():

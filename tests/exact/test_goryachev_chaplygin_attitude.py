@@ -9,8 +9,6 @@ from flint import fmpq_mpoly_ctx
 from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, Torus, _motion
-from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
 from support.proofs import assert_attitude, assert_meets, attitude_of
 
@@ -46,30 +44,8 @@ def test_the_azimuth_of_the_angular_momentum_is_proven_by_polynomials():
 @pytest.mark.parametrize("motion", [TILTED, DOUBLE, RESTING], ids=["tilted", "double root", "resting"])
 def test_the_enclosure_holds_the_attitude(motion):
     assert "validated" not in attitude_of(motion, F(2), 170)[0]
-    assert_meets(motion, (F(0), F(3, 2), F(-4)))
+    assert_meets(motion, (F(3, 2), F(-4)))
     assert_attitude(motion, F(-(10**6)))
-
-
-@pytest.mark.slow
-def test_the_size_of_gamma_and_the_unit_of_time_do_not_matter():
-    # γ twice as long and rates a hundred decades faster: the same motion
-    scale, times = F(10) ** 100, (F(3), F(10**6))
-    other = motion_from(
-        [n * scale**2 / 2 for n in TILTED.top.moment[:2]],
-        [scale * w for w in TILTED.start.omega],
-        [2 * g for g in TILTED.start.gamma],
-        TILTED.top.inertia[2],
-    )
-    for time in times:
-        pairs = zip(TILTED.attitude(time, 150), other.attitude(time / scale, 150), strict=True)
-        assert all(a.overlaps(b) for a, b in pairs)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", ALL)
-def test_every_naming_of_the_axes_has_the_closed_form(axes):
-    found = find(renamed_top(TILTED.top, axes), renamed_state(TILTED.start, axes))
-    assert "validated" not in attitude_of(found, F(2), 60)[0]
 
 
 @pytest.mark.slow

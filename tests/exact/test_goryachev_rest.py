@@ -12,7 +12,6 @@ from heavytop.exact.cases import goryachev_chaplygin_rest
 from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
@@ -114,19 +113,6 @@ def test_a_motion_goes_back_the_way_that_it_came(make):
             for other in (back, later):
                 assert all((a + b).contains(0) for a, b in zip(here[:3], other[:3], strict=True))
                 assert all(a.overlaps(b) for a, b in zip(here[3:], other[3:], strict=True))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", ALL)
-def test_any_naming_of_the_axes_and_any_units(axes):
-    for power in (-100, 0, 100):
-        size = F(10) ** power
-        top = HeavyTop((4 * size, 4 * size, size), size * size, (1, F(1, 3), 0))
-        start = State((0, 0, 0), UNIT)
-        found = find(renamed_top(top, axes), renamed_state(start, axes))
-        assert "Goryachev" in found.method
-        record = reference(found.top, found.start, [F(7, 3), -FAR], 40, attitude=True)
-        assert record.attitude_method == record.method
 
 
 @pytest.mark.parametrize("power", [1, 3, 10, 100, 300])

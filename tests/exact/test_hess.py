@@ -12,7 +12,7 @@ from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.cases.hess import Hess, HessPendulum
 from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, Disc, Segment, System2, Transfer, plan
 from heavytop.exact.catalogue import find
-from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
+from heavytop.exact.flint.balls import ball, unit_of_time, working_precision
 from heavytop.measure.reference import reference
 from heavytop.precision import dot
 from heavytop.top.equations import HEAVY_TOP
@@ -57,12 +57,12 @@ def random_pendulum(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_every_random_motion_solves_all_six_equations(seed):
     assert_exact(random_hess(seed), seed, attitude=True)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(5))
 def test_every_random_pendulum_solves_all_six_equations(seed):
     motion = random_pendulum(seed)
     time = rational(random.Random(seed), size=30)
@@ -157,28 +157,10 @@ def test_the_matrix_over_a_period_keeps_areas_and_undoes_itself():
             assert all(abs(x) < arb("1e-50") for x in back.entries())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("unit", "mass", "size"), [(100, 0, 0), (-100, 0, 50), (0, -100, -100), (0, 100, 0)])
-@pytest.mark.parametrize("spin", ["1/2", 0])
-def test_units_do_not_matter(unit, mass, size, spin):
-    plain = find(TOP, State(("3/4", spin, -1), (0, 1, 0)))
-    rate, heavy, long = (F(10) ** power for power in (unit, mass, size))
-    top = HeavyTop([i * heavy for i in TOP.inertia], heavy * rate**2 / long, TOP.centre)
-    other = find(top, State([F(w) * rate for w in ("3/4", spin, -1)], [g * long for g in (0, 1, 0)]))
-    pairs = zip(plain.state(F(7, 3), 170), other.state(F(7, 3) / rate, 600), strict=True)
-    for (one, same), factor in zip(pairs, [rate] * 3 + [long] * 3, strict=True):
-        assert abs(midpoint(one) - midpoint(same) / factor) <= 2 * radius(one)
-
-
 def test_more_turns_than_a_word_counts():
     top = HeavyTop((1, F(2, 10**20 + 1), F(1, 10**20)), 1, (1, 0, 1))
     motion = Hess(top, State((1, 1, -(10**20)), (1, 1, 1)))
     assert_narrow(motion, F(7, 3))
-
-
-def test_the_cases_of_the_plans_are_of_the_class():
-    assert isinstance(find(TOP, State(("3/4", "1/2", -1), (0, 1, 0))), Hess)
-    assert isinstance(find(TOP, State(("3/4", 0, -1), (0, 1, 0))), HessPendulum)
 
 
 def test_what_is_outside_is_refused_with_the_test_that_failed():
@@ -227,7 +209,7 @@ def assert_answered(top, start, digits=40):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("power", [3, 300])
+@pytest.mark.parametrize("power", [3, 60])
 def test_area_integrals_next_to_nothing_are_proven_or_named(power):
     start = State(("1/4", F(1, 10**power), "-1/3"), (0, 1, 0))
     assert_answered(TOP, start)
@@ -236,7 +218,7 @@ def test_area_integrals_next_to_nothing_are_proven_or_named(power):
         assert_narrow(found, F(10**6))
     else:
         with pytest.raises(OutOfReach, match=r"Hess: .*(M·gamma is all but 0|degenerate)"):
-            found.state(F(10**6), 140)
+            found.state(F(10**12), 140)
     assert process_time() - begun < 10
 
 

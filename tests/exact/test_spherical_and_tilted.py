@@ -117,15 +117,6 @@ def test_directions_all_but_along_an_axis(power):
     assert process_time() - begun < 5
 
 
-def test_fifty_digits_at_a_million_are_quick():
-    motion = SphericalTop(HeavyTop((2, 2, 2), 1, (1, 2, 3)), State((1, "1/2", 3), UNIT))
-    motion.state(FAR, 175)
-    begun = process_time()
-    for step in range(20):
-        motion.state(FAR + step, 175)
-    assert process_time() - begun < 1
-
-
 def test_several_forms_of_one_motion_agree():
     tilted = random_tilted(2, True)
     forms = list(matches(tilted.top, tilted.start))

@@ -7,8 +7,6 @@ import pytest
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.cases.one_interval import Steklov, quadratics
-from heavytop.exact.catalogue import find
-from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.heavy_top import HeavyTop, State
 from rational_motions import steklov_motion
 from support.proofs import assert_enclosed, assert_exact, assert_narrow, assert_solves, positive
@@ -68,22 +66,6 @@ def test_nearly_equal_moments_do_no_harm(distance):
     assert motion.top.inertia[1] - motion.top.inertia[2] == distance
     assert_solves(motion, F(7, 3))
     assert_narrow(motion, F(10**6))
-
-
-@pytest.mark.parametrize("power", [300, -300])
-def test_the_unit_of_time_does_not_matter(power):
-    plain, unit = steklov_motion(F(1), F(1, 5), F(6, 5), F(2)), F(10) ** power
-    other = steklov_motion(F(1), F(1, 5), F(6, 5), 2 * unit)
-    pairs = zip(plain.state(F(7, 3), 170), other.state(F(7, 3) / unit, 1200), strict=True)
-    units = [unit] * 3 + [F(1)] * 3
-    for (one, same), factor in zip(pairs, units, strict=True):
-        assert abs(midpoint(one) - midpoint(same) / factor) <= 2 * radius(one)
-
-
-def test_the_case_of_the_plans_is_one():
-    motion = find(HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0)))
-    assert isinstance(motion, Steklov)
-    assert_solves(motion, F(10**6))
 
 
 def test_what_is_outside_is_refused_with_the_test_that_failed():

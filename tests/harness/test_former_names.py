@@ -3,8 +3,6 @@
 import hashlib
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import msgspec
@@ -148,11 +146,6 @@ def test_the_command_line_takes_it_with_one_line_of_notice(tmp_path: Path) -> No
     found = in_process.heavytop("propagate", *motion.split(), "--integrator", "words")
     assert json.loads(found.stdout)["integrator"] == "multiword"
     assert found.stderr == "heavytop: note: the integrator words is called multiword now\n"
-    run = heavytop("run", "--plan", plan(tmp_path, "words"), "--workers", "1", "--out", str(tmp_path / "out"))
+    run = in_process.heavytop("run", "--plan", plan(tmp_path, "words"), "--workers", 1, "--out", tmp_path / "out")
     assert run.returncode == 0
     assert run.stderr.count("is called multiword now") == 1
-
-
-def heavytop(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "heavytop", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

@@ -34,7 +34,7 @@ GRID = {
 }
 DRIFT = {"precision": "double", "horizon": "2", "samples": 4}
 GROWTH = {
-    **{"precision": "double", "horizon": "10", "starts": 16, "seed": 1, "samples": 4, "decades": 2, "tolerance": None},
+    **{"precision": "double", "horizon": "10", "starts": 6, "seed": 1, "samples": 4, "decades": 2, "tolerance": None},
     **{"high_accuracy": False, "bias": None, "reference": None, "attitude": False},
 }
 CURVE = {"integrator": "heyoka", "precision": "double", "tolerances": ["1e-9"], "steps": []}
@@ -45,7 +45,7 @@ BASES: dict[str, dict[str, Any]] = {
         **{"rate_times": ["1", "2", "4"], "directions": ["forward"]},
     },
     "claim_model": {"cases": ["ershkov-partial-2"], "times": ["1", "2"], "grid": 4, "directions": ["forward"]},
-    "drift": {"cases": ["euler"], "runs": [DRIFT], "integrator": "heyoka", "attitude": False, "noise": True},
+    "drift": {"cases": ["euler"], "runs": [DRIFT], "integrator": "heyoka", "attitude": False, "noise": False},
     "growth": {"cases": ["euler"], "runs": [GROWTH], "integrator": "heyoka"},
     "homoclinic": {
         **{"cases": ["ershkov-partial-2"], "precisions": ["double"], "samples": 2},
@@ -72,7 +72,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
         *({"cases": ["ershkov-partial-6"]}, {"times": ["1.5", "2"]}, {"grid": 8}, {"directions": ["backward"]}),
     ],
     "drift": [
-        *({"cases": ["lagrange"]}, {"integrator": "multiword"}, {"attitude": True}, {"noise": False}),
+        *({"cases": ["lagrange"]}, {"integrator": "multiword"}, {"attitude": True}, {"noise": True}),
         *({"runs": [DRIFT | {key: value}]} for key, value in (("precision", "extended"), ("horizon", "3"))),
         *({"runs": [DRIFT | {"samples": 8}]}, {"integrator": "splitting:2", "step": "1/50"}),
     ],
@@ -81,7 +81,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
         *(
             {"runs": [GROWTH | {key: value}]}
             for key, value in {
-                **{"precision": "extended", "horizon": "11", "starts": 17, "seed": 2, "samples": 8, "decades": 3},
+                **{"precision": "extended", "horizon": "11", "starts": 7, "seed": 2, "samples": 8, "decades": 3},
                 **{"tolerance": "1e-9", "high_accuracy": True, "bias": "1e-9", "reference": "quad", "attitude": True},
             }.items()
         ),

@@ -23,7 +23,7 @@ PLAN = plan_of(
             {
                 "kind": "homoclinic",
                 "cases": ["delone"],
-                "precisions": ["double", "extended"],
+                "precisions": ["double"],
                 "directions": ["forward"],
             },
             {

@@ -8,7 +8,7 @@ import heavytop as ht
 from heavytop.precision import exact
 
 
-@pytest.mark.parametrize("rate", ["2e-16", "1e-17", "1e-50", "1e-140", "1e17", "1e20", "1e100", "1e140"])
+@pytest.mark.parametrize("rate", ["2e-16", "1e-50", "1e-140", "1e17", "1e140"])
 @pytest.mark.parametrize(("inertia", "omega"), [((1, 1, 1), (0, 0, 1)), ((3, 2, "3/2"), (1, "-1/2", 2))])
 def test_a_finite_motion_is_computed_at_every_rate(rate: str, inertia: tuple, omega: tuple) -> None:
     unit = exact(rate)

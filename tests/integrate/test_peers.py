@@ -24,8 +24,7 @@ FINE = Fraction(1, 10**12)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["kovalevskaya", "gyrostat"])
-@pytest.mark.parametrize("precision", [QUAD, real(160)], ids=lambda p: p.name)
+@pytest.mark.parametrize(("name", "precision"), [("kovalevskaya", QUAD), ("gyrostat", real(160))])
 def test_odefun_and_heyoka_agree_to_the_format(name: str, precision) -> None:
     case = CASES[name]
     times = [Fraction(1, 2), Fraction(2)]

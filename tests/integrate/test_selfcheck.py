@@ -32,16 +32,12 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "_compiled", {})
-    for precision in (EXTENDED, QUAD, real(24), real(150)) if system is HEAVY_TOP else (QUAD,):
+    for precision in (EXTENDED, QUAD, real(24)) if system is HEAVY_TOP else (QUAD,):
         engine = compiled(system, precision, attitude=True).engine
         assert engine.time == 0
         assert not numpy.any(engine.state != 0)
-    for options in (
-        {"high_accuracy": True},
-        {"compact_mode": True},
-        {"tolerance": Fraction(1, 1000)},
-        {"tolerance": Fraction(1, 10**12), "lanes": 4},
-    ):
+    compiled(system, DOUBLE, tolerance=Fraction(1, 10**12), lanes=4)
+    for options in ({"high_accuracy": True}, {"compact_mode": True}) if system is HEAVY_TOP else ():
         compiled(system, DOUBLE, **options)
 
 

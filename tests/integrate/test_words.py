@@ -2,7 +2,6 @@
 
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from functools import lru_cache
 from random import Random
@@ -119,16 +118,16 @@ def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, hor
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
-def test_samples_and_chunks_change_no_bit(precision, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = propagate_multiword(TOP, START, [10, 20], precision)
-    many = propagate_multiword(TOP, START, [Fraction(i, 8) for i in range(1, 161)], precision)
-    assert bits(many)[79] == bits(few)[0]
+@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
+def test_samples_and_chunks_change_no_bit(integrate, precision, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = integrate(TOP, START, [5, 10], precision)
+    many = integrate(TOP, START, [Fraction(i, 8) for i in range(1, 81)], precision)
+    assert bits(many)[39] == bits(few)[0]
     assert bits(many)[-1] == bits(few)[1]
     assert many.steps == few.steps
     monkeypatch.setattr(words_module, "_FIRST_CHUNK", 1)
     monkeypatch.setattr(words_module, "CHUNK_SECONDS", 0.0)
-    assert bits(propagate_multiword(TOP, START, [10, 20], precision)) == bits(few)
+    assert bits(integrate(TOP, START, [5, 10], precision)) == bits(few)
 
 
 @pytest.mark.parametrize(
@@ -157,8 +156,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
-@pytest.mark.parametrize("exponent", [-30, 6, 60])
+@pytest.mark.parametrize(("precision", "exponent"), [*zip(FORMATS, (60, -30, 60, -30, 6), strict=True)])
 def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
     """The same motion with Ω in other units: the same error relative to Ω, a step less or more at the end."""
     unit = Fraction(10) ** exponent
@@ -212,14 +210,6 @@ def test_an_equilibrium_stays_where_it_is(integrate, precision, top: HeavyTop, s
     assert bits(integrate(top, start, [-5], precision)) == bits(run)[:1]
 
 
-def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
-    run = propagate_multiword(TOP, START, [1, 2, 100], DOUBLE, step_limit=30)
-    assert run.outcome is Outcome.STEP_LIMIT
-    assert run.times == (1, 2)
-    assert run.steps == 30
-    assert 2 < run.time_reached < 100
-
-
 def test_what_is_too_large_for_the_format_is_an_outcome_and_what_is_too_small_is_zero() -> None:
     state = words_module.native_state((Fraction(1), Fraction(10) ** 400), DOUBLE)
     assert state is None
@@ -235,8 +225,14 @@ def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("integrate", "precision"), EVERY_FORMAT)
-@pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
+@pytest.mark.parametrize(
+    ("integrate", "precision", "case"),
+    [
+        pytest.param(*form.values, case, id=f"{form.id}-{case}")
+        for case in ("forward", "backward", "attitude", "resting")
+        for form in EVERY_FORMAT[:: 1 if case == "forward" else 3]
+    ],
+)
 def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(integrate, precision, case: str) -> None:
     """Samples lie closer than steps and farther apart; -0 and rest are kept."""
     top, start, sign, options = TOP, START, 1, {}
@@ -274,14 +270,6 @@ def test_a_run_cannot_go_on_with_other_flags() -> None:
         propagate_multiword(TOP, START, [1, 2], DOUBLE, tolerance=Fraction(1, 10**9), place=places[0])
 
 
-def test_threads_do_not_disturb_each_other() -> None:
-    starts = [State((Fraction(i, 7), Fraction(1, 5), Fraction(9, 10)), ("3/5", 0, "4/5")) for i in range(1, 9)]
-    alone = [bits(propagate_multiword(TOP, start, [50], DOUBLE_DOUBLE)) for start in starts]
-    with ThreadPoolExecutor(4) as pool:
-        runs = pool.map(lambda start: propagate_multiword(TOP, start, [50], DOUBLE_DOUBLE), starts)
-    assert [bits(run) for run in runs] == alone
-
-
 def test_the_error_falls_with_the_tolerance() -> None:
     rounded = propagate_multiword(TOP, START, [20], DOUBLE_DOUBLE).problem
     known = propagate(rounded.top, rounded.start, [20], real(160)).states[0]
@@ -300,11 +288,6 @@ def test_the_error_falls_with_the_tolerance() -> None:
 def test_a_tolerance_it_cannot_do_is_refused(tolerance) -> None:
     with pytest.raises(InputError, match="tolerance"):
         propagate_multiword(TOP, START, [1], DOUBLE, tolerance=Fraction(tolerance))
-
-
-def test_heyoka_refuses_double_double() -> None:
-    with pytest.raises(InputError, match="multiword"):
-        propagate(TOP, START, [1], DOUBLE_DOUBLE)
 
 
 @pytest.mark.slow
@@ -356,8 +339,11 @@ def test_what_a_tiny_coefficient_makes_of_nothing_is_computed_as_finely_as_it_ne
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
-@pytest.mark.parametrize(("about", "horizon"), [("1e-12", 20), ("1e-30", 60), ("1e-60", 110)])
+@pytest.mark.parametrize(
+    ("precision", "about", "horizon"),
+    [(DOUBLE, "1e-60", 110), (EXTENDED, "1e-12", 20), (DOUBLE_DOUBLE, "1e-30", 60)],
+    ids=lambda value: getattr(value, "name", value),
+)
 def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(
     precision: Precision, about: str, horizon: int
 ) -> None:

@@ -169,7 +169,7 @@ def test_arrays_have_their_shapes_and_agree_with_texts_and_balls(known: Referenc
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("precision", ["extended", "quad", "real:150"])
+@pytest.mark.parametrize("precision", ["extended", "quad"])
 def test_texts_of_a_run_are_exact_functions_of_its_native_numbers(precision: str) -> None:
     run = ht.propagate(TOP, START, [1], precision, attitude=True)
     digits = run.problem.precision.digits

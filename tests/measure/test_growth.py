@@ -15,8 +15,8 @@ from law_coverage import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, 
 @pytest.mark.parametrize("kind", NAMES)
 def test_every_power_is_recognised(kind: str) -> None:
     rng = numpy.random.default_rng(5)
-    found = collections.Counter(law(Ensemble(TIMES, synthetic(kind, rng), STEP)).growth for _ in range(20))
-    assert found[NAMES[kind]] >= 19, found
+    found = collections.Counter(law(Ensemble(TIMES, synthetic(kind, rng), STEP)).growth for _ in range(10))
+    assert found[NAMES[kind]] >= 9, found
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ import pytest
 import heavytop as ht
 from heavytop.cases import CASES
 from heavytop.errors import Contradiction
-from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import Known, certified, known_motion
@@ -103,17 +102,6 @@ def test_values_that_are_exact_are_said_to_agree_exactly(top: HeavyTop, start: S
     assert isinstance(later, Known)
     assert f"certified at t = 7 to {later.certificate.agreed_digits} digits by " in later.against.text
     assert later.certificate.agreed_digits < 100
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("axes", ALL)
-def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
-    case = CASES["delone"]
-    given = Problem.of(renamed_top(case.top, axes), renamed_state(case.start, axes), QUAD, case.system)
-    known = known_motion(given, Fraction(10**4))
-    assert isinstance(known, Known)
-    assert "closed form" in known.solution.method
-    assert known.certificate.agreed_digits >= 37
 
 
 @pytest.mark.parametrize("power", [-90, -30, 30, 90])

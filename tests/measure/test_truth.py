@@ -55,7 +55,7 @@ def test_the_truth_is_proven_up_to_100_and_beyond_where_that_is_cheap() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("horizon", [99, 100, 101, 160, -101])
+@pytest.mark.parametrize("horizon", [100, 101, -101])
 def test_the_boundary_of_the_model_of_the_cost(horizon: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Just below its cost an enclosure is proven and just beyond it is not; up to 100 it is, whatever it costs."""
     problem = chaotic()
@@ -101,7 +101,7 @@ def test_what_is_too_dear_to_prove_is_computed_and_right(monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_scale_makes_a_computed_truth_wrong(seed: int) -> None:
     """Tops and starts over ten decades, components down to 1e-30 of others, units of time of 1e±40: within the radius
     of the enclosure, and that radius leaves the digits of the format.

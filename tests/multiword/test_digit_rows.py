@@ -228,7 +228,7 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
-    given = problem(1, attitude=True)
+    given = problem()
     runs = [Fixed(given, grid_of(8), True, processor=each) for each in (None, processor)]
     for run in runs:
         assert run.advance(Fraction(2), 10**6) is Status.OK

@@ -108,7 +108,7 @@ def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("processor", LEVELS[1:])
+@pytest.mark.parametrize("processor", LEVELS[1:2])
 def test_the_bits_of_an_attitude_are_those_of_every_processor(processor: Processor) -> None:
     assert bits_on(processor, True, COARSE) == bits_on(None, True, COARSE)
 

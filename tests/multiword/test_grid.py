@@ -186,7 +186,7 @@ def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.slow
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
-    scaled = problem(1, attitude=True)
+    scaled = problem()
     runs = [Fixed(scaled, grid_of(3), True, processor=each) for each in (None, processor)]
     for run in runs:
         assert run.advance(Fraction(8), 10**6) is Status.OK

@@ -20,9 +20,9 @@ RESULTS = Path(__file__).parents[2] / "results"
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "growth", "peers"])
 def test_no_edit_passes(tmp_path: Path, name: str) -> None:
-    found = list(trials(RESULTS / name, tmp_path, 5, 50))
+    found = list(trials(RESULTS / name, tmp_path, 5, 16))
     assert {verdict for _, verdict in found} <= {"worse", "incomparable", "refused"}, found
-    assert len({edit for edit, _ in found}) > len(EDITS) / 3
+    assert len({edit for edit, _ in found}) > 8
 
 
 @pytest.mark.slow

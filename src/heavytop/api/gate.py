@@ -17,10 +17,10 @@ from heavytop.report.store.store import FILE
 MESSAGE = "message.txt"
 
 
-def require_baseline(baseline: Path) -> None:
-    """Raises InputError where the folder holds no report."""
+def require_baseline(baseline: Path, remedy: str) -> None:
+    """Raises InputError where the folder holds no report; remedy: the command that makes it."""
     if not any((baseline / name).exists() for name in (FILE, f"{FILE}.gz")):
-        raise InputError(f"{baseline} holds no baseline.", "Make it, and commit it: heavytop gate --bless")
+        raise InputError(f"{baseline} holds no baseline.", f"Make it, and commit it: {remedy}")
 
 
 def clear(folder: Path) -> None:

@@ -57,6 +57,7 @@ class RunOptions(TypedDict, total=False):
     high_accuracy: bool | None
     compact_mode: bool | None
     step_limit: int | None
+    step: Number | None
 
 
 _OPTIONS = tuple(RunOptions.__annotations__)
@@ -99,6 +100,7 @@ def propagate(
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
         compact_mode: heyoka's, slower but quick to compile; None for off in double and extended, on elsewhere.
         step_limit: stop after that many steps; the times reached until then are returned.
+        step: of an integrator with fixed steps, which is shortened so that it fills each interval; 1/100 where None.
         observer: called with (exact time, native state) at each sample, in place of keeping the states.
 
     Returns:
@@ -359,6 +361,7 @@ def _options(
         "high_accuracy": arguments.flag(options_given["high_accuracy"], "high_accuracy"),
         "compact_mode": arguments.flag(options_given["compact_mode"], "compact_mode"),
         "step_limit": arguments.steps(options_given["step_limit"]),
+        "step": arguments.positive(options_given["step"], "step"),
         "observer": arguments.callback(observer, "observer"),
     }
     return {name: value for name, value in checked.items() if value is not None}
@@ -445,6 +448,7 @@ class Integrator:
             and named(integrator) == "heyoka"
             and self._system is not GYROSTAT
             and isinstance(self._top, HeavyTop)
+            and "step" not in self._options  # refused by a call
         )
         if self._is_plain:
             self._prepare()

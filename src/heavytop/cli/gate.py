@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from shlex import quote
+from shlex import join, quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -49,14 +50,15 @@ def gate(
     trusted, fresh, rules = absolute(baseline), absolute(out), policy_of(plan, policy)
     clear(fresh)
     planned = prepare(plan, fresh, integrator=integrator, workers=workers)
+    command_line = join(["heavytop", *sys.argv[1:], "--bless"])
     if not bless:
-        require_baseline(trusted)
+        require_baseline(trusted, command_line)
     say_former({integrator} | former(plan))
     for warning in planned.warnings:
         say(f"warning: {warning}")
     ended = measured(planned)
     try:
-        require_baseline(trusted)
+        require_baseline(trusted, command_line)
         differences = compared(trusted, fresh, rules, None, None, json or junit is not None)
     except InputError as error:
         if not bless:

@@ -268,6 +268,7 @@ def propagate(
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     tolerance: Annotated[str | None, typer.Option(help="Of the integrator; the eps of the format without it.")] = None,
+    step: Annotated[str | None, typer.Option(help="Of fixed steps, as of splitting:4; 1/100 without it.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
 ) -> int:
     """Integrate one motion and print its states.
@@ -291,6 +292,7 @@ def propagate(
             angles=attitude,
             outputs=asked.outputs,
             reached=_part_of(asked.times, reach),
+            step=step,
             **settings,
         )
 

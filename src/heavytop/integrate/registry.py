@@ -679,7 +679,8 @@ def propagator(which: str | IntegratorSource, options: dict[str, Any]) -> Callab
     ) -> Any:
         if len(times):  # what is wrong with times is for the integrator to say
             end = times.doubles[-1] if type(times) is DoubleTimes else exact(times[-1])
-            require_reach(Problem.of(top, start, precision, system), end, options.get("step_limit"))
+            limits = options.get("step_limit"), options.get("step")
+            require_reach(Problem.of(top, start, precision, system), end, *limits)
         return run(top, start, times, precision, system=system, **more)
 
     return call
@@ -721,6 +722,7 @@ def ensemble_propagator(which: str | IntegratorSource, options: dict[str, Any]) 
     if not integrator.ensemble:
         require(integrator)
         raise InputError(f"The integrator {integrator.name} runs one motion at a time.", "Call propagate for each.")
+    _with(loaded(integrator.function), integrator.name, dict.fromkeys(options.keys() - {"threads"}))  # refuses unknown
     run = _with(loaded(integrator.ensemble), integrator.name, options)
 
     def call(problems: Sequence[Problem], times: Sequence[OrderedRing], **more: Any) -> Any:

@@ -55,8 +55,8 @@ def _part(name: str, formula: str) -> dict:
 
 
 @pytest.mark.parametrize("part", ["centre", "weight", "inertia"])
-@pytest.mark.parametrize("depth", [0, 1, 3])
-@pytest.mark.parametrize("moving", ["t", "1 + sin(t)^2", "t/t", "Omega1", "2 - gamma3"])
+@pytest.mark.parametrize("depth", [0, 3])
+@pytest.mark.parametrize("moving", ["t", "t/t", "2 - gamma3"])
 def test_the_data_of_a_top_that_move_are_refused_however_deep_they_are_hidden(part, depth, moving):
     formula, definitions = moving, {}
     for index in range(depth):
@@ -227,10 +227,8 @@ ON_AXIS_3 = {"centre": ["0", "0", "1"]}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("u", ["Omega1", "gamma2", "gamma3", "(Omega1*gamma3)"])
-@pytest.mark.parametrize(
-    "half", ["sqrt({0}^2) - {0}", "sqrt({0}^2 + Omega3^2) - {0}", "sqrt({0}^2 + 3*gamma1^2)*2 + 2*{0}"]
-)
+@pytest.mark.parametrize("u", ["Omega1", "(Omega1*gamma3)"])
+@pytest.mark.parametrize("half", ["sqrt({0}^2) - {0}", "sqrt({0}^2 + 3*gamma1^2)*2 + 2*{0}"])
 def test_half_an_invariant_plane_is_left_where_its_rate_is_divided_by_0(u, half):
     said = {"where": [*PLANE, half.format(u)]}
     report = judged(integral("gamma1^2 + 1", top=ON_AXIS_3, said=said))

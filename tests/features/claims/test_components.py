@@ -167,7 +167,7 @@ def test_a_start_that_is_rational_at_no_sample_is_named() -> None:
         top={"inertia": ["1", "1", "c"]},
         start={"omega": ["0", "L*(u2 - u1)/(4/5)", "L/c"]},
         component={"value": None, "psi": None},
-        quadrature={"psi": "L*(u2 - gamma3)/(1 - gamma3^2)"},
+        quadrature={"psi": "(Omega1*gamma1 + Omega2*gamma2)/(gamma1^2 + gamma2^2)"},
     )
     reasons = {c.reason for row in report.rows for c in row.conditions if not c.discharged}
     assert any("rational" in reason for reason in reasons)

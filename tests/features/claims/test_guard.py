@@ -80,10 +80,8 @@ HOSTILE = {
     "powers of powers": TWELVE.format("9^9^9"),
     "a number of 100000 digits": 'name = "x"\nkind = "integral"\nparameters = {a = "1e99999"}\n'
     + TWELVE.format("sin(a)").partition("\n")[2].partition("\n")[2],
-    "an integer of 5000 digits": f"name = {'9' * 5000}\n",
     "dotted keys": "a." * 20_000 + "b = 1\n",
     "a relation in the time": 'relations = ["t"]\n' + TWELVE.format("Omega1"),
-    "a relation in the state": 'relations = ["Omega1*gamma2"]\n' + TWELVE.format("Omega1"),
     "conditions of high degree": TWELVE.format("Omega1")
     + "where = ["
     + ", ".join(f'"Omega1^{n}*gamma1 + Omega2^{n} - Omega3^{n - 1}*gamma3 + Omega1*Omega2 - {n}"' for n in (4, 5, 6))
@@ -98,7 +96,7 @@ def test_whatever_a_file_holds_its_audit_ends_in_time_with_a_verdict_or_a_reason
     path, began = tmp_path / "claim.toml", time.monotonic()
     path.write_text(text)
     with suppress(InputError):
-        assert guard.in_time(str(path), "heavy_top", seconds=1).verdict in ("undecided", "refuted")
+        assert guard.in_time(str(path), "heavy_top", seconds=0.5).verdict in ("undecided", "refuted")
     assert time.monotonic() - began < 2 * guard._WALL + 1
 
 

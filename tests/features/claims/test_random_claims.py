@@ -13,7 +13,7 @@ import random_claims
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "count"), [("integral_claim", 12), ("motion_claim", 4), ("elliptic_claim", 2), ("gyrostat_claim", 6)]
+    ("kind", "count"), [("integral_claim", 8), ("motion_claim", 2), ("elliptic_claim", 1), ("gyrostat_claim", 4)]
 )
 def test_no_verdict_is_false_and_what_is_true_by_construction_holds(kind, count, monkeypatch):
     monkeypatch.setattr(random_claims, "random_claim", getattr(random_claims, kind))

@@ -103,6 +103,8 @@ def test_one_attitude_at_a_time() -> None:
 def test_an_angle_in_t_needs_no_rate_of_the_claim() -> None:
     family = stated_claims.lagrange_angles()
     table = copy.deepcopy(family.table)
+    table["quadrature"] = {"variable": "u", "phi": "Omega3 - gamma3*(b - a*gamma3)/(A*(1 - gamma3^2))"}
+    assert audited(table).verdict == "holds"  # the state is u and Omega3 = a/C
     del table["quadrature"]
     assert audited(table).verdict == "holds"
     assert stated_claims._swapped(table, family.wrong[0])

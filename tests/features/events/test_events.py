@@ -84,8 +84,10 @@ def test_proven_events_are_those_of_mpmath(name, independent) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
-@pytest.mark.parametrize("precision", ["double", "extended", "quad", "real:150"])
+@pytest.mark.parametrize(
+    ("integrator", "precision"),
+    [("heyoka", "double"), ("heyoka", "quad"), ("multiword", "extended"), ("multiword", "real:150")],
+)
 def test_computed_events_are_right_to_the_format(integrator, precision) -> None:
     for until, name in ((6, FUNCTIONS[2]), (-6, FUNCTIONS[1])):
         found = ht.events(TOP, START, until, name, precision=precision, integrator=integrator)
@@ -197,7 +199,7 @@ def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
 @pytest.mark.parametrize("digits", [None, 20])
 def test_powers_change_sign_where_their_bases_do_or_never(digits) -> None:
     free, start = ht.HeavyTop((2, 2, 1), 0, (0, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))  # γ = (cos t, −sin t, 0)
-    for power in (1, 2, 3, 8, 9):
+    for power in (1, 2, 3, 8):
         for function, first in ((f"gamma1**{power}", math.pi / 2), (f"gamma2^{power}/gamma1**2", math.pi)):
             found = ht.events(free, start, 6, function, digits=digits)
             times = found.times if digits is None else found.times_numpy()

@@ -89,6 +89,14 @@ def test_faults_are_detected_when_brute_force_detects_them() -> None:
     assert 1e-6 < coarse.error < 1e-1, "the control of a method of fixed step is its step"
 
 
+@pytest.mark.parametrize("moments", [(1, 1, 1), (2, 2, 1)])
+def test_a_gyroscopic_term_that_is_0_all_along_is_not_detected(moments: tuple[int, ...]) -> None:
+    (fault,) = ht.power(
+        ht.HeavyTop(moments, 1, (0, 0, 1)), ht.State((0, 0, 5), (0, 0, 1)), 1, "1e-13", "1/4", ["no_gyroscopic_term"]
+    ).faults
+    assert fault.detected_from is None
+
+
 def test_what_changes_nothing_is_not_planted_and_what_is_unknown_is_refused() -> None:
     free = ht.power(*FLIP, 1, "1e-3", "1/4")
     assert set(free.left_out) == {"steiner_forgotten", "steiner_twice", "gravity_9.8"}

@@ -235,7 +235,7 @@ def test_an_honest_method_is_not_accused(seed: int, step: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["pendulum", "delone", "lagrange", "hess-pendulum"])
+@pytest.mark.parametrize("case", ["pendulum", "delone"])
 def test_a_lag_and_a_saddle_are_no_mistakes(case: str) -> None:
     given = CASES[case]
     times = [Fraction(5, 2) * k for k in range(1, 9)]
@@ -272,7 +272,7 @@ def test_one_state_that_is_off_is_pointed_at() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", [1, 7])
+@pytest.mark.parametrize("row", [1])
 def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
     top, start, times = problem(8)
     times = [Fraction(k, 2) for k in range(1, 12)]

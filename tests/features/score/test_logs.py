@@ -109,6 +109,7 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
     "TUM without a header": ("tum", lambda: tum(False)),
     "ephemeris": ("aem", ephemeris),
     "ephemeris of a later row": ("aem", later_ephemeris),
+    "ephemeris below its comments": ("aem", lambda: HEAD + ephemeris().replace(HEAD.replace("# ", "COMMENT "), "")),
     "underscores": (
         "csv",
         lambda: (

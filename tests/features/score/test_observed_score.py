@@ -41,7 +41,7 @@ def off(size: float) -> "conventions.Motion":
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(1))
 def test_any_conventions_have_the_digits_of_omega_and_gamma(seed: int, tmp_path: Path) -> None:
     source, (motion, q, omega) = random.Random(seed), BODY
     how = Written().random(source)
@@ -73,16 +73,12 @@ def test_the_sign_of_a_quaternion_does_not_matter(tmp_path: Path) -> None:
 
 
 LIGHT = [
-    "scalar last, start and columns",
     "conjugate, columns",
     "y up, not said",
     "inertia about the other point",
     "degrees for radians, start and columns",
-    "matrix transposed, columns",
     "displacement for position",
     "position of another point",
-    "g with the wrong sign",
-    "quaternions not of length 1",
 ]
 
 

@@ -35,7 +35,7 @@ def kinds(found: Assessment) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("value", ["1e77", "-1e154", "1e155", "1e308", "1e400", "nan", "-inf", "0", "1e-400"])
+@pytest.mark.parametrize("value", ["-1e154", "1e155", "1e308", "1e400", "nan", "-inf", "0", "1e-400"])
 def test_a_number_of_any_size_is_scored_in_any_place(value: str) -> None:
     row, column = ((0, 0), (7, 4), (19, 2))[len(value) % 3]
     states = RIGHT.tolist()
@@ -59,12 +59,9 @@ DEGENERATE = {
     "constant": np.tile(RIGHT[3], (20, 1)),
     "Ω 0": RIGHT * GAMMA,
     "γ 0": RIGHT * OMEGA,
-    "Ω constant": np.hstack([np.tile(RIGHT[0, :3], (20, 1)), RIGHT[:, 3:]]),
     "γ constant": np.hstack([RIGHT[:, :3], np.tile(RIGHT[0, 3:], (20, 1))]),
-    "γ of the start": np.hstack([RIGHT[:, :3], np.tile([0.6, 0, 0.8], (20, 1))]),
     "rows twice": np.repeat(RIGHT[:10], 2, axis=0),
     "diverges": _from(9, lambda tail: tail * 10.0 ** np.linspace(1, 300, len(tail))[:, None]),
-    "all huge from a row on": _from(9, lambda tail: tail * 0 + 1e300),
     "two columns 1e200": RIGHT * [0, 1, 1, 1, 0, 1] + [1e200, 0, 0, 0, 1e200, 0],
 }
 
@@ -72,7 +69,7 @@ DEGENERATE = {
 @pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 12])
 def test_degenerate_trajectories_are_scored(rows: int) -> None:
-    for name, states in list(DEGENERATE.items())[:: 1 if rows > 1 else 3]:
+    for name, states in list(DEGENERATE.items())[:: 1 if rows > 1 else 4]:
         found = scored(states[:rows], TIMES[:rows])
         still = {"omega_zero"} if name == "Ω 0" else {"constant", "frozen", "integrals_off", "one_state", "some_states"}
         assert set(kinds(found)) <= still, name
@@ -83,7 +80,7 @@ def test_centres_on_an_axis_and_constant_gamma_leave_nothing_to_fit() -> None:
     for centre in ((0, 0, 1), (0, 0, 0)):
         top, start = HeavyTop((2, 2, 1), 1, centre), State((Fraction(1, 10), 0, 3), (0, 0, 1))
         y = motion(top, start, HEAVY_TOP, TIMES[:8])
-        for states in (np.hstack([y[:, :3], np.tile([0, 0, 1.0], (8, 1))]), y * OMEGA, y * [0, 0, 1, 0, 0, 1]):
+        for states in (np.hstack([y[:, :3], np.tile([0, 0, 1.0], (8, 1))]), y * OMEGA):
             scored(states, TIMES[:8], top=top, start=start)
 
 
@@ -96,7 +93,7 @@ def test_states_a_row_late_or_early_are_named_where_times_are_uneven(kind: str, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", [0, 41, 98, 99])
+@pytest.mark.parametrize("row", [0, 41, 99])
 def test_one_state_among_a_hundred_is_named(row: int) -> None:
     times = [Fraction(k, 2) for k in range(1, 101)]
     states = motion(TOP, START, HEAVY_TOP, times)
@@ -131,7 +128,7 @@ FACTORS = {"omega_in_degrees": 180 / np.pi, "omega_in_turns": 0.5 / np.pi, "omeg
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.02, -1.02, 0.001])
+@pytest.mark.parametrize("factor", [-1.02, 0.001])
 def test_a_factor_of_omega_is_told_with_its_number(factor: float) -> None:
     (told,) = scored(RIGHT * (factor * OMEGA + GAMMA)).diagnoses
     assert told.kind == "omega_scaled"
@@ -156,7 +153,7 @@ def test_a_factor_of_omega_in_start_and_states_is_told(factor: float, kind: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (3, 1.02), (4, 0.5), (2, 1e150), (2, -1.0), (5, 0.0)])
+@pytest.mark.parametrize(("column", "factor"), [(0, 1.02), (4, 0.5), (2, -1.0), (5, 0.0)])
 def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float) -> None:
     states = RIGHT.copy()
     states[:, column] *= factor
@@ -168,7 +165,7 @@ def test_a_column_that_is_scaled_or_constant_is_named(column: int, factor: float
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", ["1.02", "1.3"])
+@pytest.mark.parametrize("factor", ["1.02"])
 def test_a_factor_of_time_is_told(factor: str) -> None:
     (told,) = scored(RIGHT, [time * Fraction(factor) for time in TIMES]).diagnoses
     assert told.kind == "time_unit"
@@ -189,7 +186,7 @@ def test_the_sentence_about_first_integrals_says_of_which_it_is_true() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("omega", ["0.1", "2.5", "3", "0"])
+@pytest.mark.parametrize("omega", ["0.1", "0"])
 @pytest.mark.parametrize("precision", [DOUBLE, QUAD, None], ids=lambda form: getattr(form, "name", "guessed"))
 def test_a_permanent_rotation_in_few_digits_is_not_accused(omega: str, precision: Precision | None) -> None:
     top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, Fraction(omega)), (0, 0, 1))
@@ -203,8 +200,8 @@ def test_a_permanent_rotation_in_few_digits_is_not_accused(omega: str, precision
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["delone", "ershkov-partial-6", "generic", "hess-pendulum", "lagrange", "pendulum"])
-@pytest.mark.parametrize("digits", [3, 8, 17, 50])
+@pytest.mark.parametrize("case", ["delone", "ershkov-partial-6", "generic", "pendulum"])
+@pytest.mark.parametrize("digits", [3, 17, 50])
 def test_a_right_trajectory_of_any_digits_is_not_accused(case: str, digits: int) -> None:
     given, times = CASES[case], [Fraction(10 * k, 3) for k in (1, 2, 3)]
     texts = reference(given.top, given.start, times, digits + 5, given.system).texts()

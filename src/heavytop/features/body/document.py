@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
 from heavytop.precision import Vector, decimal_text
+from heavytop.report.render.text import wrapped
 from heavytop.top.bodies import CENTRE, PrincipalAxes, principal_axes
 from heavytop.top.body_files import BodyInFile
 from heavytop.top.equations import HEAVY_TOP, Parameters
@@ -109,16 +111,17 @@ class BodyAssessment:
         elif self.realisable:
             yield f"{self.name}: a body has this tensor, but it is implausible."
         else:
-            yield f"{self.name}: no rigid body has this tensor: {_reason(principal.moments)}"
+            yield from wrapped(f"{self.name}: no rigid body has this tensor: {_reason(principal.moments)}")
         for slip in self.slips:
-            yield f"  {slip.name}: {slip.sentence}"
-            yield from (f"    corrected: {numbers}" for numbers in _corrected(slip, self.given))
+            yield from wrapped(f"{slip.name}: {slip.sentence}", "    ", "  ")
+            for numbers in _corrected(slip, self.given):
+                yield from wrapped(f"corrected: {numbers}", " " * 6, "    ")
         yield ""
         yield f"mass                {_decimal(self.given.mass)}"
-        yield f"centre of mass      {', '.join(map(_decimal, self.given.centre))}   from the pivot"
-        numbers = zip(_NAMES, self.given.six, strict=True)
+        yield from _labelled("centre of mass", f"{', '.join(map(_decimal, self.given.centre))}   from the pivot")
+        six = zip(_NAMES, self.given.six, strict=True)
         about = "the pivot" if self.given.at_pivot else "the centre of mass"
-        yield f"inertia             {', '.join(f'{n} {decimal_text(v, _PRINTED)}' for n, v in numbers)}"
+        yield from _labelled("inertia", ", ".join(f"{n} {decimal_text(v, _PRINTED)}" for n, v in six))
         yield f"                    about {about}"
         yield f"principal moments   {moments}"
         for axis, direction in enumerate(zip(*principal.axes, strict=True)):
@@ -127,9 +130,16 @@ class BodyAssessment:
         if self.realisable:
             for axis, rotation in enumerate(self.rotations):
                 rate = f", rate {rotation.rate:.4g} of the angular velocity" if rotation.rate else ""
-                yield f"{'' if axis else 'free rotation':<20}about axis {axis + 1}: {rotation.verdict}{rate}"
+                label = "" if axis else "free rotation"
+                yield from _labelled(label, f"about axis {axis + 1}: {rotation.verdict}{rate}")
             as_given = () if self.sound else ("", "With the numbers of the file, not corrected:")
-            yield from (*as_given, "", self.toml, f"Its free tumble:\n  {self.command}")
+            yield from (*as_given, "", self.toml, "Its free tumble:")
+            yield "  " + re.sub(r" (?=--(inertia|omega))", " \\\n    ", self.command)
+
+
+def _labelled(label: str, text: str) -> list[str]:
+    """Lines of a label, and the text beside it."""
+    return wrapped(text, " " * 20, f"{label:<20}")
 
 
 def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str | None = None) -> BodyAssessment:

@@ -104,6 +104,10 @@ _PROVEN = {
     "relation": "It is proven to be kept by the motions of",
     "stability": "The constant solution is proven for",
 }
+_SYMBOLS = """\
+M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left side
+minus right, of (1.1) in Omega', divided by I; omega, gamma there: as claimed.
+Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
 _AUDIT_STYLES = {True: "green", False: "bold red", None: "yellow"}
@@ -117,6 +121,8 @@ def audit_text(report: Audit) -> RenderableType:
     if report.source:
         parts.append(Text(report.source))
     parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
+    if report.kind == "motion":
+        parts.append(Text(_SYMBOLS))
     if report.kind == "value":
         return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
     parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]

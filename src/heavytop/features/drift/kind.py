@@ -130,7 +130,7 @@ class DriftKind(Kind):
             [
                 f"Both absolute, {largest_over(rows)}: a conserved integral does not prove the trajectory correct.",
                 DIGITS,
-                COMPUTED + " Errors are those to a.",
+                COMPUTED + " Errors are those to the end of the reference, b or later.",
                 NOISE_BAND,
             ],
         )

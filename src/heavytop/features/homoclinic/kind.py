@@ -25,7 +25,7 @@ from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import HEYOKA, Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.compare.verdicts import size
-from heavytop.report.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip, short
+from heavytop.report.document.document import Block, Cell, Chart, Headline, In, Note, Value, cell_text, clip, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.page import in_columns
 from heavytop.report.render.text import NOISE_BAND, both, drifts
@@ -129,6 +129,12 @@ class Homoclinic(Kind):
         away = row.metrics.get(ESCAPE.text)
         if away is not None and away.log10 is not None and abs(exact(away.number)) > abs(exact(row.horizon)):
             yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
+
+    def line(self, row: Row) -> str:
+        """The error of Ω in its window, and the escape."""
+        (what, error), *_ = _errors(row).items()
+        escape = Value(row.metrics.get(ESCAPE.text))
+        return f"{what} {cell_text(Value(error))} while rate·|t| <= {WINDOW}; escape at |t| = {cell_text(escape)}"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Until when they stay; the earlier escape of both directions, and what it hides; a line for each case."""

@@ -127,10 +127,11 @@ def compare(
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
+    planned = "seed" in baseline.plan | candidate.plan  # a score has none
     joined = [motion for motion in motions if motion is not None]
     return Differences(
         findings,
-        _differences({"plan": baseline.plan}, {"plan": candidate.plan})
+        (_differences({"plan": baseline.plan}, {"plan": candidate.plan}) if planned else [])
         + _differences(baseline.environment, candidate.environment),
         rows.same,
         [*sentences(changes, same, rows.failed), *(motion.sentence for motion in joined if motion.sentence)],

@@ -434,8 +434,10 @@ def _explained(changes: Changes) -> Iterator[Sentence]:
         (text, first), also = cases[0], len(cases) - 1
         more = f" and {plural(also, 'other row')}" if also else ""
         seen = f" Seen on {_where(first)}{more}."
-        if len(text) + len(seen) > _LONGEST:
-            text = clip(text, _LONGEST - len(seen) - _CLIPPED)
+        room = _LONGEST - len(seen)
+        while len(text) > room and ". " in text:
+            text = text[: text.rindex(". ") + 1]
+        text = text if len(text) <= room else clip(text, room - _CLIPPED)
         yield Sentence(text + seen, frozenset(row for _, row in cases))
 
 

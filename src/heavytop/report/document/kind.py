@@ -65,6 +65,10 @@ class ReportedKind(Protocol):
         """Contradictions within a row of this kind that succeeded, as ``FIELD: REASON``."""
         return iter(())
 
+    def line(self, row: Row) -> str:
+        """Beginning of a line about a row of this kind; "" for its first error."""
+        return ""
+
     def join(
         self, old: Row, new: Row, folders: tuple[Path, Path], limits: Callable[[str], LossLimits]
     ) -> WorseMotions | None:

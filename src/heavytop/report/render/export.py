@@ -178,8 +178,9 @@ def junit(report: Report, kinds: Kinds) -> str:
             ElementTree.SubElement(case, "skipped", message=printable(row.against))
         elif _is_lost(row, kinds):
             ElementTree.SubElement(case, "error", message=printable(row.against), type=row.outcome)
-        if numbers := list(measures(row)):
-            text = "\n".join(f"{number.name}: {number.value:.6g} {number.unit}" for number in numbers)
+        said = [kind_of(row, kinds).line(row)] if row.metrics else []
+        said += [f"{number.name}: {number.value:.6g} {number.unit}" for number in measures(row)]
+        if text := "\n".join(filter(None, said)):
             ElementTree.SubElement(case, "system-out").text = printable(text)
     ElementTree.indent(suite)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"

@@ -6,7 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Sequence
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from heavytop.measure.attitude_error import ATTITUDE_ERROR, POSITION_ERROR
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_of, digits_text
 from heavytop.measure.scorer import DRIFT, ERRORS, SOLUTION_ERROR
 from heavytop.precision import exact
-from heavytop.records import HEYOKA, MULTIWORD, NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row
+from heavytop.records import HEYOKA, MULTIWORD, NOT_CARRIED, UNMEASURED, UNSUPPORTED, Law, Quantity, Report, Row, Series
 from heavytop.report.compare.compare import Differences
 from heavytop.report.compare.findings import Change, folded, line, statistics
 from heavytop.report.document.document import (
@@ -86,6 +86,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
         groups=_by_kind(rows),
+        kinds=kinds,
         left_out=left_out,
         environment=report.environment,
         commands=[] if report.beside else commands(report),
@@ -99,7 +100,7 @@ _FAILED = ("case", "measure", "integrator", "format", "outcome", "reached |t|", 
 def _failure(row: Row) -> list[Cell]:
     """A measurement that failed: where it stopped, and why where it was not measured."""
     names = (row.case, row.measure.replace("_", " "), row.integrator, row.precision)
-    reached = (Word(clip(row.outcome, 30)), short(row.time_reached), short(row.horizon), str(row.steps))
+    reached = (Word(clip(row.outcome, 30)), short(row.time_reached), short(row.horizon), str(row.steps or "-"))
     return [*map(clip, names), *reached, "" if row.metrics else clip(row.against, 200)]
 
 
@@ -182,8 +183,10 @@ def _badness(row: Row) -> tuple[bool, bool, float]:
     return row.outcome == "success", row.finite, float("inf") if kept is None else kept
 
 
-def main_metric(row: Row) -> str:
-    """Beginning of a line about a row: an error if it has one that is a number, else what its kind is about."""
+def main_metric(row: Row, kinds: Kinds) -> str:
+    """Beginning of a line about a row: what its kind says, else an error if it has one that is a number."""
+    if row.metrics and (said := kind_of(row, kinds).line(row)):
+        return said
     errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
     errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
     name = next(iter(errors or row.metrics), None)
@@ -408,7 +411,7 @@ def _end(row: Row) -> float:
 
 
 def digits_until(row: Row) -> str:
-    """``9.2 to 1e5``; ``lost 600–700`` where all are lost between these samples; * where no reference is proven."""
+    """``9.2 to 1e5``; ``lost 400–600`` where all are lost between these samples; * where no reference is proven."""
     kept, end = digits_kept(row), _end(row)
     assert kept is not None
     exponent = math.floor(end + 1e-9) if math.isfinite(end) else 0
@@ -422,9 +425,19 @@ def _unproven(row: Row) -> str:
 
 
 def _lost(row: Row) -> str:
-    """``lost 600–700``: the last sample with significant digits that the row keeps, and the first without."""
-    errors = [series.times[-1] for series in row.series.values() if series.quantity == _ALONG and series.times]
-    return f"lost {'–'.join(short(time.removeprefix('-')) for time in (*errors[:1], row.reference.until))}"
+    """``lost 400–600``: of the samples that the row keeps the last with errors of Ω and γ below 1, and the first with
+    one of γ that is not; without such, the time from which all significant digits are lost.
+    """
+    omega, gamma = (row.series.get(f"{SOLUTION_ERROR}_{part}", Series([], [])) for part in ("omega", "gamma"))
+    end = next(iter(_large(gamma)), row.reference.until)
+    small = [time for time in takewhile(end.__ne__, gamma.times) if time not in _large(omega)]
+    return f"lost {'–'.join(short(time.removeprefix('-')) for time in (*small[-1:], end))}"
+
+
+def _large(errors: Series) -> list[str]:
+    """The times at which a number is 1 or more, or NaN."""
+    sizes = ((time, value, logarithm(value)) for time, value in zip(errors.times, errors.values, strict=True))
+    return [time for time, value, size in sizes if value == "nan" or (size is not None and size >= 0)]
 
 
 def _digits_of_attitude(row: Row) -> str:
@@ -451,7 +464,7 @@ def _motion(row: Row) -> list[Cell]:
         row.case + computed_by(row),
         row.precision,
         row.horizon,
-        str(row.steps),
+        str(row.steps or "-"),
         row.outcome,
         _lost(row) if row.reference.until else digits + _unproven(row),
         *("no reference" if error is None else Value(error, 2, noise=True) for error in errors),

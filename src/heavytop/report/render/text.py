@@ -114,10 +114,13 @@ class Lines:
         if widths[0] + 2 <= room < wides[0]:
             for row in rows:  # what is broken is indented
                 row[0] = Text("\n".join(wrapped(row[0].plain, "  ", "", room)), style=row[0].style)
+            wides[0] = room
+        while sum(wides) + 2 * len(wides) > options.max_width:  # the widest is made narrower, no cell than its words
+            wides[max(range(len(wides)), key=lambda index: (wides[index] > widths[index], wides[index]))] -= 1
         made = Table(box=None, pad_edge=edge, header_style="dim")
-        for index, (column, width, wide) in enumerate(zip(columns, widths, wides, strict=True)):
+        for index, (column, wide) in enumerate(zip(columns, wides, strict=True)):
             words = index < self.words or (self.left and index == len(columns) - 1)
-            made.add_column(Text(column), justify="left" if words else "right", no_wrap=wide == width, min_width=width)
+            made.add_column(Text(column), justify="left" if words else "right", width=wide)
         for row in rows:
             made.add_row(*row)
         yield made

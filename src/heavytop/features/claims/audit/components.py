@@ -200,14 +200,15 @@ class UserComponent(UserIntegral):
         if not claims:
             raise InputError("[component] claims nothing.", "Give reduced, or rates of angles in [quadrature].")
         zeros = [*(part.expression for part in self.where), OFF_SPHERE]
+        known = self._known_components()
         for equation, index, claimed, above, below, text, needs in claims:
             pole = _POLE if equation == "rate" else ""
-            held = None if claimed.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
-            needs = frozenset(
-                _off_pole(need, u if held else None) for need in _put(needs, u, u if held else q.expression)
-            )
+            of_u = claimed.xreplace(known)
+            held = None if of_u.free_symbols & frozenset(STATE) else _through(u, q.expression, zeros, (above, below))
+            put = known if held else {u: q.expression}
+            needs = frozenset(_off_pole(need, u if held else None) for need in _put(needs, put))
             if held is not None and all(sympy.expand(e) == 0 for _, e in kept):
-                residual = sympy.numer(sympy.together(claimed * held[1] - held[0]))
+                residual = sympy.numer(sympy.together(of_u * held[1] - held[0]))
                 formulas = Formulas((u,), _without(base, *STATE) | needs | condition("/", (held[2],)), pole=pole)
                 in_u.append(Statement(equation, index, "smooth", ALL, residual, text, formulas))
             elif index == 1 or equation == "rate":
@@ -216,6 +217,15 @@ class UserComponent(UserIntegral):
                 formulas = Formulas(STATE, base | needs, pole=pole)
                 on_state.append(Statement(equation, index, "smooth", _AT_A_STATE, residual, text, formulas, flow))
         return in_u, on_state
+
+    def _known_components(self) -> dict[sympy.Expr, sympy.Expr]:
+        """Components of the state by u and by the values of first integrals that are components themselves."""
+        values = {
+            x: x - part.expression for part in self.where for x in part.expression.free_symbols & frozenset(STATE)
+        }
+        return {
+            x: e for x, e in {**values, self.quantity.expression: self._u}.items() if not e.free_symbols & set(STATE)
+        }
 
     def _true_rate(self, name: str, system: System) -> Formula:
         """The rate of an angle as a function of u, where the first integrals have their values."""
@@ -235,7 +245,7 @@ class UserComponent(UserIntegral):
             return []
         c, u, f = value.expression, self._u, self._square.expression
         domain = DOMAINS[self.content.domain]
-        along = _put(self._square.needs, u, c)
+        along = _put(self._square.needs, {u: c})
         formulas = Formulas((c,), value.needs | along | self.context.needs)
 
         def made(equation: str, index: int, residual: sympy.Expr, text: str, extra: Formulas = formulas) -> Statement:
@@ -257,7 +267,7 @@ class UserComponent(UserIntegral):
             if angle is not None:
                 if claimed is None or claimed.expression.free_symbols & frozenset(STATE):
                     claimed = self._true_rate(name, system)
-                needs = angle.needs | _put(claimed.needs, u, c) | formulas.needs
+                needs = angle.needs | _put(claimed.needs, {u: c}) | formulas.needs
                 residual = _IN_TIME(angle.expression) - claimed.expression.xreplace({u: c})
                 equations.append(
                     made("angle", index, residual, f"{name}' of {name}", Formulas((c, angle.expression), needs))
@@ -265,8 +275,8 @@ class UserComponent(UserIntegral):
         return equations
 
 
-def _put(needs: frozenset[Need], u: sympy.Symbol, value: sympy.Expr) -> frozenset[Need]:
-    return frozenset(Need(need.kind, need.expression.xreplace({u: value})) for need in needs)
+def _put(needs: frozenset[Need], values: Mapping[sympy.Expr, sympy.Expr]) -> frozenset[Need]:
+    return frozenset(Need(need.kind, need.expression.xreplace(values)) for need in needs)
 
 
 def _off_pole(need: Need, u: sympy.Symbol | None) -> Need:

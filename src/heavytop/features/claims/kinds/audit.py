@@ -102,6 +102,10 @@ class AuditKind(Kind):
         against = Against("equations", f"the equations of {task.key.system}")
         return exact_row(task, f"claimed: {claim.source}", against, by_name(metrics))
 
+    def line(self, row: Row) -> str:
+        """The verdict, and how many equations are proven and refuted."""
+        return f"{_verdict(row)[0]}: {_counted(row)}"
+
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """Whether the claims are motions of the heavy top, and how many of each system's equations are proven; how many
         claims of the library hold, and whether that is what is expected.
@@ -157,14 +161,17 @@ def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
     yield Note(clip(claim), style="soft")
     for row in rows:
         if row.case == claim:
-            verdict, refuted, held = _verdict(row)
             smooth = " on the smooth branch" if row.system == GYROSTAT.name else ""
-            said = f"for {clip(_SYSTEMS.get(row.system, row.system), 40)}{smooth}: "
-            said += f"{held} of {len(row.metrics)} equations proven"
-            if refuted:
-                names = sorted({quantity.name for quantity in refuted})
-                said += f", {len(refuted)} refuted: {clip(', '.join(names), 120)}"
-            yield Note(said, Word(verdict))
+            system_name = clip(_SYSTEMS.get(row.system, row.system), 40)
+            yield Note(f"for {system_name}{smooth}: {_counted(row)}", Word(_verdict(row)[0]))
+
+
+def _counted(row: Row) -> str:
+    """How many equations are proven, and which are refuted."""
+    _, refuted, held = _verdict(row)
+    said = f"{held} of {len(_equations_of(row))} equations proven"
+    names = sorted({quantity.name for quantity in refuted})
+    return said + (f", {len(refuted)} refuted: {clip(', '.join(names), 120)}" if refuted else "")
 
 
 def _of_entry(task: Task) -> Row:
@@ -223,13 +230,15 @@ def _value(holds: bool | None) -> Metric:
     )
 
 
+def _equations_of(row: Row) -> list[Metric]:
+    """The metrics of a row that are verdicts on its equations."""
+    others = EXPECTED.name, DIGITS
+    return [m for m in row.metrics.values() if m.quantity is None or m.quantity.name not in others]
+
+
 def _verdict(row: Row) -> tuple[str, list[Quantity], int]:
     """The verdict, the equations that are refuted, and how many are proven."""
-    equations = [
-        metric
-        for metric in row.metrics.values()
-        if metric.quantity != EXPECTED and (metric.quantity is None or metric.quantity.name != DIGITS)
-    ]
+    equations = _equations_of(row)
     refuted = [metric.quantity or Quantity("?") for metric in equations if metric.value == "0"]
     held = sum(metric.value == "1" for metric in equations)
     undecided = len(equations) - held - len(refuted)

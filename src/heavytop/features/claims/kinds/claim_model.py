@@ -294,8 +294,10 @@ class ClaimModel(Kind):
                 BRANCHES,
             ],
         )
-        truths = {row.key.case: row.against for row in rows}
-        yield from (Note(f"{case}: true motion: {text}", style="soft") for case, text in truths.items())
+        truths = {row.key.case: row.reference for row in rows}
+        for case, known in truths.items():
+            text = f"{known.brief}, {known.certified}" if known.certificates else known.text
+            yield Note(f"{case}: true motion: {text}", style="soft")
         smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
         for row in forward:
             if row.case not in smooth or row.key.subject.branch == "smooth":

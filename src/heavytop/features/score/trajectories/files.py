@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 import sys
 from collections.abc import Sequence
@@ -55,6 +56,11 @@ _STARTS = ("gamma", "start_quaternion", "start_matrix", "start_euler")
 _COMMA = re.compile(r",(?![^\[]*\])")
 """A comma, but for one in brackets, as in R[0,1]."""
 _ALL_COLUMNS = "Give every row all of its columns, with decimal points, not commas."
+_COUNTS = {"inertia": (3, 6, 9), "start_quaternion": (4,), "start_matrix": (9,)}
+"""Numbers of a key whose value is not a vector."""
+_DECIMAL_COMMAS = re.compile(r"(?!.*,\s).*(?<![^;\s])[-+]?\d+,\d+(?![^;\s])")
+"""A number such as 2,5 between semicolons or spaces, where these and no commas separate."""
+_POINT = "Write a decimal point in each number, and commas or spaces between them."
 _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
 
@@ -143,7 +149,7 @@ class TextTable:
             return False
         if key in self.keys:
             raise InputError(f"The key {key} stands twice.", "Give each key once.")
-        self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
+        self.keys[key] = _numbers(key, value.strip("[]() ")) if key in LISTS else value
         return True
 
     def _without_repeats(self, index: int) -> None:
@@ -175,6 +181,15 @@ class TextTable:
             )
         self.notes.append(f"without a header the columns are taken as {' '.join(COLUMNS)}")
         return COLUMNS
+
+
+def _numbers(key: str, text: str) -> list[str]:
+    """The numbers of a key; raises InputError, with the text as it stands, where its commas are decimal ones."""
+    numbers = re.split(r"\s*[,;]\s*|\s+", text)
+    counts = _COUNTS.get(key, (3,))
+    if "," in text and (len(numbers) not in counts or _DECIMAL_COMMAS.match(text)):
+        raise InputError(f"{key} must be {counts[0]} numbers; got {quoted(text)}.", _POINT)
+    return numbers
 
 
 def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
@@ -223,13 +238,14 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
     """The cells of every row; raises InputError that names the line of one with another number than the header."""
     rows = []
     for number, line in zip(lines, body, strict=True):
-        cells = _cells(line, separator)
+        spaced = separator is None and _DECIMAL_COMMAS.match(line)
+        cells = _cells(line.replace(",", ".") if spaced else line, separator)
         if len(cells) != width:
             decimal_commas = separator == "," and len(cells) == 2 * width
             remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else _ALL_COLUMNS
             raise InputError(f"Line {number} has {len(cells)} columns, not {width}.", remedy)
-        # where a semicolon separates, a comma is the point of a decimal
-        rows.append([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
+        # where a semicolon, a tab or a space separates, a comma is the point of a decimal
+        rows.append([cell.replace(",", ".") for cell in cells] if separator in (";", "\t") else cells)
     return rows
 
 
@@ -254,11 +270,25 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
 
 
 def require_body(case: Case, body: Body) -> None:
-    """Raises InputError where a body, in whatever axes, has other principal moments or weight than the case."""
+    """Raises InputError where a body, in whatever axes, has another weight, other principal moments, or along a
+    principal axis another centre or rotor than the case.
+    """
     top, _ = in_principal_axes(body, 64)
-    moments = zip(sorted(top.inertia), sorted(case.top.inertia), strict=True)
     said = [("weight", top.weight, case.top.weight)]
-    _require_alike([*said, *((f"principal moment {i}", new, old) for i, (new, old) in enumerate(moments, 1))], case)
+    moments = sorted(case.top.inertia)
+    pairs = zip(sorted(top.inertia), moments, strict=True)
+    said += [(f"principal moment {i}", new, old) for i, (new, old) in enumerate(pairs, 1)]
+    for what in ("centre", "rotor") if case.top.weight else ("rotor",):
+        lengths = [[_along(one, what, moment) for one in (top, case.top)] for moment in moments]
+        said += [(f"the {what} along principal axis {i}", new, old) for i, (new, old) in enumerate(lengths, 1)]
+    _require_alike(said, case)
+
+
+def _along(top: HeavyTop, what: str, moment: Fraction) -> Fraction:
+    """Length of the part of its centre or rotor along the principal axes of that moment, in double."""
+    near = max(moment, Fraction(1)) / 1000
+    parts = zip(top.inertia, getattr(top, what) or (Fraction(0),) * 3, strict=True)
+    return Fraction(math.hypot(*(float(part) for other, part in parts if abs(other - moment) <= near)))
 
 
 def _require_alike(said: Sequence[tuple[str, Any, Any]], case: Case) -> None:
@@ -318,7 +348,8 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
     data that are not those of the case.
     """
     shown_path = str(path)[:LONGEST_NAME]
-    path = bags.storage(path) if path.is_dir() else path
+    if path.is_dir():
+        path = next(path.glob("report.json"), None) or bags.storage(path)
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} has none of the endings {', '.join(_SUFFIXES)}.", REMEDY)
@@ -329,6 +360,10 @@ def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given
             text = logs.of_ephemeris(text)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The trajectory {shown_path} cannot be read: {why(error)}.", REMEDY) from None
+    if re.match(r'\s*\{\s*"schema"\s*:\s*"heavytop-report', text):
+        raise InputError(
+            f"{shown_path} is a report of heavytop, not a trajectory.", f"`heavytop show {shown_path}` shows it."
+        )
     is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
         document, notes = (_json(text), []) if is_json else _table(text, case is not None)
@@ -365,7 +400,7 @@ def _json(text: str) -> dict[str, Any]:
         raise InputError(f"This is not JSON: {error}.", REMEDY) from None
     if not isinstance(document, dict):
         raise InputError("The document is not an object.", REMEDY)
-    for key in document.keys() - _KEYS - _NOT_READ:
+    for key in sorted(document.keys() - _KEYS - _NOT_READ):
         raise unknown(key, sorted(_KEYS))
     return document
 

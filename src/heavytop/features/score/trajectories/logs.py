@@ -265,11 +265,11 @@ _SPACECRAFT = re.compile(r"SC_|SPACECRAFT|.*BODY|ACTUATOR|INSTRUMENT|CSS|DSS|GYR
 
 def is_ephemeris(text: str) -> bool:
     """Whether a text is an attitude ephemeris message."""
-    return text.lstrip().startswith("CCSDS_AEM_VERS")
+    return re.match(r"(\s|#.*\n)*CCSDS_AEM_VERS", text) is not None
 
 
 def of_ephemeris(text: str) -> str:
-    """An attitude ephemeris message of quaternions as a table; its COMMENT lines are comments.
+    """An attitude ephemeris message of quaternions as a table; lines of COMMENT or # are comments.
 
     Raises InputError for several segments, another kind of attitude, and an invalid epoch.
     """
@@ -289,11 +289,11 @@ def of_ephemeris(text: str) -> str:
         axes = "omega_space" if frame and bool(of_a) != body_first else "omega"
         order += [f"{axes}_{axis} [deg/s]" for axis in "xyz"]
     inertial_first = (meta.get("ATTITUDE_DIR", "A2B").upper() == "A2B") != body_first
-    lines = [f"# {line.strip()[7:].strip()}" for line in text.splitlines() if line.strip().startswith("COMMENT")]
+    lines = [f"# {line}" for line in re.findall(r"^\s*(?:COMMENT|#)[ \t]*(.*?)\s*$", text, re.MULTILINE)]
     if not inertial_first:
         lines.append("# quaternion: space_to_body")
     data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
-    rows = [line.split() for line in data if line.strip() and not line.strip().startswith("COMMENT")]
+    rows = [line.split() for line in data if line.strip() and not line.lstrip().startswith(("COMMENT", "#"))]
     start = _epoch(meta.get("START_TIME") or rows[0][0]) if rows else Fraction(0)
     lines.append(",".join(["timestamp", *order]))
     lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
@@ -318,6 +318,8 @@ def of_arrays(content: bytes, suffix: str) -> str:
     Numbers are written so that they are read back the same.  Arrays that have not a row for each time, and what a
     Parquet table says of itself, stand for comments.  Raises InputError for other shapes.
     """
+    import numpy
+
     columns = _of_parquet(content) if suffix == ".parquet" else _of_numpy(content)
     lengths = {canonical(name).partition(" ")[0]: len(array) for name, array in columns.items() if array.ndim}
     count = next((lengths[name] for name in _TIMES if name in lengths), max(lengths.values(), default=0))
@@ -326,11 +328,14 @@ def of_arrays(content: bytes, suffix: str) -> str:
     parts: list[Any] = []
     comments = []
     for name, array in columns.items():
-        if array.ndim == 0 or array.dtype.kind in "US" or (len(array) != count and array.size <= 9):
+        if array.ndim == 0 or (array.size <= 9 and (array.dtype.kind in "US" or len(array) != count)):
             comments.append(f"# {name}: {', '.join(map(str, array.ravel().tolist()))}")
         elif array.ndim <= 3 and array.size and array.dtype.kind in "fiu":
             parts.append(array.reshape(len(array), -1))
             names += _names_of(name, parts[-1].shape[1], last)
+        elif array.ndim == 1 and len(array) == count:  # a cell of text has no separators
+            parts.append(numpy.array([[re.sub(r"[^\w.+/-]+|^/+", " ", str(value))] for value in array]))
+            names.append(name)
     if not parts or len({len(part) for part in parts}) != 1:
         counts = ", ".join(str(len(part)) for part in parts) or "none"
         raise InputError(f"The arrays have {counts} rows.", "Give arrays of one length, one row for each time.")
