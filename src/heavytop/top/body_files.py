@@ -21,7 +21,6 @@ from heavytop.files import read_whole
 from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
 from heavytop.top import inertia_slips
 from heavytop.top.attitude import Attitude, multiplied, rotated, transposed
-from heavytop.top.bodies import IDENTITY, principal_axes
 from heavytop.top.inertia_slips import Six, Tensor, rows, six_of
 
 if TYPE_CHECKING:
@@ -35,6 +34,7 @@ _MOST_SLACK = Fraction(1, 200)
 _FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
 EARTH: Vector = (Fraction(0), Fraction(0), Fraction("-9.81"))
+_IDENTITY: Tensor = rows((Fraction(1), Fraction(1), Fraction(1), *_ZERO))
 _SIX_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _FORMATS = "Give a URDF, MJCF or SDF file, USD as text (.usda), or TOML with mass, centre and inertia."
 
@@ -409,7 +409,7 @@ class _SdfFrames:
     def in_model(self, element: Element, passed: tuple[Element, ...] = ()) -> Pose:
         """The pose of a frame, or of a shape of the link, in the axes of the model."""
         if element is self.around[self.link]:
-            return IDENTITY, _ZERO
+            return _IDENTITY, _ZERO
         if element in passed:
             raise InputError(f"{self.numbers.where}: its frames form a circle.", "Lead them back to the model.")
         pose, name = element.find("pose"), _base(element)
@@ -461,7 +461,7 @@ def _base(element: Element) -> str:
 def _pose(numbers: _Numbers, pose: Element | None) -> Pose:
     """Rotation and place of a pose x y z roll pitch yaw, or with a quaternion x y z w."""
     if pose is None:
-        return IDENTITY, _ZERO
+        return _IDENTITY, _ZERO
     form = numbers.attributes(pose, "rotation_format", "degrees", "relative_to", "frame")
     kind, degrees = form.get("rotation_format", "euler_rpy"), numbers.flag(form.get("degrees"), "degrees")
     count = {"euler_rpy": 6, "quat_xyzw": 7}.get(kind)
@@ -528,9 +528,11 @@ def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> 
     least_mass, least = (numbers.one(frames.settings.get(key), key, "0") for key in ("boundmass", "boundinertia"))
     mass = max(numbers.one(inertial.get("mass"), "mass"), least_mass)
     if least and inertia_slips.has_second_moments(rows(six), slack):
-        principal = principal_axes(rows(six), _BITS)
-        first, second, third = (max(moment, least) for moment in principal.moments)
-        six = _in_axes(principal.axes, (first, second, third, *_ZERO))
+        spare = inertia_slips.minus(rows(six), rows((least, least, least, *_ZERO)))
+        if any(six[3:]) and not inertia_slips.is_positive(spare):
+            raise InputError(f"{numbers.where}: boundinertia raises a principal moment.", "Give diaginertia and quat.")
+        if not any(six[3:]):
+            six = (max(six[0], least), max(six[1], least), max(six[2], least), *_ZERO)
     axes, centre = frames.pose(numbers, inertial, around)
     balls = [pair for pair in parts if frames.attributes(pair[0]).get("type") == "ball"]
     joint = frames.pose(numbers, *balls[0])[1] if balls else None
@@ -639,7 +641,7 @@ class _MjcfFrames:
 
     def pose(self, numbers: _Numbers, element: Element, around: Sequence[Element]) -> Pose:
         """Rotation and place of an element of a body, within the frames around it."""
-        pose = IDENTITY, _ZERO
+        pose = _IDENTITY, _ZERO
         for frame in (*around, element):
             values = self.attributes(frame)
             pose = _within(pose, (self.rotation(numbers, values), numbers.three(values.get("pos"), "pos", "0 0 0")))
@@ -667,7 +669,7 @@ class _MjcfFrames:
         if key == "zaxis":  # the least rotation of e_z to it
             x, y, z = _unit(values)
             return _turn(*((1 + z, -y, x, 0) if z > -1 else (0, 1, 0, 0)))
-        turns = IDENTITY
+        turns = _IDENTITY
         for letter, angle in zip(self.settings.get("eulerseq", "xyz"), values, strict=True):
             around = [int(letter.lower() == name) for name in "xyz"]
             turn = _rotation(Attitude.axis_angle(around, f"{angle}{unit}"))

@@ -616,6 +616,7 @@ UNREAD = {
     "two tensors": (in_mjcf(BALL.replace("/>", ' fullinertia="1 1 1 0 0 0"/>')), "fullinertia and diaginertia"),
     "two inertials": (in_mjcf(BALL + FRAMED), "2 inertials"),
     "two orientations": (in_mjcf(BALL.replace("pos", 'euler="0 0 1" quat="1 0 0 0" pos')), "quat and euler"),
+    "a bound": (("xml", mjcf(SIX).replace("<world", '<compiler boundinertia=".2"/><world')), "boundinertia"),
     "global": (in_mjcf(BALL, '<compiler coordinate="global"/>'), "MuJoCo 2.3.3"),
     "fused": (in_mjcf(BALL, '<compiler fusestatic="true"/>'), "fusestatic"),
     "gravity along y": (in_mjcf(BALL, '<option gravity="0 -9.81 0"/>'), "--gravity"),
