@@ -256,7 +256,7 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (["--plan", "huge"], "Unknown plan 'huge'"),
-        (["--plan", "none.toml"], "cannot be read"),
+        (["--plan", "none.toml"], "as --plan gate; `heavytop new`"),
         (["--plan", "bad.toml"], "unknown field `surprise`"),
         (["--workers", "0"], "workers = 0 allows nothing"),
         (["--resume"], "--out"),

@@ -156,7 +156,7 @@ def count(value: int | None, what: str) -> int | None:
         return None
     number = as_integer(value, what)
     if number < 1:
-        raise InputError(f"{what} = {quoted(number)} allows nothing.", "Give 1 or more, or None for no limit.")
+        raise InputError(f"{what} = {quoted(number)} allows nothing.", "Give 1 or more, or leave it out.")
     return min(number, _MOST)
 
 

@@ -9,7 +9,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, meant
 from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
@@ -249,7 +249,7 @@ def case(name: str, more: dict[str, Case] | None = None) -> Case:
         return CASES[name]
     known = CASES | named_bodies() | (more or {})
     if name not in known:
-        raise InputError(f"Unknown case {name[:60]!r}.", f"Known cases: {', '.join(known)}.")
+        raise InputError(f"Unknown case {name[:60]!r}.", meant(name, known) + "`heavytop list` shows the cases.")
     return known[name]
 
 

@@ -1,8 +1,9 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from enum import IntEnum
 
 
@@ -61,6 +62,18 @@ def why(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
+def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """The known name that an unknown one misspells, with so large a part alike; "" where there is none."""
+    names = {entry.lower(): entry for entry in sorted(known)}
+    return next((names[near] for near in get_close_matches(name.lower(), names, 1, alike)), "")
+
+
+def meant(name: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """``Did you mean NAME? `` of the nearest name, to begin a remedy; "" where none is near."""
+    near = nearest(name, known, alike)
+    return f"Did you mean {near}? " if near else ""
+
+
 class HeavyTopError(Exception):
     """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
 
@@ -95,6 +108,10 @@ def prefixed(what: str) -> Iterator[None]:
 
 class NotInClass(InputError):
     """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
+
+
+class NoSuchFunction(InputError):
+    """A function that a Python file does not have."""
 
 
 class LevelNotDone(NotInClass):

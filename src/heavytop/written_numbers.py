@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, prefixed
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, real, round_to
 
 _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
@@ -38,7 +38,8 @@ def number(value: Any, what: str) -> Fraction | None:
         sign, whole, part, power = hexadecimal.groups()
         fraction = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
     else:
-        fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
+        with prefixed(what):
+            fraction = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
     if fraction and abs(fraction.numerator.bit_length() - fraction.denominator.bit_length()) > _WIDEST:
         raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
     return fraction

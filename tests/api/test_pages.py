@@ -58,7 +58,7 @@ def test_a_page_is_what_its_file_says_and_has_nothing_that_only_the_site_can_sho
             pages.page(name)
     with pytest.raises(InputError) as caught:
         pages.page("Compere")
-    assert caught.value.remedy == "Did you mean compare?  `heavytop docs` lists the topics."
+    assert caught.value.remedy == "Did you mean compare? `heavytop docs` lists the topics."
 
 
 def test_a_page_has_formulas_as_text() -> None:

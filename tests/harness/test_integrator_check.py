@@ -10,6 +10,7 @@ from time import monotonic, sleep
 
 import pytest
 
+from heavytop.errors import NoSuchFunction
 from heavytop.harness import integrator_check
 from heavytop.harness.integrator_check import check
 from heavytop.integrate.registry import named
@@ -147,3 +148,10 @@ def test_an_attitude_that_is_lost_later_is_seen(tmp_path: Path) -> None:
         part = integrator_check._judged("attitude", contract._attitude)
         assert part.verdict == "violated"
         assert "With the attitude its state at t = " in part.text
+
+
+def test_a_function_that_a_file_does_not_have_is_no_violation(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def solve(request): pass\n")
+    solve = named(f"{tmp_path}/mine.py:solv")
+    with pytest.raises(NoSuchFunction, match=r"has no solv\.\n  Did you mean solve\? It has solve\."):
+        integrator_check._judged("start", solve.load)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.features.score.measurement import score
+from heavytop.features.score.measurement import measured
 from heavytop.features.score.trajectories.observed import GivenTrajectory
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
@@ -69,14 +69,14 @@ def recomputed(given: GivenTrajectory) -> float:
 @pytest.mark.parametrize("omega_scale", [1, 20])
 def test_digits_kept_are_what_the_samples_say(errors, omega_scale) -> None:
     motion = given(errors, QUAD, omega_scale)
-    assert digits_kept(score(motion)) == pytest.approx(recomputed(motion), abs=0.006)
+    assert digits_kept(measured(motion).row) == pytest.approx(recomputed(motion), abs=0.006)
 
 
 def test_a_fast_component_counts_relative_and_a_slow_one_absolute() -> None:
     fast = given({(0, 2): Fraction(1, 10**6)}, QUAD, 20)
     speed = abs(fast.states[0][2])
-    assert digits_kept(score(fast)) == pytest.approx(6 + math.log10(speed), abs=0.006)
-    assert digits_kept(score(given({(0, 5): Fraction(1, 10**6)}, QUAD, 20))) == pytest.approx(6, abs=0.006)
+    assert digits_kept(measured(fast).row) == pytest.approx(6 + math.log10(speed), abs=0.006)
+    assert digits_kept(measured(given({(0, 5): Fraction(1, 10**6)}, QUAD, 20)).row) == pytest.approx(6, abs=0.006)
 
 
 def test_numbers_bounds_and_words() -> None:
@@ -103,7 +103,7 @@ def command(*arguments: object) -> str:
 @pytest.mark.slow
 def test_every_surface_says_the_same(tmp_path: Path) -> None:
     motion = given({(1, 2): Fraction(13, 10**10), (3, 4): Fraction(1, 10**11)}, DOUBLE)
-    said = digits_text(digits_kept(score(motion)))
+    said = digits_text(digits_kept(measured(motion).row))
     document = {
         "precision": "double",
         "inertia": [str(v) for v in motion.top.inertia],
@@ -121,7 +121,7 @@ def test_every_surface_says_the_same(tmp_path: Path) -> None:
     assert digits_text(document["digits_kept"]) == digits_text(document["digits_right"]) == said
     lines = [line.split() for line in command("show", tmp_path / "out").splitlines()]
     assert [said in line for line in lines if line[:1] == ["motion"]] == [True]
-    report = Report(SCHEMA, {"name": "one"}, {}, [score(motion)])
+    report = Report(SCHEMA, {"name": "one"}, {}, [measured(motion).row])
     (drawn,) = plots.digits([("", report)]).rows
     assert said in drawn
     assert f"{said} of 16 digits right to T = 4" in html.report_page(report)

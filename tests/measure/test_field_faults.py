@@ -74,7 +74,7 @@ CHANGES = [(place, (1.00001, 0.0, -1.0)[place % 3]) for place in range(0, len(TE
 def test_every_term_of_the_field_is_named(place: int, factor: float) -> None:
     factors = numpy.ones(len(TERMS))
     factors[place] = factor
-    became = {0.0: "is left out", -1.0: "has the other sign"}.get(factor, f"is {factor} times what it is")
+    became = {0.0: "is left out", -1.0: "has the other sign"}.get(factor, f"is {factor} times what it should be")
     text = said(factors=factors)
     assert text.count(", or ") <= 2  # two terms of one monomial are one function
     assert f"the term {TERMS[place]} of {OWNERS[place]} {became}" in text
@@ -85,11 +85,11 @@ def test_a_moment_of_inertia_and_a_component_of_the_centre_are_named(axis: int) 
     for name, numbers in (("inertia", INERTIA), ("moment", MOMENT)):
         wrong = [value * (1.00001 if i == axis else 1) for i, value in enumerate(numbers)]
         letter = "I" if name == "inertia" else "r"
-        assert f"field: {letter}{axis + 1} is 1.00001 times what it is" in said(**{name: wrong})
+        assert f"field: {letter}{axis + 1} is 1.00001 times what it should be" in said(**{name: wrong})
 
 
 def test_a_factor_of_all_terms_is_named() -> None:
-    assert "the weight P is 1.001 times what it is" in said(moment=[1.001 * value for value in MOMENT])
+    assert "the weight P is 1.001 times what it should be" in said(moment=[1.001 * value for value in MOMENT])
     assert "the length of each step is 1.001 times" in said(factors=numpy.full(len(TERMS), 1.001))
     assert "γ' is 1.001 times" in said(factors=numpy.array([1.0] * 12 + [1.001] * 6))
 

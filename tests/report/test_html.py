@@ -301,6 +301,7 @@ def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
     report = full_report("smoke")
     assert "--plan smoke " in html.commands(report)[3]
     assert "--plan FILE.toml " in html.commands(full_report(HOSTILE))[3]
+    assert "--plan 'my plan.toml' " in html.commands(replace(report, plan={"name": "x", "file": "my plan.toml"}))[3]
     assert html.commands(report)[0] == f"git checkout {'0' * 40}"
     unknown = replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
     assert html.commands(unknown)[0] == "# heavytop 0.1.0"

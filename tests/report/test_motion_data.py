@@ -10,7 +10,7 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.features.score.measurement import score
+from heavytop.features.score.measurement import measured
 from heavytop.features.score.trajectories.observed import of_arrays
 from heavytop.harness.rows import data_of
 from heavytop.integrate.heyoka.motions import propagate
@@ -190,7 +190,7 @@ def test_a_scored_trajectory_has_its_data(tmp_path: Path) -> None:
     run = propagate(case.top, case.start, [Fraction(1), Fraction(2)], DOUBLE)
     other = change(case.top, weight=case.top.weight * 2)
     two = [
-        score(of_arrays(top, case.start, case.system, list(run.times), list(run.states), DOUBLE, "mine", "rk4"))
+        measured(of_arrays(top, case.start, case.system, list(run.times), list(run.states), DOUBLE, "mine", "rk4")).row
         for top in (case.top, other)
     ]
     assert two[0].data == data_of(case)

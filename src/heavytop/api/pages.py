@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from pathlib import Path
 
 from heavytop.api.formulas import plain_formula
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError, meant, quoted
 
 _INSTALLED = Path(__file__).parents[1] / "docs"
 """Where hatch_build.py puts the pages of a wheel."""
@@ -26,9 +25,8 @@ def page(topic: str) -> str:
     """The page in Markdown, formulas as text, without tables that the site makes; raises InputError for no page."""
     files, name = _files(), topic.removeprefix("docs/").removesuffix(".md")
     if name not in files:
-        near = get_close_matches(name.lower(), files, 1)
-        remedy = f"Did you mean {near[0]}?  " if near else ""
-        raise InputError(f"topic must name a page; got {quoted(topic)}.", remedy + "`heavytop docs` lists the topics.")
+        remedy = meant(name, files) + "`heavytop docs` lists the topics."
+        raise InputError(f"topic must name a page; got {quoted(topic)}.", remedy)
     return re.sub(
         r"\$\$\n(.*?)\$\$",
         lambda formula: f"```text\n{plain_formula(formula[1])}\n```",

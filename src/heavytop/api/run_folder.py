@@ -19,7 +19,7 @@ from heavytop.display import printable
 from heavytop.errors import InputError, PeerFailed
 from heavytop.extras import require_extra
 from heavytop.features.kinds import KINDS
-from heavytop.harness import checkpoint
+from heavytop.harness import BUILT_IN, checkpoint
 from heavytop.harness.checkpoint import Checkpoint, identity_of
 from heavytop.harness.plan import read, warnings
 from heavytop.harness.rows import Task
@@ -179,8 +179,10 @@ def prepare(
         raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
+    identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
+    identity |= {} if plan in BUILT_IN else {"file": printable(Path(plan).name)}
     run = PlannedRun(
-        {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": name_of(which)} if which else {}),
+        identity | ({"integrator": name_of(which)} if which else {}),
         tasks,
         warnings(loaded),
         out or Path("heavytop-results") / f"{loaded.name}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}",

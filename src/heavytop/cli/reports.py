@@ -221,8 +221,8 @@ def run(
 ) -> int:
     """Run a plan of measurements and write its report.
 
-    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 10 seconds, default a minute,
-    gate two minutes, peers five, growth ten, long half an hour.
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke, bodies and selftest take about 15 seconds,
+    engines half a minute, default a minute, gate and claims two minutes, peers five, growth ten, long half an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
     from heavytop.harness.plan import former

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 
 from heavytop.cases import CASES
-from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
+from heavytop.errors import HeavyTopError, InputError, NoSuchFunction, PeerFailed, Unsupported
 from heavytop.integrate import registry
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import Command, ProgramRequest, Session, begin_row, close_all, session
@@ -527,5 +527,7 @@ def _judged(name: str, part: Callable[[], str]) -> Checked:
         return Checked(name, "note", str(note))
     except Unsupported as error:
         return Checked(name, "note", error.cause)
+    except NoSuchFunction:
+        raise
     except (_Violated, HeavyTopError) as error:
         return Checked(name, "violated", f"{_cause(error).removesuffix('.')}.")

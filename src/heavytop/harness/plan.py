@@ -8,7 +8,6 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from fractions import Fraction
 from functools import reduce
 from importlib import resources
@@ -22,7 +21,7 @@ import msgspec
 
 from heavytop import records
 from heavytop.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.errors import InputError, invalid, prefixed, quoted, why
+from heavytop.errors import InputError, invalid, meant, nearest, prefixed, quoted, why
 from heavytop.exact.resolved import resolve
 from heavytop.files import read_whole
 from heavytop.harness import BUILT_IN, OF_FEATURES
@@ -42,6 +41,7 @@ from heavytop.top.heavy_top import HeavyTop
 _KEYS = "`heavytop docs plans` lists kinds and keys; the plans that ship show them in use."
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
+_READABLE = "Give a readable TOML file or a built-in plan, as --plan gate; `heavytop new` makes one of your own."
 QUANTITIES = frozenset(
     (
         *("inertia", "weight", "mass", "gravity", "centre", "rotor"),
@@ -143,9 +143,10 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
         try:
             text = read_whole(Path(name)).decode("utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"The plan {name} cannot be read: {why(error)}.", "Give a readable TOML file.") from None
+            raise InputError(f"The plan {name} cannot be read: {why(error)}.", _READABLE) from None
     else:
-        raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
+        remedy = meant(name, BUILT_IN) + "`heavytop list` shows the plans; your own is a file ending in .toml."
+        raise InputError(f"Unknown plan {name[:60]!r}.", remedy)
     try:
         plan = of_document(document_of(text), kinds)
         if not re.fullmatch(_NAME, plan.name):
@@ -268,8 +269,8 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
     for index, entry in enumerate(entries if isinstance(entries, list) else []):
         kind = entry.get("kind") if isinstance(entry, dict) else None
         if isinstance(kind, str) and kind not in known:
-            near = get_close_matches(kind, known, 1)
-            meant = f"; did you mean {near[0]}" if near else ""
+            near = nearest(kind, known)
+            meant = f"; did you mean {near}" if near else ""
             raise msgspec.ValidationError(
                 f"kind in {section}[{index}] must be one of {', '.join(sorted(known))}; got {quoted(kind)}{meant}"
             )

@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, quoted, why
+from heavytop.errors import HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported, invalid, meant, quoted, why
 from heavytop.extras import extra_of, missing
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import CheckedPlugin, Declared, contained, quiet, require_equal, said
@@ -156,7 +156,8 @@ class Integrator:
         if self.name not in known():
             _of_packages.cache_clear()  # it may have been installed since
         if self.name not in known():
-            raise InputError(f"Unknown integrator {quoted(self.name)}.", f"Known: {', '.join(known())}. {_YOURS}")
+            remedy = f"{meant(self.name, known())}`heavytop list` shows the integrators. {_YOURS}"
+            raise InputError(f"Unknown integrator {quoted(self.name)}.", remedy)
         return known()[self.name]
 
     @property

@@ -13,7 +13,7 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.features.score.measurement import score
+from heavytop.features.score.measurement import measured
 from heavytop.features.score.trajectories.files import read
 from heavytop.measure.motion import compute
 from heavytop.measure.scalar import digits_kept
@@ -56,7 +56,7 @@ command = in_process.heavytop
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(160)], ids=lambda p: p.name)
 def test_our_own_motion_scores_as_it_scored_itself(precision, tmp_path: Path) -> None:
     given = document(precision)
-    row = score(read(written(tmp_path, given)))
+    row = measured(read(written(tmp_path, given))).row
     ours = {name: metric["value"] for name, metric in given["metrics"].items()}
     assert ours == {name: m.value for name, m in row.metrics.items() if name.startswith("drift_")}
     assert (row.outcome, row.precision, row.steps) == ("success", precision.name, given["steps"])
@@ -70,7 +70,7 @@ def test_a_known_mistake_is_measured(tmp_path: Path) -> None:
     given = document(QUAD)
     off = exact(given["states"][1][3]) + Fraction(1, 10**9)
     given["states"][1][3] = str(float(off))
-    row = score(read(written(tmp_path, given)))
+    row = measured(read(written(tmp_path, given))).row
     np.testing.assert_allclose(float(row.metrics["solution_error_gamma_max"].value), 1e-9, rtol=1e-5)
     assert float(row.metrics["solution_error_gamma_final"].value) < 1e-30
     assert digits_kept(row) == 9
@@ -80,7 +80,7 @@ def test_a_known_mistake_is_measured(tmp_path: Path) -> None:
 def test_csv_and_json_decimal_and_hexadecimal_say_the_same(number, tmp_path: Path) -> None:
     given = document()
     (tmp_path / "motion.csv").write_text(as_csv(given, number), "utf-8")
-    one, two = score(read(tmp_path / "motion.csv")), score(read(written(tmp_path, given)))
+    one, two = measured(read(tmp_path / "motion.csv")).row, measured(read(written(tmp_path, given))).row
     assert one == two
 
 
@@ -107,13 +107,13 @@ def test_hexadecimal_floats_are_exact(tmp_path: Path) -> None:
 def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
     given = document()
     given["states"][1][4] = word
-    row = score(read(written(tmp_path, given)))
-    first = score(read(written(tmp_path, given | {"times": given["times"][:1], "states": given["states"][:1]})))
+    row = measured(read(written(tmp_path, given))).row
+    first = measured(read(written(tmp_path, given | {"times": given["times"][:1], "states": given["states"][:1]}))).row
     assert (row.outcome, row.finite) == ("non_finite", False)
     assert (row.time_reached, row.horizon) == (first.horizon, "7")
     assert row.metrics["solution_error_omega_max"] == first.metrics["solution_error_omega_max"]
     given["states"][0][0] = word
-    none = score(read(written(tmp_path, given)))
+    none = measured(read(written(tmp_path, given))).row
     assert none.time_reached == "0"
     assert {metric.value for metric in none.metrics.values()} == {"missing"}
     assert digits_kept(none) is None
@@ -122,7 +122,7 @@ def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
     given = document(case=CASES["generic"], times=[Fraction(3000)])  # no digit of a double is left
-    row = score(read(written(tmp_path, given)))
+    row = measured(read(written(tmp_path, given))).row
     assert "no reference" in row.against
     assert "drift_energy_max" in row.metrics
     assert digits_kept(row) is None
@@ -138,13 +138,13 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"times": ["1", "2"]}, "2 times and 3 states"),
         ({"times": ["2", "1", "3"]}, "does not come after"),
         ({"times": ["1", "-2", "3"]}, "different signs"),
-        ({"times": ["1", "nan", "3"]}, "the time in row 2 is nan"),
+        ({"times": ["1", "nan", "3"]}, "Row 2, t is nan"),
         ({"times": "1,2,3"}, "times is not a list"),
         ({"states": [["1"] * 5] * 3}, "state has 5 numbers"),
         ({"states": [["1"] * 6, "x", ["1"] * 6]}, "state is not a list"),
-        ({"states": [["1", "2", "three", "4", "5", "6"]] * 3}, "'three' is not a finite number"),
-        ({"states": [[None] * 6] * 3}, "a component of a state is a NoneType"),
-        ({"states": [[True] * 6] * 3}, "a component of a state is a bool"),
+        ({"states": [["1", "2", "three", "4", "5", "6"]] * 3}, "Row 1, omega3: 'three' is not a finite number"),
+        ({"states": [[None] * 6] * 3}, "Row 1, omega1 is a NoneType"),
+        ({"states": [[True] * 6] * 3}, "Row 1, omega1 is a bool"),
         ({"states": [["0x"] * 6] * 3}, "'0x' is not a finite number"),
         ({"inertia": ["1", "2"]}, "inertia has 2 numbers"),
         ({"inertia": ["1", "2", "-3"]}, "not positive"),
@@ -161,8 +161,8 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"outcome": "fine"}, "Unknown outcome"),
         ({"steps": -1}, "not a count"),
         ({"steps": "1e30"}, "not a count"),
-        ({"states": [["0x1p999999"] * 6] * 3}, "a component of a state is '0x1p999999'"),
-        ({"states": [["1e-99999"] * 6] * 3}, "a component of a state is '1e-99999'"),
+        ({"states": [["0x1p999999"] * 6] * 3}, "Row 1, omega1 is '0x1p999999'"),
+        ({"states": [["1e-99999"] * 6] * 3}, "Row 1, omega1 is '1e-99999'"),
         ({"name": ""}, "The name of 0 characters"),
         ({"name": "x" * 10_000}, "The name of 10000 characters"),
         ({"integrator": "a\x1b[31m"}, "The integrator of 6 characters"),
@@ -274,7 +274,7 @@ def test_the_examples_of_the_documentation_can_be_scored(kind: str, tmp_path: Pa
     (tmp_path / f"motion.{kind}").write_text(re.search(rf"```{kind}\n(.*?)```", text, re.S)[1], "utf-8")
     given = read(tmp_path / f"motion.{kind}")
     assert (given.name, given.integrator, given.flags) == ("mine", "rk4.f90", {"step": "0.001"})
-    row = score(given)
+    row = measured(given).row
     assert row.outcome == "success"
     assert digits_kept(row) > 15
 
@@ -284,10 +284,10 @@ def test_a_state_too_large_for_its_format_is_not_finite(precision: str, size: st
     given = document() | {"precision": precision}
     del given["bits"]
     given["states"][1] = [size, *given["states"][1][1:]]
-    row = score(read(written(tmp_path, given)))
+    row = measured(read(written(tmp_path, given))).row
     assert (row.outcome, row.samples) == ("non_finite", 1)
     given["states"][1] = ["1e308", *given["states"][1][1:]]
-    assert score(read(written(tmp_path, given))).outcome == "success"
+    assert measured(read(written(tmp_path, given))).row.outcome == "success"
 
 
 def test_what_has_no_end_is_refused_before_it_is_read(tmp_path: Path) -> None:

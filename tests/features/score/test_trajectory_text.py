@@ -183,7 +183,7 @@ def test_w_x_y_z_beside_each_other_are_a_quaternion(names: str, places: dict[str
         (table(None, order=range(3)), "without a header Row 1 has 3 columns, not 7"),
         (table() + "1,2\n", "Line 7 has 2 columns, not 7"),
         (table() + "2,1,1,1,0,0,1\n", "Lines 6 and 7 are of one time and differ"),
-        (table() + "3,1,1,1,0,0,abc\n", "'abc' is not a finite number"),
+        (table() + "3,1,1,1,0,0,abc\n", "Line 7, gamma3: 'abc' is not a finite number"),
         ("# centre: 0, 0, 0,5\n" + table(), "centre must be 3 numbers; got '0, 0, 0,5'"),
         ("# inertia: 2,5;2,5;1,5\n" + table(), "inertia must be 3 numbers; got '2,5;2,5;1,5'"),
         (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 states are too many.*"),

@@ -125,7 +125,7 @@ def audit_text(report: Audit) -> RenderableType:
         parts.append(Text(_SYMBOLS))
     if report.kind == "value":
         return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
-    parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
+    parts += [Text(), _table(report), *_witnesses(report), *_conditions(report)]
     parts += [Text(f'With assume = [..., "{bound}"] the verdict is: {verdict}.') for bound, verdict in report.deciding]
     if report.unused:
         parts.append(Text(f"No formula uses {', '.join(report.unused)} of [parameters]."))
@@ -149,8 +149,7 @@ def _entry(report: Audit) -> list[RenderableType]:
 
 def _table(report: Audit) -> Table:
     """A line a statement; branch and domain stand in it where the claim has more than the smooth one and all times."""
-    usual = {"branch": {"smooth"}, "domain": {"all"}}
-    own = [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
+    own = _own(report)
     table = Table(box=None, pad_edge=False)
     for name in ("equation", *own, "verdict", "residual", "statement"):
         table.add_column(name, overflow="fold", no_wrap=name not in ("residual", "statement"))
@@ -159,6 +158,21 @@ def _table(report: Audit) -> Table:
         cells = (Text(value) for value in (_label(row), *(getattr(row, name) for name in own)))
         table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
     return table
+
+
+def _own(report: Audit) -> list[str]:
+    """The columns branch and domain, where the claim has more than the smooth one and all times."""
+    usual = {"branch": {"smooth"}, "domain": {"all"}}
+    return [name for name in usual if {getattr(row, name) for row in report.rows} != usual[name]]
+
+
+def _indented(title: str, lines: Sequence[tuple[str | Text, str]]) -> list[RenderableType]:
+    """Texts behind their labels, below a title; nothing where there are none."""
+    table = Table.grid(padding=(0, 1))
+    table.add_column(no_wrap=True)
+    for label, text in lines:
+        table.add_row(Text("  ").append(label).append(":"), Text(text, overflow="fold"))
+    return [Text(f"\n{title}:"), table] if lines else []
 
 
 def _in_lines(expression: str) -> str:
@@ -176,34 +190,33 @@ def _label(row: StatementVerdict) -> str:
     return f"{number} {row.component}"
 
 
-def _witnesses(report: Audit) -> list[Text]:
+def _witnesses(report: Audit) -> list[RenderableType]:
     """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
     refuted = [row for row in report.rows if row.witness is not None]
-    lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
+    points = []
     for row in refuted:
         witness = dict(row.witness or {})
         parameters = witness.pop("parameters")
         ball = f"{witness.pop('value')} +/- {witness.pop('radius')}" if "value" in witness else row.residual
-        point = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
-        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {ball} at {point}"))
-    notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
-    if notes:
-        lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]
-    return lines
+        point = ", ".join(f"{name}={number}" for name, number in {**parameters, **witness}.items())
+        points.append((" ".join([_label(row), *(getattr(row, name) for name in _own(report))]), f"{ball} at {point}"))
+    notes = sorted({(f"{row.branch} {row.domain}", row.note) for row in report.rows if row.note})
+    title = "Witnesses, with the residual as a ball that excludes 0"
+    return _indented(title, points) + _indented("The domains", notes)
 
 
-def _conditions(report: Audit) -> list[Text]:
+def _conditions(report: Audit) -> list[RenderableType]:
     """The conditions of the proofs, each once: first what is not discharged, with the rows that it leaves open."""
     rows: dict[tuple[bool, str, str], list[str]] = {}
     for row in report.rows:
         if row.holds is not False:
             for c in row.conditions:
                 rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
-    lines = [Text("Conditions of the proofs (domain: moments of inertia > 0, and `assume`):")] if rows else []
+    lines = []
     for (discharged, text, reason), labels in sorted(rows.items()):
         state = Text(
             "discharged" if discharged else "not discharged", style=_AUDIT_STYLES[True if discharged else None]
         )
         where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
-        lines.append(Text("  ").append(state).append(f": {text} ({reason}){where}"))
-    return lines
+        lines.append((state, f"{text} ({reason}){where}"))
+    return _indented("Conditions of the proofs (domain: moments of inertia > 0, and `assume`)", lines)

@@ -186,7 +186,7 @@ class Growth(Kind):
             notes.append("Rate: the median over the starts of their finite-time rates.")
         lacking = dict.fromkeys(row.key.subject.name for row in rows if NOT_CARRIED.items() <= row.flags.items())
         notes += [f"No attitude, which it does not carry: {', '.join(lacking)}."] if lacking else []
-        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+        columns = ["case", "format", "quantity", "starts", "law", "exponent or rate [95 %]", "detects"]
         columns.append("lost at |t|")
         title = "Growth laws: root mean square over the starts, of drifts of first integrals and errors"
         cells = [_cells(row, law) for row in rows for law in row.laws.values()]

@@ -224,4 +224,4 @@ def _said(factor: _Factor, number: Fraction) -> str:
         return f"{factor.text} is left out"
     if number == -1:
         return f"{factor.text} has the other sign"
-    return f"{factor.text} is {plain_decimal(number, 8)} times what it is"
+    return f"{factor.text} is {plain_decimal(number, 8)} times what it should be"

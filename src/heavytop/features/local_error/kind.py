@@ -198,7 +198,7 @@ def _order(row: Row) -> str:
     order, known = runs or single, bool(runs) or not is_third_party(row.key.subject.name)
     if not order:
         return ""
-    steps = "" if known else " in single steps"
+    steps = " in whole runs" if runs else "" if known else " in single steps"
     text = f"order {order}{steps}"
     if order == str(row.order):
         text = f"order {order} confirmed{steps}"

@@ -37,7 +37,11 @@ PathLike = str | os.PathLike[str]
 # Arrays of quaternions, matrices, Euler angles, positions and Ω in any axes, checked for :func:`heavytop.score`.
 
 
-_SHAPES = {"quaternion": "(n, 4)", "matrix": "(n, 3, 3)"}
+_SHAPES = {
+    "quaternion": "(n, 4)",
+    "matrix": "(n, 3, 3)",
+    "states": "(n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3",
+}
 
 
 def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[str, list[list[Any]]]:
@@ -45,7 +49,7 @@ def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[s
 
     Raises InputError for another shape, and for what is given twice.
     """
-    rows_by_name = {name: _observed_rows(values, name) for name, values in arrays.items() if values is not None}
+    rows_by_name = {name: _rows(values, name) for name, values in arrays.items() if values is not None}
     if states is not None:
         for name, part in (("omega", slice(0, 3)), ("gamma", slice(3, 6))):
             if name in rows_by_name:
@@ -56,15 +60,15 @@ def columns(arrays: Mapping[str, Any], states: list[list[Any]] | None) -> dict[s
     return {name: rows_by_name[name] for name in WIDTHS if name in rows_by_name}
 
 
-def _observed_rows(values: Any, name: str) -> list[list[Any]]:
+def _rows(values: Any, name: str) -> list[list[Any]]:
     remedy = f"Give an array of shape {_SHAPES.get(name, '(n, 3)')}."
     rows = []
     for i, row in enumerate(ordered(values, name, remedy)):
         numbers = ordered(row, f"{name}[{i}]", remedy)
         if name == "matrix" and len(numbers) == 3:
             numbers = [value for part in numbers for value in ordered(part, f"{name}[{i}]", remedy)]
-        if len(numbers) != WIDTHS[name]:
-            raise InputError(f"{name}[{i}] has {len(numbers)} numbers, not {WIDTHS[name]}.", remedy)
+        if len(numbers) != (width := WIDTHS.get(name, 6)):
+            raise InputError(f"{name}[{i}] has {len(numbers)} numbers, not {width}.", remedy)
         rows.append(numbers)
     return rows
 
@@ -80,7 +84,6 @@ _LABELS = {
     "position_relative": "error of the position, relative",
 }
 _HEADER = ("", "largest", "rms", "final")
-_STATES = "Give an array of shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3."
 
 
 class Summary(NamedTuple):
@@ -246,12 +249,12 @@ def score(
             "euler": euler,
             "position": positions,
         },
-        None if states is None else _rows(states),
+        None if states is None else _rows(states, "states"),
     )
     state = arguments.is_a(start, State, "start")
     if states is not None and set(arrays) == {"omega", "gamma"} and isinstance(body, HeavyTop) and not state.attitude:
         _, state = arguments.motion(body, state)
-        return scored(of_arrays(body, state, about, instants, _rows(states), form, *names), needed)
+        return scored(of_arrays(body, state, about, instants, _rows(states, "states"), form, *names), needed)
     words = {"quaternion_order": quaternion_order, "quaternion": quaternion, "matrix": matrix, "angles": angles}
     words |= {"sequence": sequence, "up": up}
     words = {word: arguments.text(value, word) for word, value in words.items()} | {"sequence": sequence.upper()}
@@ -349,18 +352,6 @@ def drift(run: Trajectory) -> Drifts:
     for time, state, xi in zip(run.times, computed.states, beside, strict=True):
         measure(time, [*state, *xi])
     return Drifts(_summaries(measure.metrics(), DRIFT))
-
-
-def _rows(states: Any) -> list[list[Any]]:
-    """The states as rows of six; raises InputError that says the shape."""
-    shape = getattr(states, "shape", None)
-    if shape is not None and (len(shape) != 2 or shape[1] != 6):
-        raise InputError(f"states has the shape {tuple(shape)}.", _STATES)
-    rows = [ordered(row, f"states[{i}]", _STATES) for i, row in enumerate(ordered(states, "states", _STATES))]
-    for i, row in enumerate(rows):
-        if len(row) != 6:
-            raise InputError(f"states[{i}] has {len(row)} numbers.", _STATES)
-    return rows
 
 
 def _summaries(metrics: dict[str, Metric], name: str) -> dict[str, Summary]:

@@ -13,7 +13,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.errors import HeavyTopError, InputError
+from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.diagnosis import diagnose, rounded
 from heavytop.features.score.diagnose.readings import Seen, disagreement
@@ -70,12 +70,6 @@ def exact_problem(trajectory: GivenTrajectory) -> Problem:
     return Problem(trajectory.system, trajectory.precision, parameters, posed.start, xi, (posed.top, posed.start))
 
 
-def observed_of(trajectory: GivenTrajectory) -> Observed:
-    """The columns that the trajectory gives."""
-    assert trajectory.observed is not None
-    return trajectory.observed
-
-
 @dataclass(frozen=True, slots=True)
 class Scored:
     """A scored trajectory: its row, what measured it, and the relative error of each sample with a reference."""
@@ -88,7 +82,7 @@ class Scored:
 
 def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence[float]) -> list[Diagnosis]:
     """Explanations of the error: the digits written, lengths off 1, a convention, or another mistake."""
-    about: dict[str, Any] = {"step": _step(trajectory)}
+    about: dict[str, Any] = {"step": trajectory.step}
     count = len(_finite(trajectory))
     times, states = trajectory.times[:count], _finite(trajectory)
     said: list[Diagnosis] = []
@@ -162,9 +156,8 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
     return said
 
 
-def used(trajectory: GivenTrajectory) -> str:
+def used(observed: Observed) -> str:
     """Which columns were scored, and how they were read."""
-    observed = observed_of(trajectory)
     said, parts = observed.said, []
     for name in observed.names:
         text = _WORDS[name]
@@ -248,18 +241,9 @@ def _is_number(metric: Metric) -> bool:
     return metric.log10 is not None or metric.value == "0"
 
 
-def _step(trajectory: GivenTrajectory) -> Fraction | None:
-    """The step of the method, where the file says it in a number."""
-    try:
-        step = exact(trajectory.flags.get("step", "0"))
-    except InputError:
-        return None
-    return step if step > 0 else None
-
-
 def _on_multiples(trajectory: GivenTrajectory) -> GivenTrajectory | None:
     """The trajectory at multiples of its step, where its times are all but these; None where they are, or are not."""
-    step = _step(trajectory)
+    step = trajectory.step
     if step is None:
         return None
     times = [round(time / step) * step for time in trajectory.times]
@@ -271,28 +255,19 @@ def _on_multiples(trajectory: GivenTrajectory) -> GivenTrajectory | None:
     return None if same or not increasing or max(off) > _CLOCK * step else replace(trajectory, times=times)
 
 
-def score(trajectory: GivenTrajectory) -> Row:
-    """The row of a trajectory: drift of every integral that holds, and distance from the known motion.
-
-    The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
-    the first that is not finite on are not scored; the outcome says so.
-    """
-    return _measured(trajectory).row
-
-
 def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Assessment:
-    """The row of :func:`score`, heyoka beside it, and what explains the error.
+    """The row of :func:`measured`, heyoka beside it, and what explains the error.
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
-    scored = _measured(trajectory, progress)
+    scored = measured(trajectory, progress)
     count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
     explained = scored if told is None else told[1]
     said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
     written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
     single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
-    columns = "" if trajectory.observed is None else used(trajectory)
+    columns = "" if trajectory.observed is None else used(trajectory.observed)
     clock = [] if told is None else [told[0]]
     return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns)
 
@@ -302,7 +277,7 @@ def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored,
     exactly = _on_multiples(trajectory)
     if exactly is None:
         return None
-    scored = _measured(exactly)
+    scored = measured(exactly)
     kept, with_exact = digits_kept(row), digits_kept(scored.row)
     if kept is None or with_exact is None or with_exact < kept + _NOTICED:
         return None
@@ -311,14 +286,14 @@ def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored,
     return Diagnosis("clock", numbers, _size(row), _size(scored.row)), scored, exactly
 
 
-def _measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
-    """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes."""
+def measured(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> Scored:
+    """The row, what made it, and the error of each sample relative to the size of Ω and γ where the reference goes.
+
+    The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
+    the first that is not finite on are not scored; the outcome says so.
+    """
     observed, rate = trajectory.observed, turning_rate(trajectory.top, trajectory.start)
-    problem = (
-        Problem.of(trajectory.top, trajectory.start, trajectory.precision, trajectory.system)
-        if observed is None
-        else exact_problem(trajectory)
-    )
+    problem = exact_problem(trajectory)
     times = [round_to(time, trajectory.precision.bits) for time in trajectory.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
     known = truth(problem, times, _REFERENCE_EFFORT)

@@ -16,7 +16,7 @@ from typing import Any
 from heavytop.errors import ExitCode, InputError
 from heavytop.features.score.api import Score, read_trajectory, scored
 from heavytop.measure.scalar import RELATIVE, digits_text
-from heavytop.precision import DOUBLE, exact, exact_text
+from heavytop.precision import DOUBLE, exact_text
 from heavytop.processes import ChildContext
 from heavytop.report.document.document import clip
 
@@ -73,16 +73,8 @@ def _scored_file(path: str, case: str | None, require: str | None, normalize: bo
     document = {"file": path, **score.to_json()}
     digits = "-" if score.digits_kept is None else digits_text(score.digits_kept)
     said = "; ".join(diagnosis.kind for diagnosis in score.assessment.diagnoses)
-    return ScoredFile(
-        path, document, score.exit_code, digits, said, (motion.integrator, *body), _step(motion.flags), _error(score)
-    )
-
-
-def _step(flags: dict[str, str]) -> Fraction:
-    try:
-        return max(exact(flags.get("step", "0")), Fraction(0))
-    except InputError:
-        return Fraction(0)
+    method, step = (motion.integrator, *body), motion.step or Fraction(0)
+    return ScoredFile(path, document, score.exit_code, digits, said, method, step, _error(score))
 
 
 def _error(score: Score) -> float | None:

@@ -47,7 +47,17 @@ from heavytop.report.render.text import table, wrapped
 # Mistakes of convention in a sentence each: what fits, where it was found, and how many digits are right with it.
 
 
+_MEANINGS = {
+    "gamma_down": ("γ points down", ": with −γ they fit"),
+    "omega_reversed": ("Ω has the other sign", ": with −Ω they fit"),
+    "both_reversed": ("Ω and γ both have the other sign", ": with −Ω and −γ they fit"),
+    "omega_in_degrees": ("Ω is in degrees per time unit", ", not in radians"),
+    "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
+    "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
+}
+"""Meanings of the columns, and how they fit."""
 _CONVENTION_SENTENCES = {
+    **{kind: "".join(_MEANINGS[kind]) for kind in _MEANINGS if "_in_" in kind},
     "scalar_last": "The quaternions have their scalar part in the other place: quaternion_order = {quaternion_order}",
     "conjugate": "The quaternions are conjugate: quaternion = {quaternion}",
     "scalar_last_conjugate": "The quaternions are conjugate and have their scalar part in the other place",
@@ -58,9 +68,6 @@ _CONVENTION_SENTENCES = {
     "angles_negated": "The Euler angles have the other sign",
     "angles_of_inverse": "The Euler angles are those of the inverse rotation, from space to body",
     "omega_frame": "Ω is in the axes of {frame}: {key}",
-    "omega_in_degrees": "Ω is in degrees per time unit, not in radians",
-    "omega_in_turns": "Ω is in turns per time unit, not in radians",
-    "omega_in_rpm": "Ω is in turns per 60 time units (rpm where times are in s), not in radians",
     "omega_reversed": "Ω has the other sign",
     "omega_scaled": "Ω is {factor} times what fits",
     "momentum": "The columns of Ω are the angular momentum M = I Ω",
@@ -157,15 +164,6 @@ def _mistake(fit: Diagnosis) -> str:
 # What explains the error of a motion, in a sentence each.
 
 
-_MEANINGS = {
-    "gamma_down": ("γ points down", ": with −γ they fit"),
-    "omega_reversed": ("Ω has the other sign", ": with −Ω they fit"),
-    "both_reversed": ("Ω and γ both have the other sign", ": with −Ω and −γ they fit"),
-    "omega_in_degrees": ("Ω is in degrees per time unit", ", not in radians"),
-    "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
-    "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
-}
-"""Meanings of the columns, and how they fit."""
 _SENTENCES = {
     "no_gravity": "The states fit a motion without gravity, P = 0",
     "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",

@@ -23,7 +23,7 @@ _NAMES = {
     "error_omega": "error of Ω",
     "error_gamma": "error of γ",
     "error_scaled": "error in eps T^1.5",
-    "drift_gamma_squared": "drift of γ²",
+    "drift_gamma_squared": "drift of |γ|²",
     "drift_area": "drift of M·γ",
     "drift_energy": "drift of the energy",
     "drift_further": "drift of further integrals",

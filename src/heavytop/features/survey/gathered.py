@@ -72,9 +72,9 @@ def _writer(where: Any, schema: Any) -> Any:
 
 def read_chunk(content: bytes) -> Any:
     """The table of :func:`chunk_bytes`."""
-    from pyarrow.parquet import read_table
+    from pyarrow.parquet import ParquetFile
 
-    return read_table(io.BytesIO(content))
+    return ParquetFile(io.BytesIO(content)).read(use_threads=False)
 
 
 def write(path: Path, chunks: Iterable[bytes]) -> None:

@@ -120,7 +120,7 @@ class Lead:
 
     @property
     def ratio(self) -> float | None:
-        """How many times faster heyoka is."""
+        """How many times as fast heyoka is."""
         return self._ratio(self.ours)
 
     def _ratio(self, seconds: float | None) -> float | None:
@@ -154,7 +154,7 @@ class Lead:
             parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
         else:
             pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
-            parts = [f"{goal} is {_speed(self.ratio)} than the best other integrator, {self.other} ({pair})"]
+            parts = [f"{goal} is {_speed(self.ratio)} as the best other integrator, {self.other} ({pair})"]
         if self.general is not None:
             parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
         if self.lanes is not None:
@@ -229,7 +229,7 @@ def beside_ours(rows: Sequence[Row]) -> list[Table]:
                     if (curve.integrator, curve.precision) == (OURS, line.precision)
                 ]
                 cells += [_point(line, point, ours)[: 3 + beside] for point in line.points]
-                cells += [] if line.order is None else [["order seen", line.order_text, "", ""][: 3 + beside]]
+                cells += [] if line.order is None else [["order, finest two", line.order_text, "", ""][: 3 + beside]]
             columns = [f"{name}, {case}", "error", "time", "heyoka's time"][: 3 + beside]
             tables.append(Table("", columns, cells, shown=In.SHORT))
     return tables
@@ -287,7 +287,7 @@ def _quickest(lines: Sequence[WorkPrecisionLine], log10: float) -> tuple[float |
 
 
 def _speed(ratio: float) -> str:
-    return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
+    return f"{ratio:.{1 if ratio >= 1 else 2}f} × as fast"
 
 
 def seconds_text(seconds: float, digits: int = 3) -> str:

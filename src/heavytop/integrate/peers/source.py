@@ -11,10 +11,11 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, NoSuchFunction, PeerFailed, meant
 from heavytop.integrate.peers.contract import contained, quiet, said
 
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
@@ -40,12 +41,14 @@ class PythonFile:
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror}.", "Give FILE.py:FUNCTION.") from None
         module: Any = _module(path, (status.st_mtime_ns, status.st_size))
-        for part in self.function.split("."):
-            try:
-                module = getattr(module, part)
-            except AttributeError:
-                raise InputError(f"{self.path} has no {self.function}.", "Give FILE.py:FUNCTION.") from None
-        return as_peer(module, self.name)
+        try:
+            call = attrgetter(self.function)(module)
+        except AttributeError:
+            functions = (item for item in vars(module).values() if inspect.isfunction(item))
+            own = [item.__name__ for item in functions if item.__module__ == module.__name__]
+            remedy = f"{meant(self.function, own)}It has {', '.join(own) or 'no function'}."
+            raise NoSuchFunction(f"{self.path} has no {self.function}.", remedy) from None
+        return as_peer(call, self.name)
 
 
 @dataclass(frozen=True, slots=True)

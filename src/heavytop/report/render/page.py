@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterable, Sequence
 from itertools import islice, takewhile
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from markupsafe import Markup, escape
@@ -227,14 +228,14 @@ def quantities(changed: Change) -> list[list[Cell]]:
 
 def commands(report: Report) -> list[str]:
     """How to make the report again, as far as the report knows."""
-    name = report.plan.get("name", "")
+    plan = {"file": report.plan["name"]} if report.plan.get("name", "") in BUILT_IN else report.plan
     version = report.environment.get("packages", {}).get("heavytop", "")
     commit = str(report.environment.get("commit") or "").removesuffix("-dirty")
     lines = [f"git checkout {clip(commit)}"] if commit else [f"# heavytop {clip(str(version))}"]
     lines += [
         "python3 -m venv .venv && .venv/bin/pip install --require-hashes -r constraints/run.txt",
         ".venv/bin/pip install --no-deps --no-build-isolation .",
-        f".venv/bin/heavytop run --plan {name if name in BUILT_IN else 'FILE.toml'} --out again",
+        f".venv/bin/heavytop run --plan {quote(clip(plan.get('file', 'FILE.toml')))} --out again",
         ".venv/bin/heavytop compare report.json again",
     ]
     return lines

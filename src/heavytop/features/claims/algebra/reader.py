@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, TypeVar
 import sympy
 from flint import arb, fmpq
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.features.claims.algebra import structure
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.features.claims.algebra.elliptic import FORMULAS
@@ -173,7 +173,7 @@ class _Parser(Descent):
 
     def __init__(self, text: str, names: Mapping[str, Formula], where: str) -> None:
         self._names = names
-        self._where = where
+        self._where = f"{where} = {quoted(text)}"
         super().__init__(text)
 
     def _no_token(self, text: str) -> InputError:
@@ -256,7 +256,7 @@ class _Parser(Descent):
         if token[:1].isalpha():
             is_call = token in FUNCTIONS and (token not in self._names or self._next() == "(")
             return self._function(token) if is_call else self._name(token)
-        raise self._error(f"a number, a name or '(' expected, not {token[:20]!r}")
+        raise self._error(f"a number, a name or '(' expected{f', not {token[:20]!r}' if token else ' at its end'}")
 
     def _number(self, token: str) -> Formula:
         exponent = re.search(r"[eE]([+-]?\d+)$", token)

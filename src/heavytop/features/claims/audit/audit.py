@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, invalid, prefixed
+from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
@@ -26,7 +26,7 @@ from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, Sta
 from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
-from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, split
+from heavytop.features.claims.library.entry import FOLDER, Entry, Verdict, file_of, library, split
 from heavytop.files import cache_folder
 from heavytop.guard import processors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System, system
@@ -91,7 +91,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)
-    return made(content)
+    with prefixed(where):
+        return made(content)
 
 
 def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
@@ -129,7 +130,7 @@ def _path(name: str) -> Path:
     chosen = file_of(name)
     if chosen is None:
         remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
-        raise InputError(f"Unknown claim {name[:60]!r}.", remedy)
+        raise InputError(f"Unknown claim {name[:60]!r}.", meant(name, [*PAPER, *library()]) + remedy)
     return chosen
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.features.score.diagnose.hypotheses import UNITS_OF_OMEGA, other_axes
+from heavytop.features.score.diagnose.hypotheses import FALLS, UNITS_OF_OMEGA, other_axes
 from heavytop.features.score.diagnose.readings import (
     Beginning,
     BodyData,
@@ -45,6 +45,7 @@ from heavytop.features.score.diagnose.samples import (
     named,
     notable,
     principal,
+    refused,
 )
 from heavytop.measure.attitude_error import FORMS
 from heavytop.precision import decimal_text, plain_decimal
@@ -61,8 +62,6 @@ _CONTRADICTS = 0.1
 AS_LIKELY = 3.0
 """Of likely suppositions whose errors differ by less, the simplest is named."""
 _REFINED = 4
-_ANISOTROPY = 3.0
-"""Factor by which M may grow more than Ω."""
 _NO_SHIFT = Fraction(0)
 _FEWEST = 4
 """Samples to which the six numbers of a start, or one of the body, are fitted."""
@@ -119,29 +118,17 @@ class _Try:
         return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
 
 
-class _Courses:
-    """The motions that were computed, by what they follow from."""
-
-    def __init__(self, seen: Seen) -> None:
-        self.seen = seen
-        self.made: dict[tuple[bytes, ...], Course | None] = {}
-
-    def of(
-        self,
-        start: Reading | None = None,
-        body: BodyData | None = None,
-        shift: Fraction = _NO_SHIFT,
-        begin: Beginning | None = None,
-    ) -> Course | None:
-        seen = self.seen
-        which = body or seen.body
-        begin = begin or seen.start.begin(start or seen.said, which.tensor)
-        data = numpy.array([which.force])
-        parts = (which.tensor, which.centre, data, begin.rotation, begin.omega)
-        key = (str(shift).encode(), *(part.tobytes() for part in parts))
-        if key not in self.made:
-            self.made[key] = simulate(which, begin, [time + shift for time in seen.times])
-        return self.made[key]
+def _course(
+    seen: Seen,
+    start: Reading | None = None,
+    body: BodyData | None = None,
+    shift: Fraction = _NO_SHIFT,
+    begin: Beginning | None = None,
+) -> Course | None:
+    """The motion of the file with another reading of its start, another body, other times, another start."""
+    body = body or seen.body
+    begin = begin or seen.start.begin(start or seen.said, body.tensor)
+    return simulate(body, begin, tuple(float(time + shift if shift else time) for time in seen.times))
 
 
 class Suppositions:
@@ -154,10 +141,9 @@ class Suppositions:
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         rate = turning(seen.body, self.start)
         self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
-        self.courses = _Courses(self.seen)
         first = FIRST[-1] + (not self.seen.times[0])
-        self.early = _Courses(self.seen.at(list(range(min(len(self.seen.times), first)))))
-        self.own = errors(self.seen, self.courses.of(), seen.said, seen.body)
+        self.early = self.seen.at(list(range(min(len(self.seen.times), first))))
+        self.own = errors(self.seen, _course(self.seen), seen.said, seen.body)
         self.tried: list[tuple[_Try, Array]] = []
 
     def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
@@ -207,33 +193,29 @@ class Suppositions:
         return Diagnosis(kind, numbers, own, left, until)
 
     @cached_property
-    def _refused(self) -> float:
-        """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω."""
-        largest = [
-            max(float(numpy.abs(values).max()) for name, values in seen.columns.items() if name.startswith("omega"))
-            if {"omega", "omega_space"} & seen.columns.keys()
-            else 1.0
-            for seen in (self.early.seen, self.seen)
+    def refused(self) -> float:
+        """The error of the first samples beyond which a motion explains nothing."""
+        rates = [
+            [v for name, v in seen.columns.items() if name.startswith("omega")] for seen in (self.early, self.seen)
         ]
-        own = float(self.own.max())
-        growth = _ANISOTROPY * largest[1] / largest[0] if largest[0] else numpy.inf
-        return growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP
+        early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
+        return refused(early, largest, float(self.own.max()))
 
     def _left(self, attempt: _Try) -> Array:
         """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
         if attempt.start is not None or attempt.body is not None or attempt.shift or attempt.begin is not None:
             early = self._error(attempt, self.early)
-            if not float(early.max()) <= self._refused:
+            if not float(early.max()) <= self.refused:
                 return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
-        return self._error(attempt, self.courses)
+        return self._error(attempt, self.seen)
 
     @staticmethod
-    def _error(attempt: _Try, courses: _Courses) -> Array:
-        seen, body = courses.seen, attempt.body or courses.seen.body
-        course = courses.of(attempt.start, body, attempt.shift, attempt.begin)
+    def _error(attempt: _Try, seen: Seen) -> Array:
+        body, plain = attempt.body or seen.body, _course(seen) if attempt.rates else None
+        course = _course(seen, attempt.start, body, attempt.shift, attempt.begin)
         if attempt.body is not None and seen.point is seen.body.centre:
             seen = replace(seen, point=body.centre)
-        if attempt.rates and course is not None and (plain := courses.of()) is not None:
+        if course is not None and plain is not None:
             in_body = numpy.einsum("nji,nj->ni", plain.rotation, course.omega_space)
             course = Course(plain.rotation, in_body if "omega_space" in seen.columns else course.omega)
         if attempt.still:
@@ -283,7 +265,7 @@ def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:
     yield from _positions(seen)
     yield from _renamed(seen)
     yield from _columns(seen)
-    course = suppositions.courses.of()
+    course = _course(seen)
     if course is not None:
         yield from _fitted(seen, course)
         yield from _early_rates(suppositions, course)
@@ -347,7 +329,7 @@ def _data(suppositions: Suppositions) -> Iterator[_Try]:
             scaled: dict[str, Any] = {key: getattr(seen.body, key) * (1.0 + part * x[0])}
             return replace(seen.body, **scaled), begin
 
-        x, left = _refined(suppositions, body_of, 1)
+        x, left = _refined(suppositions, body_of, 1, DROP)
         factor = named(1.0 + float(x[0]), max(AS_LIKELY * left, _SAME)) if abs(x[0]) < numpy.inf else Fraction(1)
         if notable(factor, Fraction(1)):
             body, _ = body_of(numpy.array([float(factor) - 1]))
@@ -364,7 +346,7 @@ def _start(suppositions: Suppositions) -> Iterator[_Try]:
     def start_of(x: Array) -> tuple[BodyData, Beginning]:
         return seen.body, Beginning(begin.rotation @ _turn(x[:3]), begin.omega + size * x[3:])
 
-    x, _ = _refined(suppositions, start_of, 6)
+    x, _ = _refined(suppositions, start_of, 6, _START_DROP)
     if _SAME < (off := float(numpy.abs(x).max())) < numpy.inf:
         elsewhere = start_of(x)[1]
         numbers = {"angle": _angle(_turn(x[:3])), "omega": _list(elsewhere.omega)}
@@ -385,15 +367,18 @@ def _scalable(body: BodyData) -> Iterator[tuple[str, dict[str, str], str, Any]]:
             yield "top", {"number": f"Number {i + 1} of the centre"}, "centre", unit
 
 
-def _refined(suppositions: Suppositions, move: Move, count: int) -> tuple[Array, float]:
-    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves."""
-    x, here = numpy.zeros(count), numpy.zeros(1)
-    for courses in (suppositions.early, suppositions.courses):
-        seen = courses.seen
+def _refined(suppositions: Suppositions, move: Move, count: int, drop: float) -> tuple[Array, float]:
+    """The numbers that fit best, as far as each step of Gauss-Newton makes the error smaller, and what it leaves.
 
-        def off(x: Array, courses: _Courses = courses, seen: Seen = seen) -> Array:
+    drop: how far the error must fall at least; numbers that do not do that to the first samples are refined no more.
+    """
+    refused = suppositions.refused * LIKELY_DROP / drop
+    x, here = numpy.zeros(count), numpy.zeros(1)
+    for seen in (suppositions.early, suppositions.seen):
+
+        def off(x: Array, seen: Seen = seen) -> Array:
             body, begin = move(x)
-            course = courses.of(body=body, begin=begin)
+            course = _course(seen, body=body, begin=begin)
             return numpy.full(1, numpy.inf) if course is None else residuals(seen, course, seen.said, body)
 
         here = off(x)
@@ -405,7 +390,11 @@ def _refined(suppositions: Suppositions, move: Move, count: int) -> tuple[Array,
             there = off(after)
             if not float(there @ there) < float(here @ here):
                 break
-            x, here = after, there
+            falls, x, here = float(here @ here) > FALLS * float(there @ there), after, there
+            if not falls:
+                break  # at the least of it
+        if float(numpy.linalg.norm(here)) > refused * len(here) ** 0.5:
+            break
     return x, float(numpy.abs(here).max())
 
 
@@ -424,7 +413,7 @@ def _early_rates(suppositions: Suppositions, course: Course) -> Iterator[_Try]:
     values = seen.said.vectors(seen.columns[name], True) if name == "omega_space" else seen.columns[name]
     shift = Fraction(0)
     for _ in range(_REFINED):
-        here, there = (suppositions.courses.of(shift=at) for at in (shift, shift + small))
+        here, there = (_course(seen, shift=at) for at in (shift, shift + small))
         if here is None or there is None:
             return
         at_shift, later = (getattr(rates, name) for rates in (here, there))
@@ -589,7 +578,7 @@ def _positions(seen: Seen) -> Iterator[_Try]:
         yield _Try("position_unit", {"factor": name}, replace(said, scale=factor))
         yield _Try("position_unit", {"factor": name}, replace(said, scale=factor, displaced=True))
     if seen.body.centre.any() and not numpy.array_equal(seen.point, seen.body.centre):
-        yield _Try("position_of_centre", columns=replace(said, point=_triple(seen.body.centre)))
+        yield _Try("position_of_centre", columns=replace(said, point=tuple(seen.body.centre)))
 
 
 def _renamed(seen: Seen) -> Iterator[_Try]:
@@ -615,10 +604,6 @@ def _square(matrix: Array) -> Square:
     return tuple(map(tuple, matrix.tolist()))
 
 
-def _triple(vector: Array) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])
-
-
 def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
     """Constant rotations of space and body axes, another point, another place of the pivot, factors."""
     if len(seen.times) < 3:
@@ -636,12 +621,12 @@ def _fitted(seen: Seen, course: Course) -> Iterator[_Try]:
             "position_unit", "factor", float((positions * true).sum()) / size, lambda value: replace(said, scale=value)
         )
     offset = (positions - true).mean(axis=0)
-    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=_triple(offset)), drop=FITTED_DROP)
+    yield _Try("pivot", {"offset": _list(offset)}, replace(said, offset=tuple(offset)), drop=FITTED_DROP)
     own = numpy.einsum("nji,nj->ni", course.rotation, positions).mean(axis=0)
-    yield _Try("point", {"point": _list(own)}, replace(said, point=_triple(own)), drop=FITTED_DROP)
+    yield _Try("point", {"point": _list(own)}, replace(said, point=tuple(own)), drop=FITTED_DROP)
     both = _point_and_offset(course, positions)
     if both is not None:
-        reading = replace(said, point=_triple(both[:3]), offset=_triple(both[3:]))
+        reading = replace(said, point=tuple(both[:3]), offset=tuple(both[3:]))
         numbers = {"point": _list(both[:3]), "offset": _list(both[3:])}
         yield _Try("point_and_pivot", numbers, reading, drop=FITTED_DROP)
 

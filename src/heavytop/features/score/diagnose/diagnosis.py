@@ -179,6 +179,7 @@ def _tried(examined: Examined, first: int | None) -> _Tried:
     examined = examined if first is None else examined.at(examined.rows[: first + (not examined.times[0])])
     truth = examined.supposed(examined.times)
     error = _TOO_FAR if truth is None else examined.error(truth)
+    examined = examined.refusing(error)
     tried = [*_hypotheses(examined, truth, first is None)] if error > WORTH_ASKING else []
     return _Tried(examined, truth, error, tried, first is None)
 

@@ -210,7 +210,7 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     k = top.rotor or (Fraction(0),) * 3
     momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
     yield _tried(run, "start_momentum", start=momentum)
-    yield _as_momentum(run, momentum)
+    yield Hypothesis("all_momentum", {}, _restated(run, momentum, lambda omega: omega @ run.tensor + run.in_file(k)))
     for unit, factor in UNITS_OF_OMEGA.items():
         yield Hypothesis(f"all_in_{unit}", {}, _all_times(run, factor))
     other = GYROSTAT if run.system is HEAVY_TOP else HEAVY_TOP
@@ -221,7 +221,7 @@ def without_numbers(run: Examined) -> Iterator[Hypothesis]:
     for kind, numbers, *body in other_axes(*own):
         if not all(map(numpy.array_equal, body, own)):
             supposed = run.with_body(body[0], float(top.weight) * body[1], body[2])
-            yield Hypothesis(kind, numbers, supposed.error(supposed.supposed(run.times)))
+            yield Hypothesis(kind, numbers, supposed.left())
 
 
 def other_axes(tensor: Array, centre: Array, rotor: Array) -> Iterator[tuple[str, dict[str, str], Array, Array, Array]]:
@@ -242,22 +242,19 @@ def _tried(run: Examined, kind: str, top: HeavyTop | None = None, start: State |
     same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "rotor"))
     if same and (start is None or start == run.start) and kind != "system":
         return Hypothesis(kind, {}, float("inf"))
-    return Hypothesis(kind, {}, run.error(run.supposed(run.times, top, start)))
+    return Hypothesis(kind, {}, run.left(top, start))
 
 
-def _as_momentum(run: Examined, start: State) -> Hypothesis:
-    """Start and states give M in place of Ω."""
+def _restated(run: Examined, start: State, omega: Callable[[Array], Array]) -> float:
+    """The error where the start is another, and the states give something else in place of Ω."""
     truth = run.supposed(run.times, start=start)
-    if truth is not None:
-        truth[:, :3] = truth[:, :3] @ run.tensor + run.in_file(run.top.rotor or (Fraction(0),) * 3)
-    return Hypothesis("all_momentum", {}, run.error(truth))
+    return run.error(None if truth is None else numpy.hstack([omega(truth[:, :3]), truth[:, 3:]]))
 
 
 def _all_times(run: Examined, factor: float) -> float:
     """The error where start and states give Ω times ``factor``."""
     start = State([w / Fraction(factor) for w in run.start.omega], run.start.gamma)
-    truth = run.supposed(run.times, start=start)
-    return run.error(None if truth is None else truth * ([factor] * 3 + [1.0] * (truth.shape[1] - 3)))
+    return _restated(run, start, lambda omega: omega * factor)
 
 
 def all_scaled(run: Examined) -> Hypothesis | None:
@@ -295,7 +292,7 @@ def another_weight(run: Examined) -> Hypothesis | None:
     fitted = ratio * float(old)
     candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
     tops = [(weight, replace(run.top, weight=weight)) for weight in candidates]
-    weight, error = _roundest([(weight, run.error(run.supposed(run.times, top))) for weight, top in tops])
+    weight, error = _roundest([(weight, run.left(top)) for weight, top in tops])
     if not notable(weight, old):
         return None
     return Hypothesis("weight", {"P": _text(weight * run.units.moment)}, error, FITTED_DROP)
@@ -315,7 +312,7 @@ def another_start(run: Examined) -> Hypothesis | None:
     if back is None or truth is None or not _shows_at_once(run, truth):
         return None
     start = run.in_file(run.start.flat)
-    error = run.error(run.starting(back[0]).supposed(times))
+    error = run.starting(back[0]).left()
     off = numpy.abs(back[0, :6] - start)
     magnified = float(numpy.abs(run.states[0] - truth[0]).max() / (off.max() or 1.0))
     sizes = [max(run.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
@@ -419,10 +416,9 @@ def _with(run: Examined, inertia: Sequence[Fraction], moment: Sequence[Fraction]
     for (i, j), value in zip(_PRODUCTS, floats(inertia), strict=False):
         tensor[i, j] = tensor[j, i] = value
     try:
-        supposed = run.with_body(tensor, floats(moment))
+        return run.with_body(tensor, floats(moment)).left()
     except InputError:  # a moment that is not positive
         return float("inf")
-    return supposed.error(supposed.supposed(run.times))
 
 
 _Numbers = TypeVar("_Numbers")
@@ -588,9 +584,7 @@ def _of_field(
     rotor = run.system.parameters(run.top, run.start).mapped(float).rotor
     axes = tuple(map(tuple, run.frame.axes.tolist()))
     other = replace(run, system=_altered(run.system, rotor, axes, changes, factor))
-    left = (
-        run.error(other.supposed(run.times)) if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
-    )
+    left = other.left() if _begins_so(other, max(early / LIKELY_DROP, _OF_STEPS)) else float("inf")
     return Hypothesis(kind, numbers, left, FITTED_DROP)
 
 
@@ -657,7 +651,7 @@ _WITHIN = 0.3
 """A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
 _TRIED = 12
 _REFINED = 6
-_FALLS = 1.5
+FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
@@ -680,7 +674,7 @@ def clock(run: Examined, fitted: bool) -> Hypothesis | None:
     hypotheses = list(_of_rows(run))
     for factor in sorted(_UNITS | {Fraction(value) for value in _CIRCLE}):
         if abs(float(factor * run.times[-1])) * run.rate <= FARTHEST:
-            error = run.error(run.supposed([factor * time for time in run.times]))
+            error = run.left(times=[factor * time for time in run.times])
             hypotheses.append(Hypothesis("time_unit", _unit_numbers(float(factor)), error))
     if fitted and len(run.rows) >= 3:
         hypotheses += _fitted(run)
@@ -702,7 +696,7 @@ def _of_rows(run: Examined) -> Iterator[Hypothesis]:
         tried.append(("rows_reversed", run, [every[-1 - row] for row in run.rows]))
         tried.append(("rows_off_by_one", *_neighbours(run, 1, 2 * every[-1] - every[-2])))
         tried.append(("rows_late", *_neighbours(run, -1, 2 * every[0] - every[1])))
-    yield from (Hypothesis(kind, {}, at.error(at.supposed(times))) for kind, at, times in tried)
+    yield from (Hypothesis(kind, {}, at.left(times=times)) for kind, at, times in tried)
 
 
 def _neighbours(run: Examined, off: int, beyond: Fraction) -> tuple[Examined, list[Fraction]]:
@@ -794,7 +788,7 @@ def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array
             return
         here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
         off = (run.states - here) / sizes
-        if not _FALLS * (size := float(numpy.nansum(off * off))) < before:
+        if not FALLS * (size := float(numpy.nansum(off * off))) < before:
             break  # at the least of it
         slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
         square = float((slope * slope)[~numpy.isnan(run.states)].sum())
@@ -803,4 +797,4 @@ def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array
         number += float(numpy.nansum(slope * off)) / square
         if not abs(_moved(kind, number, times)).max() * run.rate <= FARTHEST:
             return
-    yield number, run.error(run.supposed([Fraction(value) for value in _moved(kind, number, times)]))
+    yield number, run.left(times=[Fraction(value) for value in _moved(kind, number, times)])

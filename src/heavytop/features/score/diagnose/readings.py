@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from math import floor, isfinite, log10
 from types import SimpleNamespace
 
@@ -12,8 +13,9 @@ import numpy
 
 from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
 from heavytop.measure.attitude_error import UPS, Convention
+from heavytop.precision import cross
 from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
-from heavytop.top.bodies import Body
+from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -28,7 +30,7 @@ _LEAST = 1e-12
 """A principal moment below this part of the largest is not that of a body."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class BodyData:
     """A body as a file describes it, in its own axes.
 
@@ -49,20 +51,25 @@ class BodyData:
         """The weight."""
         return self.gravity * (1.0 if self.mass is None else self.mass)
 
-    @property
+    @cached_property
     def steiner(self) -> Array:
         """The term that moving the tensor from the centre of mass to the fixed point adds to it."""
         c = self.centre
         tensor: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
         return tensor
 
-    @property
+    @cached_property
     def tensor(self) -> Array:
         """About the fixed point."""
         return self.inertia + self.steiner if self.about_centre else self.inertia
 
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal moments about the fixed point, and axes as the columns of a rotation."""
+        return principal((self.tensor + self.tensor.T) / 2)
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, eq=False)
 class Beginning:
     """Where a motion begins: R in canonical axes of space, shape (3, 3), and Ω in body axes."""
 
@@ -91,14 +98,15 @@ def nearest_rotation(matrix: Array) -> Array:
     return rotation
 
 
-def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
+@lru_cache(maxsize=512)
+def simulate(body: BodyData, start: Beginning, times: tuple[float, ...]) -> Course | None:
     """The motion at ``times``; None for an invalid body, and where it cannot be computed."""
     tensor = body.tensor
     if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
         return None
     if not (numpy.isfinite(start.rotation).all() and numpy.isfinite(start.omega).all()):
         return None
-    moments, axes = principal((tensor + tensor.T) / 2)
+    moments, axes = body.principal
     if not moments[0] > _LEAST * moments.max() or moments.min() <= 0:
         return None
     rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
@@ -107,11 +115,11 @@ def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Cou
     system = HEAVY_GYROSTAT if len(whirl) else HEAVY_TOP
     numbers = numpy.concatenate([moments / size, moment / size / rate / rate, whirl])
     first = numpy.concatenate([omega / rate, rows[2], rows[0]])
-    values = motion_in_double(system, numbers, first, rate * floats(times))
+    values = motion_in_double(system, numbers, first, rate * numpy.array(times))
     if values is None:
         return None
     gamma, along = values[:, 3:6], values[:, 6:9]
-    rotation = numpy.stack([along, numpy.cross(gamma, along), gamma], axis=1) @ axes.T
+    rotation = numpy.stack([along, numpy.array(cross([*gamma.T], [*along.T])).T, gamma], axis=1) @ axes.T
     return Course(rotation, values[:, :3] @ axes.T * rate)
 
 
@@ -168,8 +176,8 @@ class Reading:
     pseudo: bool = True
     scale: float = 1.0
     displaced: bool = False
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    point: tuple[float, float, float] | None = None
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)
+    point: tuple[float, ...] | None = None
 
     @classmethod
     def of(cls, said: Convention) -> Reading:
@@ -245,7 +253,7 @@ def upright_vectors(vectors: Array, up: str) -> Array:
     return upright
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class GivenStart:
     """The start as it was given.
 
@@ -260,6 +268,13 @@ class GivenStart:
 
     def begin(self, reading: Reading, inertia: Array) -> Beginning:
         """Where the motion begins if the start is to be read so."""
+        begin = _as_read(self, reading)
+        if not reading.momentum:
+            return begin
+        return Beginning(begin.rotation, numpy.linalg.solve(inertia, begin.omega).astype(float))
+
+    def as_read(self, reading: Reading) -> Beginning:
+        """R and the columns of Ω in body axes, which may be M."""
         if self.form == "rows":
             rotation = self.values.reshape(3, 3)
             if reading.gamma < 0:
@@ -273,7 +288,10 @@ class GivenStart:
             omega = rotation.T @ reading.vectors(said, True)[0]
         else:
             omega = reading.body_vectors(said, True)[0]
-        return Beginning(rotation, numpy.linalg.solve(inertia, omega) if reading.momentum else omega)
+        return Beginning(rotation, omega)
+
+
+_as_read = lru_cache(maxsize=256)(GivenStart.as_read)
 
 
 @dataclass(frozen=True, slots=True)
@@ -405,7 +423,7 @@ def of_states(
     try:
         columns = numpy.array(states, dtype=float)
         omega, gamma, along = (floats(part or ()) for part in (start.omega, start.gamma, xi))
-        body = _data_of(top)
+        body = body_data(top)
     except OverflowError:
         return None
     if not len(columns) or not numpy.isfinite(columns).all():
@@ -423,11 +441,14 @@ def of_states(
     return Seen(tuple(times), split, body, reading, Reading(), body.centre, numpy.zeros(3))
 
 
-def _data_of(top: HeavyTop) -> BodyData:
-    """The body of a top; with a mass its tensor is about the centre of mass, as a program is given it."""
-    rotor = numpy.zeros(3) if top.rotor is None else floats(top.rotor)
-    body = None if top.mass is None else Body.realising(top)
-    if body is None:
-        return BodyData(numpy.diag(floats(top.inertia)), floats(top.centre), None, float(top.weight), False, rotor)
-    tensor = numpy.array([floats(row) for row in body.central])
-    return BodyData(tensor, floats(body.centre), float(body.mass), float(body.gravity), True, rotor)
+def body_data(body: HeavyTop | Body) -> BodyData:
+    """The body in double; of a top with a mass about its centre of mass, as a program is given it."""
+    rotor = None if body.rotor is None else floats(body.rotor)
+    realised = body if isinstance(body, Body) else None if body.mass is None else Body.realising(body)
+    if isinstance(body, HeavyTop) and realised is None:
+        return BodyData(numpy.diag(floats(body.inertia)), floats(body.centre), None, float(body.weight), rotor=rotor)
+    assert realised is not None
+    about_centre = realised is not body or realised.about == CENTRE
+    tensor = numpy.array([floats(row) for row in (realised.central if about_centre else realised.tensor)])
+    mass, gravity = float(realised.mass), float(realised.gravity)
+    return BodyData(tensor, floats(realised.centre), mass, gravity, about_centre, rotor)

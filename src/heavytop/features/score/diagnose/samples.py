@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from math import floor
 from typing import NamedTuple
 
@@ -60,6 +61,8 @@ FITTED_DROP = 1000.0
 """... by so much for one whose numbers were fitted; ..."""
 LIKELY_DROP = 30.0
 """... one without a free number by which it falls less is likely."""
+_ANISOTROPY = 3.0
+"""Factor by which M may grow more than Ω."""
 FIRST = (6, 2)
 """Of the samples away from t = 0, those judged by themselves: there a method of low order is off by little."""
 
@@ -128,6 +131,7 @@ class Examined:
     states: of these rows, shape (n, 6), in double, or (n, 9) with ξ where there is an attitude; nan where the file does
     not give a vector.
     units: everything is in these.  rate: radians per time unit, roughly, at which the motion turns.
+    refused: the error of the first samples beyond which a motion explains nothing.
     """
 
     top: HeavyTop
@@ -140,6 +144,7 @@ class Examined:
     rate: float
     units: Units
     frame: FileAxes
+    refused: float = float("inf")
 
     @property
     def times(self) -> list[Fraction]:
@@ -248,12 +253,41 @@ class Examined:
         errors: Array = numpy.fmax(*largest)
         return errors
 
+    def refusing(self, own: float) -> Examined:
+        """This motion, whose error is ``own``, with the error of its first samples that refuses another."""
+        omega = numpy.nan_to_num(numpy.abs(self.states[:, :3]), nan=1.0)
+        return replace(self, refused=refused(float(omega[: self._first].max()), float(omega.max()), own))
+
+    @property
+    def _first(self) -> int:
+        return FIRST[0] + (not self.times[0])
+
+    def left(
+        self, top: HeavyTop | None = None, start: State | None = None, times: Sequence[Fraction] | None = None
+    ) -> float:
+        """The error beside another top, start or other times; infinite where the first samples refuse that motion."""
+        times = self.times if times is None else times
+        for rows in (self.rows[: self._first], self.rows):
+            error = self.at(rows).error(self.supposed(times[: len(rows)], top, start))
+            if len(rows) < len(self.rows) and not error <= self.refused:
+                return float("inf")
+        return error
+
     def error(self, supposed: Array | None) -> float:
         """The largest of the errors; infinite for None."""
         if supposed is None:
             return float("inf")
         worst = float(self.errors(supposed).max())
         return worst if worst == worst else float("inf")
+
+
+def refused(early: float, largest: float, own: float) -> float:
+    """The error of the first samples beyond which a motion explains nothing, also relative to the largest Ω.
+
+    early, largest: |Ω| of the first samples and of all.  own: the error without a mistake.
+    """
+    growth = _ANISOTROPY * largest / early if early else numpy.inf
+    return float(growth * (own if numpy.isfinite(own) else 1.0) / LIKELY_DROP)
 
 
 def examined(
@@ -345,21 +379,25 @@ def motion(
 
 def motion_in_double(system: System, numbers: Array, first: Array, times: Array) -> Array | None:
     """:func:`motion` of the numbers that enter the field, of a start and of times in double."""
-    motion = numpy.tile(first, (len(times), 1))
+    known, wanted = _states_by_time(system, numbers.tobytes(), first.tobytes()), times.tolist()
     for sign in (1.0, -1.0):
-        rows = numpy.flatnonzero(sign * times > 0)
-        if not len(rows):
+        targets = sorted({time for time in wanted if sign * time > 0 and time not in known}, key=abs)
+        if not targets:
             continue
-        targets, places = numpy.unique(sign * times[rows], return_inverse=True)
         attitude = len(first) > 6
         # 0.1 s to compile in place of 0.8, for some hundred motions that take twice as long
         with compiled(system, DOUBLE, attitude=attitude, compact_mode=attitude).borrowed() as engine:
-            ends = (sign * targets).tolist()
-            states, outcome, *_ = states_at(engine, numbers, first, ends, _STEPS, DOUBLE)
+            states, outcome, *_ = states_at(engine, numbers, first, targets, _STEPS, DOUBLE)
         if outcome is not Outcome.SUCCESS:
             return None
-        motion[rows] = numpy.array(states)[places]
-    return motion
+        known.update(zip(targets, states, strict=True))
+    return numpy.array([known[time] if time else first for time in wanted])
+
+
+@lru_cache(maxsize=512)
+def _states_by_time(system: System, numbers: bytes, first: bytes) -> dict[float, Array]:
+    """States of a motion that were computed: hypotheses are tried on the first samples, and again on all."""
+    return {}
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:

@@ -305,11 +305,7 @@ def cell(text: str, where: str) -> Fraction | None:
     """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
     if not text.strip():
         raise InputError(f"{where} is empty.", "Give every row all of its columns.")
-    try:
-        return written_numbers.number(text, where)
-    except InputError as error:
-        cause = error.cause if error.cause.startswith(where) else f"{where}: {error.cause}"
-        raise InputError(cause, error.remedy) from None
+    return written_numbers.number(text, where)
 
 
 # Files with attitudes, positions or Ω in any axes, or the data of a body: read as the columns that they have.

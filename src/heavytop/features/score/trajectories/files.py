@@ -9,7 +9,6 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from typing import Any
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES
 from heavytop.cases import Case
-from heavytop.errors import InputError, quoted, why
+from heavytop.errors import InputError, meant, nearest, quoted, why
 from heavytop.features.score.trajectories import bags, logs
 from heavytop.features.score.trajectories import columns as observed_columns
 from heavytop.features.score.trajectories.observed import (
@@ -65,15 +64,9 @@ _LIKE = 0.75
 """A key is a misspelling of another if so large a part of them is alike."""
 
 
-def nearest(key: str, known: Sequence[str]) -> str:
-    """The known key that an unknown one is a misspelling of, or nothing."""
-    return next(iter(get_close_matches(key.lower(), sorted(known), 1, _LIKE)), "")
-
-
 def unknown(key: str, known: Sequence[str]) -> InputError:
     """Error text for an unknown key."""
-    near = nearest(key, known)
-    return InputError(f"Unknown key {quoted(key)}.", f"Did you mean {near}?" if near else REMEDY)
+    return InputError(f"Unknown key {quoted(key)}.", meant(key, known, _LIKE).rstrip() or REMEDY)
 
 
 class TextTable:
@@ -144,7 +137,7 @@ class TextTable:
         key, value = match[1], match[2].strip()
         if key not in known:
             # other comments may say what they like
-            if nearest(key, known):
+            if nearest(key, known, _LIKE):
                 raise unknown(key, known)
             return False
         if key in self.keys:
@@ -417,23 +410,27 @@ def _table(text: str, started: bool) -> tuple[dict[str, Any], list[str]]:
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
         return table.keys | more, table.notes
     columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
-    columns["numbers"] = [f"line {number}" for number in table.lines]
+    columns["numbers"] = [f"Line {number}" for number in table.lines]
     return table.keys | columns, table.notes
 
 
 def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST_STATES:
         raise too_many(len(document["times"]))
-    top, at_start = _top(document, case), _row_of_start(document)
+    top, times, rows = _top(document, case), _times(document), _list(document, "states")
+    require_states(times, rows)
+    texts = [_list({"state": row}, "state", 6) for row in rows]
+    values = [
+        [written_numbers.number(text, f"{row}, {name}") for text, name in zip(state, VARIABLES, strict=True)]
+        for state, row in zip(texts, _places(document, len(rows)), strict=True)
+    ]
+    first = [value for value in values[0] if value is not None]
+    at_start = State(first[:3], first[3:]) if not times[0] and len(first) == 6 else None
     start = _start(document, case, at_start)
     which = system_of(_system(document, case), top)
-    times = _times(document)
     if case is not None:
         require_case(case, top, start, which, at_start)
     require_physical(top, start)
-    rows = _list(document, "states")
-    require_states(times, rows)
-    texts = [_list({"state": row}, "state", 6) for row in rows]
     precision = _precision(document, [str(value) for row in texts for value in row])
     from_row = at_start is not None and start == at_start
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
@@ -441,7 +438,7 @@ def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bo
         start = start.normalized()
     start.require_unit_gamma(slack, "Write all its digits, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
-    states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
+    states = [rounded_state(state, precision) for state in values]
     about = _about(document, stem, case, None in states)
     return GivenTrajectory(top=top, start=start, system=which, precision=precision, times=times, states=states, **about)
 
@@ -479,12 +476,17 @@ def _times(document: dict[str, Any]) -> list[Fraction]:
         texts = observed_columns.times(document)
     else:
         written = _list(document, "times")
-        where = document.get("numbers") or [f"row {number}" for number in range(1, len(written) + 1)]
-        texts = [written_numbers.finite(time, f"the time in {row}") for time, row in zip(written, where, strict=True)]
+        rows = zip(written, _places(document, len(written)), strict=True)
+        texts = [written_numbers.finite(time, f"{row}, t") for time, row in rows]
     times = list(check_times(texts))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     return times
+
+
+def _places(document: dict[str, Any], count: int) -> list[str]:
+    """Where each state stands: its line in a table, its row in JSON."""
+    return document.get("numbers") or [f"Row {number}" for number in range(1, count + 1)]
 
 
 def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
@@ -568,18 +570,6 @@ def _vector(document: dict[str, Any], key: str, case: Case | None) -> list[Any]:
         owner = case.top if key in ("inertia", "centre") else case.start
         return list(getattr(owner, key))
     return _list(document, key, 3)
-
-
-def _row_of_start(document: dict[str, Any]) -> State | None:
-    """The state of the first row if its time is 0 and it is finite."""
-    times, rows = document.get("times"), document.get("states")
-    if not (isinstance(times, list) and isinstance(rows, list) and times and rows and isinstance(rows[0], list)):
-        return None
-    if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
-        return None
-    values = [written_numbers.component(value) for value in rows[0]]
-    numbers = [value for value in values if value is not None]
-    return State(numbers[:3], numbers[3:]) if len(numbers) == 6 else None
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:

@@ -363,7 +363,8 @@ def _of_parquet(content: bytes) -> dict[str, Any]:
     import pyarrow.parquet
 
     try:
-        return _columns_of(pyarrow.parquet.read_table(BytesIO(content)))
+        # in this thread: one that still holds the file while Python ends aborts the process
+        return _columns_of(pyarrow.parquet.ParquetFile(BytesIO(content)).read(use_threads=False))
     except (pyarrow.ArrowException, ValueError) as error:
         raise InputError(f"A log must be a Parquet table: {error}.", "Give one number or list for each time.") from None
 

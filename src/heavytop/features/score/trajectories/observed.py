@@ -13,7 +13,7 @@ import numpy
 from heavytop import written_numbers
 from heavytop.arguments import MOST_STATES, bits_of, component
 from heavytop.errors import InputError, prefixed
-from heavytop.features.score.diagnose.readings import BodyData, GivenStart, Reading, Seen
+from heavytop.features.score.diagnose.readings import GivenStart, Reading, Seen, body_data
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.attitude_error import Convention, Posed, space_to_body
 from heavytop.precision import (
@@ -23,13 +23,14 @@ from heavytop.precision import (
     cross,
     decimal_text,
     dot,
+    exact,
     number,
     round_to,
     shown,
 )
 from heavytop.top.attitude import Angle, Attitude, perpendicular, quaternion_products
 from heavytop.top.bodies import CENTRE, IDENTITY, Body
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, VARIABLES, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 # Bodies of trajectory files: rounded to a format, in principal axes, and in double.
@@ -40,18 +41,6 @@ from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 AnyBody = HeavyTop | Body
 Tensor = tuple[Vector, Vector, Vector]
-
-
-def as_given(body: Body) -> Tensor:
-    """The tensor about the point that it was given about, exactly."""
-    if body.about != CENTRE:
-        return body.tensor
-    c, square = body.centre, dot(body.centre, body.centre)
-    first, second, third = (
-        _triple([body.tensor[i][j] - body.mass * ((square if i == j else 0) - c[i] * c[j]) for j in range(3)])
-        for i in range(3)
-    )
-    return first, second, third
 
 
 def _triple(values: Sequence[Fraction]) -> Vector:
@@ -70,7 +59,14 @@ def rounded_body(body: AnyBody, precision: Precision) -> AnyBody:
         weight = round_to(body.weight, precision.bits)
         return HeavyTop(near(body.inertia), weight, near(body.centre), rotor=rotor)
     mass, gravity = (round_to(value, precision.bits) for value in (body.mass, body.gravity))
-    return Body(mass, gravity, near(body.centre), [near(row) for row in as_given(body)], body.about, rotor)
+    return Body(
+        mass,
+        gravity,
+        near(body.centre),
+        [near(row) for row in (body.central if body.about == CENTRE else body.tensor)],
+        body.about,
+        rotor,
+    )
 
 
 def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
@@ -85,22 +81,6 @@ def in_principal_axes(body: AnyBody, bits: int) -> tuple[HeavyTop, Tensor]:
     centre = [round_to(value, bits) for value in top.centre]
     rotor = None if top.rotor is None else [round_to(value, bits) for value in top.rotor]
     return HeavyTop(top.inertia, top.weight, centre, rotor, top.mass), principal.axes
-
-
-def system_of(body: AnyBody, named: System) -> System:
-    """The system in which a body moves: that of a heavy top with a rotor where it has one."""
-    return HEAVY_GYROSTAT if named is HEAVY_TOP and body.rotor is not None else named
-
-
-def body_data(body: AnyBody) -> BodyData:
-    """The body in double."""
-    centre = numpy.array([float(value) for value in body.centre])
-    rotor = numpy.array([float(value) for value in body.rotor or (0, 0, 0)])
-    if isinstance(body, HeavyTop):
-        inertia = numpy.diag([float(value) for value in body.inertia])
-        return BodyData(inertia, centre, None, float(body.weight), False, rotor)
-    inertia = numpy.array([[float(value) for value in row] for row in as_given(body)])
-    return BodyData(inertia, centre, float(body.mass), float(body.gravity), body.about == CENTRE, rotor)
 
 
 # The start of a file with attitudes: R and Ω as exact numbers, and the body with them in principal axes.
@@ -313,6 +293,15 @@ class GivenTrajectory:
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
     observed: Observed | None = None
+
+    @property
+    def step(self) -> Fraction | None:
+        """That of the method, where the file says it in a number."""
+        try:
+            step = exact(self.flags.get("step", "0"))
+        except InputError:
+            return None
+        return step if step > 0 else None
 
     def warnings(self) -> list[str]:
         """Data that no rigid body can have, and γ so far off the unit sphere that columns may be in another order."""
@@ -553,7 +542,7 @@ def of_observed_arrays(
     places = [f"row {i}" for i in range(len(times))]
     quantities, states = observed(body, raw, said, values, places, form, normalize)
     require_physical(quantities.posed.top, quantities.posed.start)
-    which = system_of(body, HEAVY_TOP)
+    which = system_of(None, body)
     return _in_memory(names, quantities.posed.top, quantities.posed.start, which, form, times, states, quantities)
 
 
