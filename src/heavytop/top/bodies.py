@@ -30,6 +30,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.inertia_slips import (
     MassProperties,
     Tensor,
+    determinant,
     has_second_moments,
     is_positive,
     mending,
@@ -102,10 +103,10 @@ def _spread(tensor: Rows[Fraction]) -> int:
 
     0 for ordinary bodies, whose guard bits do, and for a tensor that has a moment below 0.
     """
-    trace, determinant = tensor[0][0] + tensor[1][1] + tensor[2][2], _determinant(tensor)
-    if determinant <= 0:
+    trace, product = tensor[0][0] + tensor[1][1] + tensor[2][2], determinant(tensor)
+    if product <= 0:
         return 0
-    ratio = Fraction(trace**3 / determinant)
+    ratio = Fraction(trace**3 / product)
     spread = ratio.numerator.bit_length() - ratio.denominator.bit_length()
     if spread > _MOST_SPREAD:
         raise InputError(
@@ -113,10 +114,6 @@ def _spread(tensor: Rows[Fraction]) -> int:
             "Check its entries and their units: no body that can be computed has such moments.",
         )
     return spread // _GUARD_BITS * _GUARD_BITS
-
-
-def _determinant(rows: Rows[Fraction]) -> Fraction:
-    return dot(rows[0], cross(rows[1], rows[2]))
 
 
 def _less(tensor: Rows[Fraction], moment: Fraction) -> Three[Vector]:
@@ -131,7 +128,7 @@ def _exact_moments(tensor: Rows[Fraction], near: Vector) -> Vector:
     moments = []
     for value in near:
         candidate = Fraction(round(value * common), common)
-        moments.append(candidate if _determinant(_less(tensor, candidate)) == 0 else value)
+        moments.append(candidate if determinant(_less(tensor, candidate)) == 0 else value)
     return moments[0], moments[1], moments[2]
 
 
@@ -140,7 +137,7 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
     turned = multiplied(transposed(near), multiplied(tensor, near))
     guess = (turned[0][0], turned[1][1], turned[2][2])
     moments = _exact_moments(tensor, guess)
-    if any(_determinant(_less(tensor, moment)) for moment in moments):
+    if any(determinant(_less(tensor, moment)) for moment in moments):
         return None
     vectors = _unit_vectors(tensor, moments)
     if vectors is None:
@@ -151,7 +148,7 @@ def _rational(tensor: Rows[Fraction], near: Rows[Fraction]) -> PrincipalAxes | N
     )
     columns = [vectors[index] for index in order]
     columns = [v if dot(v, u) >= 0 else (-v[0], -v[1], -v[2]) for v, u in zip(columns, transposed(near), strict=True)]
-    if _determinant(columns) < 0:
+    if determinant(columns) < 0:
         columns[2] = (-columns[2][0], -columns[2][1], -columns[2][2])
     axes = transposed(columns)
     turned = multiplied(transposed(axes), multiplied(tensor, axes))
@@ -283,17 +280,20 @@ class Body:
 
     @classmethod
     def from_file(
-        cls, path: str | Path, link: str | None = None, pivot: Iterable[Any] | None = None, gravity: Given = "9.81"
+        cls, path: str | Path, link: str | None = None, pivot: Iterable[Any] | None = None, gravity: Given | None = None
     ) -> Body:
         """The body of a URDF, MJCF, SDF, USD (text) or TOML file, or its link of that name, in the axes of the link.
 
-        pivot: the fixed point there; without it the ball joint of the body, or the origin.
+        pivot: the fixed point there; without it the ball joint of the body, or the origin.  gravity: without it that
+        of the file, or 9.81.
         Raises InputError for a file that cannot be read, for several bodies without ``link``, and for a tensor that no
         body has, with the slip that makes it one.
         """
         from heavytop.top.body_files import read_body
 
-        body = read_body(Path(path), link).about(None if pivot is None else vector(pivot, "pivot"))
+        link_or_body = read_body(Path(path), link)
+        body = link_or_body.about(None if pivot is None else vector(pivot, "pivot"))
+        gravity = link_or_body.gravity_down if gravity is None else gravity
         return cls(body.mass, gravity, body.centre, body.six, PIVOT if body.at_pivot else CENTRE)
 
     def __repr__(self) -> str:
@@ -472,7 +472,7 @@ def body_of(data: Mapping[str, Any]) -> Body:
     twice = [key for key in BODY if key in data and key != "gravity"]
     if twice:
         raise InputError(f"file and {twice[0]} were given.", f"The file says {twice[0]}: leave it out.")
-    return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity", "9.81"))
+    return Body.from_file(data["file"], data.get("link"), gravity=data.get("gravity"))
 
 
 def _require(data: Mapping[str, Any], key: str) -> Any:

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 from heavytop.errors import InputError, prefixed, quoted
 from heavytop.files import read_whole
-from heavytop.precision import Vector, cross, exact, round_to, vector
+from heavytop.precision import Vector, cross, exact, round_to, six_digits, vector
 from heavytop.top import inertia_slips
-from heavytop.top.attitude import Attitude, multiplied, transposed
+from heavytop.top.attitude import Attitude, multiplied, rotated, transposed
 from heavytop.top.inertia_slips import Six, Tensor, rows, six_of
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ _LARGEST = Fraction(10**30)
 _MOST_SLACK = Fraction(1, 200)
 _FROM_DOUBLE = Fraction(1, 10**14)
 _ZERO: Vector = (Fraction(0), Fraction(0), Fraction(0))
+EARTH: Vector = (Fraction(0), Fraction(0), Fraction("-9.81"))
 _IDENTITY: Tensor = rows((Fraction(1), Fraction(1), Fraction(1), *_ZERO))
 _SIX_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _FORMATS = "Give a URDF, MJCF or SDF file, USD as text (.usda), or TOML with mass, centre and inertia."
@@ -43,10 +44,10 @@ class BodyInFile:
     """A link or body of a file, in its own axes and units of kg and metres.
 
     centre: of mass.  six: I11, I22, I33, I12, I13, I23 about the centre of mass, or the origin where ``at_pivot``.
-    joint: where a ball joint holds it, or None.  slack: rounding of the printed digits,
-    of an entry of the second moments.
-    geometry, geometry_axes: tensor about the centre of mass of the one shape that the file gives it, as a uniform body,
-    and the rotation of its axes; None where it gives none, several, or a mesh.
+    slack: rounding of the printed digits, of an entry of the second moments.
+    geometry, geometry_axes: tensor about its centre of the one shape that the file gives it, uniform and of 1 kg, and
+    the rotation of its axes; None where it gives none, several, or a mesh.
+    joint: where a ball joint holds it, or None.  gravity: in the axes of the world.
     """
 
     name: str
@@ -54,11 +55,21 @@ class BodyInFile:
     centre: Vector
     six: Six
     slack: Fraction
-    at_pivot: bool = False
-    joint: Vector | None = None
     geometry: Tensor | None = None
     geometry_axes: Tensor | None = None
+    joint: Vector | None = None
+    gravity: Vector = EARTH
+    at_pivot: bool = False
     si: bool = True
+
+    @property
+    def gravity_down(self) -> Fraction:
+        """The acceleration of gravity; raises InputError where it is not along -z."""
+        x, y, z = self.gravity
+        if x or y or z > 0:
+            cause = f"{self.name}: gravity must be along -z; got {', '.join(map(six_digits, self.gravity))}."
+            raise InputError(cause, "Give its size, --gravity or gravity in Python: e_z of the start then points up.")
+        return -z
 
     def about(self, pivot: Vector | None) -> inertia_slips.MassProperties:
         """Its mass properties, with the centre of mass from the pivot: the ball joint, or the origin, where None."""
@@ -142,16 +153,23 @@ def _xml(path: Path, content: bytes) -> Iterator[Link]:
     return _of_links(root, _urdf if root.tag == "robot" else _sdf)
 
 
-def _of_links(root: Element, reader: Callable[[str, Element, Element], BodyInFile]) -> Iterator[Link]:
+_Around = Mapping["Element", "Element"]
+"""The element around each element of a file."""
+
+
+def _around(root: Element) -> _Around:
+    return {part: element for element in root.iter() for part in element}
+
+
+def _of_links(root: Element, reader: Callable[[str, Element, Element, _Around], BodyInFile]) -> Iterator[Link]:
     """The links with an inertial element, by their names; where several models have links, behind the model's."""
-    models = root.findall(".//model")
-    owners = {link: model.get("name", "") for model in models for link in model.findall("link")}
-    several = len(set(owners.values())) > 1
+    around = _around(root)
+    several = len({around[link] for link in root.findall(".//model/link")}) > 1
     for link in root.iter("link"):
-        name, inertial = link.get("name", ""), link.find("inertial")
+        name, inertial, model = link.get("name", ""), link.find("inertial"), around[link]
         if inertial is not None:
-            name = f"{owners[link]}::{name}" if several and link in owners else name
-            yield name, partial(reader, name, link, inertial)
+            name = f"{model.get('name', '')}::{name}" if several and model.tag == "model" else name
+            yield name, partial(reader, name, link, inertial, around)
 
 
 class _Numbers:
@@ -184,17 +202,21 @@ class _Numbers:
 
     def three(self, text: str | None, what: str, default: str | None = None) -> Vector:
         """Three numbers."""
-        return vector(self._of(text, what, 3, default), what)
+        return vector(self.some(text, what, 3, default), what)
 
-    def four(self, text: str, what: str) -> list[Fraction]:
-        """Four numbers."""
-        return self._of(text, what, 4, None)
-
-    def one(self, text: str | None, what: str) -> Fraction:
+    def one(self, text: str | None, what: str, default: str | None = None) -> Fraction:
         """One number."""
-        return self._of(text, what, 1, None)[0]
+        return self.some(text, what, 1, default)[0]
 
-    def _of(self, text: str | None, what: str, count: int, default: str | None) -> list[Fraction]:
+    def flag(self, text: str | None, what: str) -> bool:
+        """A boolean of SDF, false where it is missing."""
+        value = (text or "").strip().lower() or "false"
+        if value not in ("true", "1", "false", "0"):
+            raise InputError(f"{self.where}: {what} must be true or false; got {quoted(value)}.", "Give one of them.")
+        return value in ("true", "1")
+
+    def some(self, text: str | None, what: str, count: int, default: str | None = None) -> list[Fraction]:
+        """So many numbers."""
         values = self.read(text, what, default)
         if len(values) != count:
             raise InputError(f"{self.where}: {what} has {len(values)} numbers.", f"Give {count}.")
@@ -224,7 +246,7 @@ class _Numbers:
         """
         self.units = []
         a, b, c, d, e, f = (
-            self._of(text, name, 1, None if index < 3 else products)[0]
+            self.some(text, name, 1, None if index < 3 else products)[0]
             for index, (text, name) in enumerate(zip(texts, what, strict=True))
         )
         return (a, b, c, d, e, f), min(2 * min(self.units, default=Fraction(0)), _MOST_SLACK * max(map(abs, (a, b, c))))
@@ -251,7 +273,17 @@ def _in_axes(axes: Tensor, six: Six) -> Six:
     return a, b, c, d, e, f
 
 
-def _urdf(name: str, link: Element, inertial: Element) -> BodyInFile:
+Pose = tuple[Tensor, Vector]
+"""Rotation and place of a frame in another."""
+
+
+def _within(outer: Pose, inner: Pose) -> Pose:
+    """A pose in the frame of the outer one, in the frame around that."""
+    x, y, z = (a + b for a, b in zip(outer[1], rotated(outer[0], inner[1]), strict=True))
+    return multiplied(outer[0], inner[0]), (x, y, z)
+
+
+def _urdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyInFile:
     numbers = _Numbers(f"link {name}")
     numbers.attributes(inertial)
     numbers.require_known([part.tag for part in inertial], inertial, ("origin", "mass", "inertia"), "element")
@@ -259,11 +291,11 @@ def _urdf(name: str, link: Element, inertial: Element) -> BodyInFile:
     six, slack = numbers.tensor([tensor.get(key) for key in _SIX_URDF], _SIX_URDF)
     value = numbers.one(numbers.attributes(inertial.find("mass"), "value").get("value"), "mass")
     axes, centre = _origin(numbers, inertial)
-    shape = _shape_of(numbers, _shapes_of_urdf(numbers, link), value, centre)
-    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, False, None, *shape)
+    shape = _shape_of(_shapes(numbers, link, partial(_origin, numbers)), centre)
+    return BodyInFile(name, value, centre, _in_axes(axes, six), slack, *shape)
 
 
-def _origin(numbers: _Numbers, element: Element) -> tuple[Tensor, Vector]:
+def _origin(numbers: _Numbers, element: Element) -> Pose:
     """Rotation and place of an element of a URDF."""
     pose = numbers.attributes(element.find("origin"), "xyz", "rpy", "quat_xyzw")
     centre, quaternion = numbers.three(pose.get("xyz"), "origin xyz", "0 0 0"), pose.get("quat_xyzw")
@@ -271,7 +303,7 @@ def _origin(numbers: _Numbers, element: Element) -> tuple[Tensor, Vector]:
         return _rpy(numbers, pose.get("rpy")), centre
     if "rpy" in pose:
         raise InputError(f"{numbers.where}: origin has rpy and quat_xyzw.", "Give one of them.")
-    x, y, z, w = numbers.four(quaternion, "quat_xyzw")
+    x, y, z, w = numbers.some(quaternion, "quat_xyzw", 4)
     return _turn(w, x, y, z), centre
 
 
@@ -279,19 +311,14 @@ Shape = tuple[Tensor, Vector, Vector]
 """Axes and centre of a shape, and its principal moments for unit mass."""
 
 
-def _shape_of(
-    numbers: _Numbers, shapes: Sequence[Shape], mass: Fraction, centre: Vector
-) -> tuple[Tensor | None, Tensor | None]:
-    """The tensor about the centre of mass of one shape, and its axes; nothing of several or of one elsewhere."""
-    distinct = {shape[1:]: shape for shape in shapes}
-    if len(distinct) != 1:
+def _shape_of(shapes: Sequence[Shape], centre: Vector) -> tuple[Tensor | None, Tensor | None]:
+    """The tensor about its centre of one shape, and its axes; nothing of several or of one elsewhere."""
+    if len(set(shapes)) != 1:
         return None, None
     axes, middle, moments = shapes[0]
-    size = sum(moments)
-    if sum((a - b) ** 2 for a, b in zip(middle, centre, strict=True)) > size / 100:
+    if sum((a - b) ** 2 for a, b in zip(middle, centre, strict=True)) > sum(moments) / 100:
         return None, None
-    six = _in_axes(axes, (*(mass * value for value in moments), Fraction(0), Fraction(0), Fraction(0)))  # type: ignore[arg-type]
-    return rows(six), axes
+    return rows(_in_axes(axes, (*moments, *_ZERO))), axes
 
 
 def _box(a: Fraction, b: Fraction, c: Fraction) -> Vector:
@@ -308,110 +335,210 @@ def _sphere(radius: Fraction) -> Vector:
     return moment, moment, moment
 
 
-def _primitive(numbers: _Numbers, geometry: Element, of: Callable[[Element, str], str | None]) -> Vector | None:
-    """Moments of a box, cylinder or sphere of unit mass; ``of`` reads a dimension of its element."""
+def _primitive(numbers: _Numbers, geometry: Element) -> Vector | None:
+    """Moments of a box, cylinder or sphere of unit mass, with its dimensions as attributes or elements."""
     for kind in ("box", "cylinder", "sphere"):
         shape = geometry.find(kind)
         if shape is None:
             continue
+        size, radius, length = (shape.get(key, shape.findtext(key)) for key in ("size", "radius", "length"))
         if kind == "box":
-            return _box(*numbers.three(of(shape, "size"), "size"))
-        radius = numbers.one(of(shape, "radius"), "radius")
-        return _sphere(radius) if kind == "sphere" else _cylinder(radius, numbers.one(of(shape, "length"), "length"))
+            return _box(*numbers.three(size, "size"))
+        half = numbers.one(radius, "radius")
+        return _sphere(half) if kind == "sphere" else _cylinder(half, numbers.one(length, "length"))
     return None
 
 
-def _shapes_of_urdf(numbers: _Numbers, link: Element) -> list[Shape]:
+def _shapes(numbers: _Numbers, link: Element, pose: Callable[[Element], Pose]) -> list[Shape]:
     """Its collision shapes, or where there are none its visual ones; [] where a mesh is among them."""
-    for tag in ("collision", "visual"):
-        shapes = []
-        for part in link.findall(tag):
-            geometry = part.find("geometry")
-            moments = None if geometry is None else _primitive(numbers, geometry, lambda shape, key: shape.get(key))
-            if moments is None:
-                return []
-            shapes.append((*_origin(numbers, part), moments))
-        if shapes:
-            return shapes
-    return []
+    shapes: list[Shape] = []
+    for part in link.findall("collision") or link.findall("visual"):
+        geometry = part.find("geometry")
+        moments = None if geometry is None else _primitive(numbers, geometry)
+        if moments is None:
+            return []
+        shapes.append((*pose(part), moments))
+    return shapes
 
 
-_SDF_INERTIAL = ("mass", "pose", "inertia", "density", "auto_inertia_params", "fluid_added_mass")
+_SDF_INERTIAL = ("mass", "pose", "inertia", "density", "auto_inertia_params")
 
 
-def _sdf(name: str, link: Element, inertial: Element) -> BodyInFile:
-    numbers = _Numbers(f"link {name}")
-    numbers.require_known([part.tag for part in inertial], inertial, _SDF_INERTIAL, "element")
-    if numbers.attributes(inertial, "auto").get("auto") == "true":
+def _sdf(name: str, link: Element, inertial: Element, around: _Around) -> BodyInFile:
+    numbers, pose, tensor = _Numbers(f"link {name}"), inertial.find("pose"), inertial.find("inertia")
+    if inertial.find("fluid_added_mass") is not None:
         raise InputError(
-            f'{numbers.where}: inertial auto="true" has Gazebo compute mass and tensor from the shapes.',
+            f"{numbers.where}: fluid_added_mass is not a body's.", "Leave it out: a heavy top has no fluid."
+        )
+    numbers.require_known([part.tag for part in inertial], inertial, _SDF_INERTIAL, "element")
+    if numbers.flag(numbers.attributes(inertial, "auto").get("auto"), "auto"):
+        raise InputError(
+            f"{numbers.where}: inertial auto is true: Gazebo computes mass and tensor from the shapes.",
             "Write the numbers out: gz sdf --print FILE --expand-auto-inertials > FILE.sdf.",
         )
-    axes, centre = _pose(numbers, inertial.find("pose"))
-    tensor = inertial.find("inertia")
+    if pose is not None and (frame := pose.get("relative_to") or pose.get("frame")):
+        raise InputError(f"{numbers.where}: relative_to {quoted(frame)} of an inertial.", "Give its pose in the link.")
+    axes, centre = _pose(numbers, pose)
     if tensor is not None:
         numbers.require_known([part.tag for part in tensor], tensor, _SIX_URDF, "element")
     texts = [None if tensor is None else tensor.findtext(key) for key in _SIX_URDF]
     six, slack = numbers.tensor(texts, _SIX_URDF, products="0")
-    mass = numbers.one(inertial.findtext("mass"), "mass")
-    shapes: list[Shape] = []
-    for part in link.findall("collision") or link.findall("visual"):
-        geometry = part.find("geometry")
-        moments = None if geometry is None else _primitive(numbers, geometry, lambda e, key: e.findtext(key))
-        if moments is None:
-            shapes = []
-            break
-        turn, middle = _pose(numbers, part.find("pose"))
-        shapes.append((turn, middle, moments))
-    shape = _shape_of(numbers, shapes, mass, centre)
-    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, None, *shape)
+    mass, frames = numbers.one(inertial.findtext("mass"), "mass"), _SdfFrames(numbers, link, around)
+    shape = _shape_of(_shapes(numbers, link, frames.in_link), centre)
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, frames.ball(), frames.gravity())
 
 
-def _pose(numbers: _Numbers, pose: Element | None) -> tuple[Tensor, Vector]:
+@dataclass(frozen=True, slots=True)
+class _SdfFrames:
+    """Links, joints and frames of the model of a link of SDF, by their names."""
+
+    numbers: _Numbers
+    link: Element
+    around: _Around
+
+    def named(self, name: str) -> Element:
+        """The frame of this name."""
+        model = self.around[self.link]
+        frames = [part for part in model if part.tag in ("link", "joint", "frame") and part.get("name") == name]
+        if not frames and name != "__model__":
+            raise InputError(
+                f"{self.numbers.where}: its model has no frame {quoted(name)}.", "Use frames of one model."
+            )
+        return frames[0] if frames else model
+
+    def in_model(self, element: Element, passed: tuple[Element, ...] = ()) -> Pose:
+        """The pose of a frame, or of a shape of the link, in the axes of the model."""
+        if element is self.around[self.link]:
+            return _IDENTITY, _ZERO
+        if element in passed:
+            raise InputError(f"{self.numbers.where}: its frames form a circle.", "Lead them back to the model.")
+        pose, name = element.find("pose"), _base(element)
+        if pose is not None:
+            name = pose.get("relative_to") or pose.get("frame") or name
+        outer = self.named(name) if name else self.around[element]
+        return _within(self.in_model(outer, (*passed, element)), _pose(self.numbers, pose))
+
+    def in_link(self, element: Element) -> Pose:
+        """The pose of a frame or shape in the axes of the link."""
+        turn, (x, y, z) = self.in_model(self.link)
+        back = transposed(turn)
+        return _within((back, rotated(back, (-x, -y, -z))), self.in_model(element))
+
+    def ball(self) -> Vector | None:
+        """Where a ball joint holds the link, or a frame attached to it, as its child."""
+        places, model = [], self.around[self.link]
+        for joint in [part for part in self.around if (part.tag, part.get("type")) == ("joint", "ball")]:
+            child = _base(joint)
+            if child.endswith(f"::{self.link.get('name')}"):
+                raise InputError(f"{self.numbers.where}: its ball joint is of another model.", "Put it into its own.")
+            if self.around[joint] is model and "::" not in child and self.held(child) is self.link:
+                places.append(self.in_link(joint)[1])
+        if len(places) > 1:
+            raise InputError(f"{self.numbers.where}: {len(places)} ball joints hold it.", "Leave one.")
+        return places[0] if places else None
+
+    def held(self, name: str) -> Element:
+        """The link that a frame is attached to, or the model."""
+        element = self.named(name)
+        for _ in self.around[self.link]:
+            if element.tag in ("frame", "joint"):
+                element = self.named(_base(element) or "__model__")
+        return element
+
+    def gravity(self) -> Vector:
+        """That of the world around the link, zero where the link is exempt."""
+        if not self.numbers.flag(self.link.findtext("gravity") or "true", "gravity"):
+            return _ZERO
+        worlds = [part for part in self.around.values() if part.tag == "world"]
+        return self.numbers.three(worlds[0].findtext("gravity"), "gravity", "0 0 -9.8") if worlds else EARTH
+
+
+def _base(element: Element) -> str:
+    """What a joint or a frame of SDF is attached to."""
+    return (element.findtext("child") or element.get("attached_to") or "").strip()
+
+
+def _pose(numbers: _Numbers, pose: Element | None) -> Pose:
     """Rotation and place of a pose x y z roll pitch yaw, or with a quaternion x y z w."""
     if pose is None:
-        return _rpy(numbers, None), _ZERO
-    values = numbers.read(pose.text, "pose", "0 0 0 0 0 0")
+        return _IDENTITY, _ZERO
     form = numbers.attributes(pose, "rotation_format", "degrees", "relative_to", "frame")
-    quaternion = form.get("rotation_format") == "quat_xyzw"
-    if len(values) != (7 if quaternion else 6):
-        raise InputError(f"{numbers.where}: pose has {len(values)} numbers.", "Give x y z roll pitch yaw.")
+    kind, degrees = form.get("rotation_format", "euler_rpy"), numbers.flag(form.get("degrees"), "degrees")
+    count = {"euler_rpy": 6, "quat_xyzw": 7}.get(kind)
+    values = numbers.read(pose.text, "pose", "0 0 0 0 0 0")
+    if len(values) != count or (degrees and count == 7):
+        raise InputError(
+            f"{numbers.where}: pose has {len(values)} numbers, as {quoted(kind)}{' in degrees' if degrees else ''}.",
+            "Give x y z roll pitch yaw as euler_rpy, or x y z and a quaternion x y z w as quat_xyzw, without degrees.",
+        )
     position = (values[0], values[1], values[2])
-    if quaternion:
+    if count == 7:
         x, y, z, w = values[3:]
         return _turn(w, x, y, z), position
-    text = " ".join(str(value) for value in values[3:])
-    return _rpy(numbers, text, form.get("degrees") == "true"), position
+    return _rpy(numbers, " ".join(map(str, values[3:])), degrees), position
 
 
 def _mjcf(path: Path, root: Element) -> Iterator[Link]:
-    """The bodies with an inertial element, exactly; those without, with geoms or of other files, by MuJoCo itself."""
+    """The bodies with an inertial element, exactly; those that MuJoCo computes or takes from other files, by itself."""
     settings = {key: value for compiler in root.iter("compiler") for key, value in compiler.attrib.items()}
-    frames = _MjcfFrames(settings.get("angle") == "radian", settings.get("eulerseq", "xyz"))
-    defaults = _Defaults.of(root)
-    computed = settings.get("inertiafromgeom") == "true" or "settotalmass" in settings
+    if settings.get("coordinate", "local") != "local":
+        raise InputError(f"{path} has global coordinates.", "Load and save it in MuJoCo 2.3.3, which makes them local.")
+    fused = any(settings.get(key, "auto") not in ("auto", "false") for key in ("inertiafromgeom", "fusestatic"))
+    if fused or exact(settings.get("settotalmass", "-1")) > 0 or root.find(".//include") is not None:
+        yield from _included(path, set())
+        return
+    frames = _MjcfFrames(root, _around(root), settings, _gravity(root))
     for index, body in enumerate(root.iter("body")):
-        name, inertial = body.get("name") or f"body{index + 1}", body.find("inertial")
-        if computed or (inertial is None and body.find("geom") is not None):
+        name, parts = body.get("name") or f"body{index + 1}", [*_parts(body)]
+        tags = [part.tag for part, _ in parts]
+        if "inertial" in tags:
+            yield name, partial(_mjcf_body, name, body, parts, frames)
+        elif "geom" in tags:
             yield name, partial(by_mujoco, path, name, index)
-        elif inertial is not None:
-            yield name, partial(_mjcf_body, name, body, inertial, frames, defaults)
-    if root.find(".//include") is not None or root.find(".//attach") is not None:
+    if root.find(".//attach") is not None:
         yield from _included(path, {body.get("name") for body in root.iter("body")})
 
 
-def _mjcf_body(name: str, body: Element, inertial: Element, frames: _MjcfFrames, defaults: _Defaults) -> BodyInFile:
+def _gravity(root: Element) -> Vector:
+    """The gravity of an MJCF file, zero where a flag disables it."""
+    off = any(flag.get("gravity") == "disable" for flag in root.iterfind("option/flag"))
+    texts = [option.get("gravity") for option in root.findall("option[@gravity]")]
+    return _ZERO if off else _Numbers("option").three([None, *texts][-1], "gravity", "0 0 -9.81")
+
+
+_Parts = Sequence[tuple["Element", Sequence["Element"]]]
+
+
+def _parts(element: Element, frames: tuple[Element, ...] = ()) -> Iterator[tuple[Element, tuple[Element, ...]]]:
+    """The elements of a body of MJCF, each with the frames around it in the body, the outermost first."""
+    for part in element:
+        yield part, frames
+        if part.tag == "frame":
+            yield from _parts(part, (*frames, part))
+
+
+def _mjcf_body(name: str, body: Element, parts: _Parts, frames: _MjcfFrames) -> BodyInFile:
     numbers = _Numbers(f"body {name}")
-    known = ("pos", "mass", "diaginertia", "fullinertia", *_ORIENTATIONS)
-    axes = frames.rotation(numbers, numbers.attributes(inertial, *known))
+    (inertial, around), *more = (pair for pair in parts if pair[0].tag == "inertial")
+    if more:
+        raise InputError(f"{numbers.where}: {len(more) + 1} inertials were given.", "Leave one.")
+    numbers.attributes(inertial, "pos", "mass", "diaginertia", "fullinertia", *_ORIENTATIONS)
+    numbers.three(inertial.get("pos"), "pos")
     six, slack = numbers.tensor(_mjcf_six(numbers, inertial), ("M11", "M22", "M33", "M12", "M13", "M23"))
-    centre, mass = numbers.three(inertial.get("pos"), "pos"), numbers.one(inertial.get("mass"), "mass")
-    joints = [defaults.attributes(joint) for joint in body.findall("joint")]
-    ball = next((joint for joint in joints if joint.get("type", "hinge") == "ball"), None)
-    joint = None if ball is None else numbers.three(ball.get("pos"), "pos", "0 0 0")
-    geoms = [defaults.attributes(geom) for geom in body.findall("geom")]
-    shape = _shape_of(numbers, _geoms(numbers, geoms, frames), mass, centre)
-    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, False, joint, *shape)
+    least_mass, least = (numbers.one(frames.settings.get(key), key, "0") for key in ("boundmass", "boundinertia"))
+    mass = max(numbers.one(inertial.get("mass"), "mass"), least_mass)
+    if least and inertia_slips.has_second_moments(rows(six), slack):
+        spare = inertia_slips.minus(rows(six), rows((least, least, least, *_ZERO)))
+        if any(six[3:]) and not inertia_slips.is_positive(spare):
+            raise InputError(f"{numbers.where}: boundinertia raises a principal moment.", "Give diaginertia and quat.")
+        if not any(six[3:]):
+            six = (max(six[0], least), max(six[1], least), max(six[2], least), *_ZERO)
+    axes, centre = frames.pose(numbers, inertial, around)
+    balls = [pair for pair in parts if frames.attributes(pair[0]).get("type") == "ball"]
+    joint = frames.pose(numbers, *balls[0])[1] if balls else None
+    shape = _shape_of(frames.shapes(numbers, parts), centre)
+    x, y, z = ((1 - numbers.one(body.get("gravcomp"), "gravcomp", "0")) * value for value in frames.gravity)
+    return BodyInFile(name, mass, centre, _in_axes(axes, six), slack, *shape, joint, (x, y, z))
 
 
 def _compiled(path: Path) -> Any:
@@ -422,7 +549,7 @@ def _compiled(path: Path) -> Any:
         raise InputError(
             "MuJoCo computes mass and tensor of these bodies, from their geoms or out of other files.",
             "Install it with: pip install 'heavytop[engines]'; or write them out: mujoco.mj_saveLastXML(FILE, model), "
-            "without inertiafromgeom.",
+            "without inertiafromgeom, settotalmass and fusestatic.",
         ) from None
     try:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -438,13 +565,21 @@ def by_mujoco(path: Path, name: str, index: int) -> BodyInFile:
 
 
 def _of_model(model: Any, name: str, body: int) -> BodyInFile:
-    values = [Fraction(repr(float(value))) for value in model.body_inertia[body]]
-    six = _in_axes(_turn(*map(float, model.body_iquat[body])), (*values, *_ZERO))  # type: ignore[arg-type]
-    x, y, z = (Fraction(repr(float(value))) for value in model.body_ipos[body])
+    import mujoco
+
+    values = _of_doubles(model.body_inertia[body])
+    six = _in_axes(_turn(*map(float, model.body_iquat[body])), (*values, *_ZERO))
     balls = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and model.jnt_type[j] == 1]
-    joint = vector([float(value) for value in model.jnt_pos[balls[0]]], "pos") if balls else None
-    mass = Fraction(repr(float(model.body_mass[body])))
-    return BodyInFile(name, mass, (x, y, z), six, _FROM_DOUBLE * max(values), False, joint)
+    joint = _of_doubles(model.jnt_pos[balls[0]]) if balls else None
+    weight = 0 if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY else 1 - model.body_gravcomp[body]
+    (mass,), centre = _of_doubles([model.body_mass[body]]), _of_doubles(model.body_ipos[body])
+    gravity = _of_doubles(weight * model.opt.gravity)
+    return BodyInFile(name, mass, centre, six, _FROM_DOUBLE * max(values), None, None, joint, gravity)
+
+
+def _of_doubles(values: Iterable[Any]) -> Any:
+    """The shortest decimals of doubles."""
+    return tuple(Fraction(repr(float(value))) for value in values)
 
 
 def _included(path: Path, known: set[str | None]) -> Iterator[Link]:
@@ -459,6 +594,8 @@ def _included(path: Path, known: set[str | None]) -> Iterator[Link]:
 def _mjcf_six(numbers: _Numbers, inertial: Element) -> Sequence[str | None]:
     """The six numbers of fullinertia, or the three of diaginertia with zeros."""
     full = inertial.get("fullinertia")
+    if full is not None and "diaginertia" in inertial.attrib:
+        raise InputError(f"{numbers.where}: fullinertia and diaginertia were given.", "Give one of them.")
     parts = [*(inertial.get("diaginertia") or "").split(), "0", "0", "0"] if full is None else full.split()
     if full is not None and len(parts) == 9:
         raise InputError(
@@ -480,51 +617,49 @@ _ORIENTATIONS = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
 
 
 @dataclass(frozen=True, slots=True)
-class _Defaults:
-    """Attributes of each default class by tag, from the classes around it too; and the element around each element."""
+class _MjcfFrames:
+    """Elements of an MJCF file and those around them, settings of its compiler, and its gravity."""
 
-    classes: dict[str, dict[str, dict[str, str]]]
-    parents: dict[Element, Element]
-
-    @classmethod
-    def of(cls, root: Element) -> _Defaults:
-        """Those of a file."""
-        classes: dict[str, dict[str, dict[str, str]]] = {}
-
-        def collect(default: Element, inherited: dict[str, dict[str, str]]) -> None:
-            own = {part.tag: part.attrib for part in default if part.tag != "default"}
-            merged = {tag: inherited.get(tag, {}) | own.get(tag, {}) for tag in inherited.keys() | own.keys()}
-            classes[default.get("class", "main")] = merged
-            for nested in default.findall("default"):
-                collect(nested, merged)
-
-        for default in root.findall("default"):
-            collect(default, {})
-        return cls(classes, {child: parent for parent in root.iter() for child in parent})
+    root: Element
+    around: _Around
+    settings: Mapping[str, str]
+    gravity: Vector
 
     def attributes(self, element: Element) -> dict[str, str]:
-        """Those of an element and of its class, or of the childclass of the nearest body around it."""
-        name, around = element.get("class"), element
-        while name is None and around in self.parents:
-            around = self.parents[around]
-            name = around.get("childclass")
-        return self.classes.get(name or "main", {}).get(element.tag, {}) | element.attrib
+        """Those of an element and of its class, or the nearest childclass around it, and of the classes around that."""
+        name, outer, values = element.get("class"), element, dict(element.attrib)
+        while name is None and outer in self.around:
+            outer = self.around[outer]
+            name = outer.get("childclass")
+        classes = [part for part in self.root.iter("default") if name and part.get("class") == name]
+        while classes and classes[-1].tag == "default":
+            classes.append(self.around[classes[-1]])
+        for default in (*classes, *reversed(self.root.findall("default"))):
+            part = default.find(element.tag) if default.tag == "default" else None
+            values = values if part is None else {**part.attrib, **values}
+        return values
 
-
-@dataclass(frozen=True, slots=True)
-class _MjcfFrames:
-    """Units and sequence of angles in an MJCF file; of the sequence small letters turn with the frame."""
-
-    radians: bool
-    sequence: str
+    def pose(self, numbers: _Numbers, element: Element, around: Sequence[Element]) -> Pose:
+        """Rotation and place of an element of a body, within the frames around it."""
+        pose = _IDENTITY, _ZERO
+        for frame in (*around, element):
+            values = self.attributes(frame)
+            pose = _within(pose, (self.rotation(numbers, values), numbers.three(values.get("pos"), "pos", "0 0 0")))
+        return pose
 
     def rotation(self, numbers: _Numbers, frame: Mapping[str, str]) -> Tensor:
-        """Rotation of a frame: a quaternion, axisangle, two axes, the third axis, or euler angles."""
-        key = next((key for key in _ORIENTATIONS if key in frame), "euler")
+        """Rotation of a frame: a quaternion, axisangle, two axes, the third axis, or euler angles.
+
+        Of the sequence of euler angles small letters turn with the frame.
+        """
+        keys = [key for key in _ORIENTATIONS if key in frame]
+        if len(keys) > 1:
+            raise InputError(f"{numbers.where}: {' and '.join(keys)} were given.", "Give one orientation.")
+        key = keys[0] if keys else "euler"
         values = numbers.read(frame.get(key), key, "0 0 0")
         if len(values) != _ORIENTATIONS[key]:
             raise InputError(f"{numbers.where}: {key} has {len(values)} numbers.", f"Give {_ORIENTATIONS[key]}.")
-        unit = "" if self.radians else "deg"
+        unit = "" if self.settings.get("angle") == "radian" else "deg"
         if key == "quat":
             return _turn(*values)
         if key == "axisangle":
@@ -535,11 +670,30 @@ class _MjcfFrames:
             x, y, z = _unit(values)
             return _turn(*((1 + z, -y, x, 0) if z > -1 else (0, 1, 0, 0)))
         turns = _IDENTITY
-        for letter, angle in zip(self.sequence, values, strict=True):
+        for letter, angle in zip(self.settings.get("eulerseq", "xyz"), values, strict=True):
             around = [int(letter.lower() == name) for name in "xyz"]
             turn = _rotation(Attitude.axis_angle(around, f"{angle}{unit}"))
             turns = multiplied(turns, turn) if letter.islower() else multiplied(turn, turns)
         return turns
+
+    def shapes(self, numbers: _Numbers, parts: _Parts) -> list[Shape]:
+        """The geoms of a body; [] where a mesh, or another shape without moments here, is among them."""
+        shapes: list[Shape] = []
+        for geom, around in parts:
+            if geom.tag != "geom":
+                continue
+            values = self.attributes(geom)
+            size, kind = numbers.read(values.get("size"), "size", ""), values.get("type", "sphere")
+            if (kind, len(size)) == ("box", 3):
+                moments = _box(*(2 * value for value in size))
+            elif (kind, len(size)) == ("cylinder", 2):
+                moments = _cylinder(size[0], 2 * size[1])
+            elif (kind, len(size)) == ("sphere", 1):
+                moments = _sphere(size[0])
+            else:
+                return []
+            shapes.append((*self.pose(numbers, geom, around), moments))
+        return shapes
 
 
 def _turn(*quaternion: Any) -> Tensor:
@@ -563,23 +717,6 @@ def _of_axes(x: Sequence[Fraction], y: Sequence[Fraction]) -> Tensor:
     third = _unit(cross(first, vector(y, "xyaxes")))
     columns = (first, cross(third, first), third)
     return _rotation(Attitude.matrix(transposed(columns), normalize=True))
-
-
-def _geoms(numbers: _Numbers, geoms: Sequence[Mapping[str, str]], frames: _MjcfFrames) -> list[Shape]:
-    shapes: list[Shape] = []
-    for geom in geoms:
-        size = numbers.read(geom.get("size"), "size", "")
-        kind = geom.get("type", "sphere")
-        if (kind, len(size)) == ("box", 3):
-            moments = _box(*(2 * value for value in size))
-        elif (kind, len(size)) == ("cylinder", 2):
-            moments = _cylinder(size[0], 2 * size[1])
-        elif (kind, len(size)) == ("sphere", 1):
-            moments = _sphere(size[0])
-        else:
-            return []
-        shapes.append((frames.rotation(numbers, geom), numbers.three(geom.get("pos"), "pos", "0 0 0"), moments))
-    return shapes
 
 
 _PRIM = re.compile(r'(?:def|over)\s+(?:\w+\s+)?"([^"]*)"')
@@ -698,7 +835,12 @@ def _toml_table(name: str, table: Mapping[str, Any]) -> BodyInFile:
             f"{numbers.where}: it is not said which point the inertia tensor is about.",
             'Give about = "pivot" or about = "centre of mass".',
         )
-    return BodyInFile(name, mass, centre, six, slack, table.get("about") == "pivot", si=False)
+    if table.get("rotor"):
+        raise InputError(
+            f"{numbers.where}: a rotor is not read from a file.", "Give the keys of the body in place of it."
+        )
+    gravity = (Fraction(0), Fraction(0), -numbers.one(str(table.get("gravity", "9.81")), "gravity"))
+    return BodyInFile(name, mass, centre, six, slack, gravity=gravity, at_pivot=table.get("about") == "pivot", si=False)
 
 
 def _texts(values: Any) -> list[str]:

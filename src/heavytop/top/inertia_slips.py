@@ -11,11 +11,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations
+from itertools import chain, combinations, permutations, product
 
 from heavytop.errors import InputError
 from heavytop.precision import Vector, cross, decimal_text, dot, round_to, shown
-from heavytop.top.attitude import multiplied, transposed
+from heavytop.top.attitude import Rows, multiplied, transposed
 
 Tensor = tuple[Vector, Vector, Vector]
 Six = tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]
@@ -32,6 +32,13 @@ _ROUND = 10
 """By so much the products of inertia shrink without Steiner's part where the tensor was meant about the pivot."""
 _APART = Fraction(1, 20)
 """Relative distance of a tensor from that of the geometry in the file from which on it is another."""
+_HULL, _END = 3, 5
+"""Largest second moments of a body within a box, a cylinder or a sphere, in those of the uniform shape: their trace, as
+with all mass in the corners of a box; along an axis, as in two poles of a sphere."""
+_DENSE_CORE = Fraction(1, 30)
+"""Their least trace that a unit may leave."""
+_TYPICAL = 300
+"""kg/m³ of a fifth of the cube around a body."""
 _SMALL = Fraction(1, 10**9)
 _ROUNDINGS = Fraction(1, 2**48)
 """Of the largest entry, by which a tensor that was multiplied in double may miss symmetry."""
@@ -44,8 +51,8 @@ class MassProperties:
 
     six: the tensor in the order of :data:`Six`, about the centre of mass, or about the pivot where ``at_pivot``.
     centre: of mass, from the pivot.  slack: rounding of the printed numbers, of any entry.  si: kg and metres.
-    geometry: the tensor of the shapes in the same file, about the centre of mass, as a uniform body; and the rotation
-    of their axes.
+    geometry: the tensor of the shape in the same file, about its centre, uniform and of 1 kg; and the rotation of its
+    axes.
     """
 
     six: Six
@@ -136,7 +143,7 @@ def _semidefinite(tensor: Tensor, slack: Fraction) -> bool:
     return min(*minors, determinant(t)) >= 0
 
 
-def determinant(tensor: Tensor) -> Fraction:
+def determinant(tensor: Rows[Fraction]) -> Fraction:
     """det J."""
     return dot(tensor[0], cross(tensor[1], tensor[2]))
 
@@ -177,13 +184,17 @@ def slips(body: MassProperties) -> list[Slip]:
 
     A realisable tensor is implausible where no material is so dense or so thin, where the centre of mass lies a hundred
     sizes away, where Steiner's part explains its products of inertia, or where the geometry of the file has another.
+    No slip contradicts that geometry.
     """
-    central = body.central
-    if not realisable(central, body.slack):
-        if has_second_moments(central, body.slack):
-            return [_rod(body)]
-        return [slip for slip, mended in _mends(body) if realisable(mended.central, body.slack)]
-    return [*_against_geometry(body), *_of_units(body), *_of_products(body)][:3]
+    possible = realisable(body.central, body.slack)
+    if not possible and has_second_moments(body.central, body.slack):
+        return [_rod(body)]
+    if slip := next(_against_geometry(body), None):
+        return [slip]
+    if not possible:
+        mends = [pair for pair in _mends(body) if realisable(pair[1].central, body.slack) and _in_shape(pair[1])]
+        return [slip for slip, _ in sorted(mends, key=lambda pair: _ROUND * _products(pair[1]) > _products(body))]
+    return [*_of_units(body), *_of_products(body)][:3] or [*_beyond_shape(body)]
 
 
 def _rod(body: MassProperties) -> Slip:
@@ -213,13 +224,16 @@ def _mends(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     ):
         yield _mend(body, "order_urdf", f"The six numbers are in the order {which}.", six)
     yield from _row_major(body)
-    absolute = (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:])
-    if absolute != n:
-        yield _mend(body, "negative_moment", "A moment of inertia is negative: its sign is wrong.", absolute)
     flipped = (*n[:3], -n[3], -n[4], -n[5])
     sentence = "The products of inertia have the other sign: I12 is minus the integral of x y dm."
     if flipped != n:
         yield _mend(body, "signs_of_products", sentence, flipped)
+    if not body.at_pivot and any(body.centre):
+        sentence = "The tensor was about the centre of mass already when Steiner's part was subtracted from it."
+        yield _mend(body, "about_centre", sentence, six_of(plus(rows(n), steiner(body.mass, body.centre))))
+    if negative := sum(value < 0 for value in n[:3]):
+        cause = "A moment of inertia is negative: its sign is" if negative == 1 else "Signs of moments of inertia are"
+        yield _mend(body, "negative_moment", f"{cause} wrong.", (abs(n[0]), abs(n[1]), abs(n[2]), *n[3:]))
     if body.at_pivot:
         slip = Slip("about_centre", "The tensor is about the centre of mass, and was read as about the pivot.", n)
         yield slip, replace(body, at_pivot=False)
@@ -247,8 +261,9 @@ def _row_major(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
         if first <= 0 or second <= 0:
             continue
         sentence = "These are the first six numbers of the matrix row by row; I33 is not among them."
-        for part in range(64, 0, -1):  # of what the triangle inequality allows
-            mended = replace(body, six=(first, second, Fraction(part, 64) * (first + second), *products))
+        parts = (Fraction(part, 64) * (first + second) for part in range(64, 0, -1))  # of what the inequality allows
+        for third in parts if body.geometry is None else (body.mass * body.geometry[2][2],):
+            mended = replace(body, six=(first, second, third, *products))
             if realisable(mended.central, body.slack):
                 yield Slip("row_major", sentence, (first, second, None, *products)), mended
                 break
@@ -260,17 +275,17 @@ def _size(body: MassProperties) -> float:
     return math.sqrt(12 * trace / body.mass)
 
 
-def _scaled(body: MassProperties, length: int, mass: int) -> MassProperties:
-    """With lengths of the tensor and masses divided."""
-    a, b, c, d, e, f = (value / mass / length**2 for value in body.six)
-    return replace(body, six=(a, b, c, d, e, f), mass=body.mass / mass, slack=body.slack / mass / length**2)
-
-
-_UNITS = (
-    ("grams", 1, 1000, "Mass and tensor are in grams: no material is as dense as this body."),
-    ("millimetres", 1000, 1, "The tensor is in kg mm^2: a body of this mass and so large is thinner than air."),
-    ("grams", 1000, 1000, "Mass and tensor are in grams and millimetres: a body this large is thinner than air."),
+_INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
+_UNITS: tuple[tuple[str, str, Fraction | int], ...] = (
+    ("millimetres", "kg mm^2", 10**6),
+    ("centimetres", "kg cm^2", 10**4),
+    ("grams", "g m^2", 10**3),
+    ("grams", "g cm^2", 10**7),
+    ("grams", "g mm^2", 10**9),
+    ("inches", "kg in^2, or lb in^2 beside a mass in lb", 1 / _INCH**2),
+    ("inches", "lb in^2", 1 / _POUND / _INCH**2),
 )
+"""Names of units of length or mass, units of a tensor, and their number in a kg m^2."""
 
 
 def _of_units(body: MassProperties) -> Iterator[Slip]:
@@ -289,11 +304,25 @@ def _of_units(body: MassProperties) -> Iterator[Slip]:
             sentence = "The mass is in grams: no material is as dense as this body."
             yield Slip("grams", sentence, body.six, only_mass.mass)
             return
-    for name, length, mass, sentence in _UNITS:
-        mended = _scaled(body, length, mass)
-        wrong = 5 * density > _DENSEST if length == 1 else density < _THINNEST
-        if wrong and _PLAUSIBLE[0] < 5 * float(mended.mass) / _size(mended) ** 3 < _PLAUSIBLE[1]:
-            yield Slip(name, sentence, mended.six, None if mass == 1 else mended.mass)
+    likely = []
+    for (name, unit, number), (slip, mended) in zip(_UNITS, _in_units(body), strict=True):
+        mended = replace(mended, mass=body.mass / 1000) if name == "grams" else mended
+        wrong = 5 * density > _DENSEST if number == 1000 else density < _THINNEST and name != "inches"
+        reason = "no material is as dense as this body" if number == 1000 else "a body this large is thinner than air"
+        slip = replace(slip, sentence=f"The tensor is in {unit}: {reason}.")
+        ratio = 5 * float(mended.mass) / _size(mended) ** 3
+        if wrong and _PLAUSIBLE[0] < ratio < _PLAUSIBLE[1] and _DENSE_CORE < _trace_ratio(mended) < _HULL:
+            likely.append((abs(math.log(ratio / _TYPICAL)) + abs(math.log(mended.mass)), _of_mass(slip, mended, body)))
+    yield from (slip for _, slip in sorted(likely, key=lambda pair: pair[0]))
+
+
+def _of_mass(slip: Slip, mended: MassProperties, body: MassProperties) -> Slip:
+    return slip if mended.mass == body.mass else replace(slip, mass=mended.mass)
+
+
+def _products(body: MassProperties) -> Fraction:
+    """The largest product of inertia."""
+    return max(map(abs, body.six[3:]))
 
 
 def _of_products(body: MassProperties) -> Iterator[Slip]:
@@ -301,7 +330,7 @@ def _of_products(body: MassProperties) -> Iterator[Slip]:
     if body.at_pivot or body.geometry is not None:
         return
     less = six_of(minus(rows(body.six), steiner(body.mass, body.centre)))
-    with_part, without = (max(map(abs, six[3:])) for six in (body.six, less))
+    with_part, without = _products(body), max(map(abs, less[3:]))
     if with_part > body.slack and without * _ROUND <= with_part and realisable(rows(less), body.slack):
         sentence = (
             "The tensor is about the pivot, and was read as about the centre of mass: its products are Steiner's."
@@ -309,15 +338,42 @@ def _of_products(body: MassProperties) -> Iterator[Slip]:
         yield Slip("about_pivot", sentence, less)
 
 
+def _trace_ratio(body: MassProperties) -> Fraction:
+    """Square of the radius of gyration about the centre of mass, in that of the uniform shape; 1 without a shape."""
+    if body.geometry is None:
+        return Fraction(1)
+    return sum(body.central[i][i] for i in range(3)) / (body.mass * sum(body.geometry[i][i] for i in range(3)))
+
+
+def _in_shape(body: MassProperties) -> bool:
+    """Whether a body within the shape in its file can have this tensor, by the second moments along its axes."""
+    if body.geometry is None or (axes := body.geometry_axes) is None:
+        return True
+    moments = (second_moments(tensor) for tensor in (body.central, body.geometry))
+    own, uniform = (multiplied(transposed(axes), multiplied(tensor, axes)) for tensor in moments)
+    return all(own[i][i] <= _END * body.mass * uniform[i][i] + body.slack for i in range(3))
+
+
+def _beyond_shape(body: MassProperties) -> Iterator[Slip]:
+    """Whether the radius of gyration exceeds that of all bodies within the shape of the file."""
+    if body.geometry is not None and (ratio := _trace_ratio(body)) > _HULL:
+        half = sum(body.geometry[i][i] for i in range(3)) / 2
+        own, most = (decimal_text(Fraction(math.sqrt(factor * half)), 3) for factor in (ratio, _HULL))
+        sentence = f"The radius of gyration is {own} m; within the shape in the file it is at most {most} m."
+        yield Slip("beyond_shape", sentence, body.six)
+
+
 def _against_geometry(body: MassProperties) -> Iterator[Slip]:
-    """The slip by which the tensor becomes that of the shapes in the file."""
-    shape = body.geometry
-    if shape is None or (apart := _distance(body.central, shape)) < _APART:
+    """The slips by which the tensor becomes that of the shape in the file."""
+    if body.geometry is None or (apart := _from_shape(body)) < _APART:
         return
-    for slip, mended in (*_conjugated(body), *_mends(body), *_about_pivot(body), *_of_scale(body)):
-        if _distance(mended.central, mended.geometry or shape) * _ROUND < min(apart, Fraction(1, 5)):
-            yield slip if mended.mass == body.mass else replace(slip, mass=mended.mass)
-            return
+    lighter, size = body, _size(replace(body, six=six_of(body.geometry), mass=Fraction(1), at_pivot=False))
+    if 5 * float(body.mass) / size**3 > _DENSEST:
+        lighter = replace(body, mass=body.mass / 1000)
+    ways = (_conjugated(body), _mends(body), _about_pivot(body), _in_units(lighter), _of_axes(body))
+    for slip, mended in chain(*ways):
+        if _from_shape(mended) * _ROUND < min(apart, Fraction(1, 5)):
+            yield _of_mass(slip, mended, body)
 
 
 def _conjugated(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
@@ -335,21 +391,26 @@ def _about_pivot(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
     yield _mend(body, "about_pivot", "The tensor is about the pivot, and was read as about the centre of mass.", less)
 
 
-def _of_scale(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
-    if body.geometry is not None:
-        shape = replace(body, six=six_of(body.geometry), at_pivot=False)
-        if 5 * float(body.mass) / _size(shape) ** 3 > _DENSEST:
-            lighter = _scaled(shape, 1, 1000)
-            body = replace(body, mass=lighter.mass, geometry=rows(lighter.six))
-    for name, scale, unit in (
-        ("millimetres", 10**6, "kg mm^2"),
-        ("grams", 10**3, "g m^2"),
-        ("grams", 10**9, "g mm^2"),
-    ):
-        yield _mend(body, name, f"The tensor is in {unit}.", [value / scale for value in body.six])
+def _in_units(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    for name, unit, number in _UNITS:
+        yield _mend(body, name, f"The tensor is in {unit}.", [value / number for value in body.six])
 
 
-def _distance(one: Tensor, other: Tensor) -> Fraction:
-    """Largest difference of two tensors, relative to the largest entry of the second."""
-    apart = max(map(abs, six_of(minus(one, other))))
-    return apart / max(map(abs, six_of(other)))
+def _of_axes(body: MassProperties) -> Iterator[tuple[Slip, MassProperties]]:
+    """Signs of single products of inertia, and axes taken for one another."""
+    tensor = rows(body.six)
+    for order in permutations(range(3)):
+        name, sentence = "signs_of_products", "Some products of inertia have the other sign."
+        if order != (0, 1, 2):
+            axes = ", ".join(f"I{i + 1}{i + 1}" for i in order)
+            name, sentence = "exchanged_axes", f"The axes are exchanged: {axes} were meant as I11, I22, I33."
+        moments = [tensor[i][i] for i in order]
+        products = [tensor[order[i]][order[j]] for i, j in combinations(range(3), 2)]
+        for signs in product((1, -1), repeat=3):
+            yield _mend(body, name, sentence, [*moments, *(a * b for a, b in zip(signs, products, strict=True))])
+
+
+def _from_shape(body: MassProperties) -> Fraction:
+    """Largest difference from the uniform shape in the file, relative to its largest entry."""
+    shape = [body.mass * value for value in six_of(body.geometry or body.central)]
+    return max(abs(a - b) for a, b in zip(six_of(body.central), shape, strict=True)) / max(map(abs, shape))

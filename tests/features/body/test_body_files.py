@@ -507,3 +507,138 @@ def test_a_link_is_chosen_from_python_as_the_message_says(tmp_path: Path) -> Non
     with pytest.raises(ht.InputError, match='link="arm" in Python'):
         ht.Body.from_file(path)
     assert ht.Body.from_file(path, link="leg").mass == 2
+
+
+SHAPE = '<visual><origin xyz="0 0 .3"/><geometry><box size=".1 .3 .6"/></geometry></visual>'
+UNIFORM = (0.075, 0.37 / 6, 1 / 60)
+"""Moments of 2 kg in that box."""
+TWICE = (0.075 - 0.18, 0.37 / 6 - 0.18, 1 / 60)
+"""Less Steiner's part, 2 · 0.3²."""
+
+
+@pytest.mark.parametrize(
+    ("moments", "shape", "names"),
+    [
+        (TWICE, SHAPE, ["about_centre"]),
+        (TWICE, "", ["about_centre", "negative_moment"]),
+        ([2 * TWICE[0] / 3, 2 * TWICE[1] / 3, 0.02], SHAPE, ["about_centre"]),
+        ([1e4 * value for value in UNIFORM], SHAPE, ["centimetres"]),
+        ([1e4 * value for value in UNIFORM], "", ["centimetres", "grams"]),
+        ([value / 0.0254**2 for value in UNIFORM], SHAPE, ["inches"]),
+        ([value / 0.0254**2 / 0.45359237 for value in UNIFORM], SHAPE, ["inches"]),
+        ([1e7 * value for value in UNIFORM], SHAPE, ["grams"]),
+        ([40 * value for value in UNIFORM], SHAPE, ["beyond_shape"]),
+        ([2.9 * value for value in UNIFORM], SHAPE, []),
+        ([UNIFORM[1], UNIFORM[2], UNIFORM[0]], SHAPE, ["exchanged_axes"]),
+        ([-UNIFORM[0], -UNIFORM[1], UNIFORM[2]], SHAPE, ["negative_moment"]),
+    ],
+)
+def test_a_slip_agrees_with_the_shape_in_the_same_file(
+    tmp_path: Path, moments: Sequence[float], shape: str, names: list[str]
+) -> None:
+    six = [repr(value) for value in (*moments, 0.0, 0.0, 0.0)]
+    document = judged(tmp_path / "a.urdf", urdf(six, mass="2", centre="0 0 .3", extra=shape))[1]
+    assert [slip["name"] for slip in document["slips"]] == names  # type: ignore[attr-defined, index]
+    if names and shape and names != ["beyond_shape"] and sum(moments) != pytest.approx(2 * sum(TWICE[:2]) / 3 + 0.02):
+        mended = [float(value) for value in document["slips"][0]["inertia"]]  # type: ignore[index]
+        assert mended[:3] == pytest.approx(UNIFORM, rel=1e-9)
+
+
+def test_one_sign_of_three_products_is_named_by_the_shape(tmp_path: Path) -> None:
+    turned = SHAPE.replace('xyz="0 0 .3"', 'xyz="0 0 .3" rpy=".5 .4 .3"')
+    right = urdf([repr(value) for value in (*UNIFORM, 0.0, 0.0, 0.0)], "2", "0 0 .3", turned, ".5 .4 .3")
+    (path := tmp_path / "a.urdf").write_text(right)
+    six = [repr(float(value)) for value in read_body(path).six]
+    assert judged(path, urdf(six, "2", "0 0 .3", turned))[0] == 0
+    six[4] = repr(-float(six[4]))
+    code, document = judged(path, urdf(six, "2", "0 0 .3", turned))
+    assert (code, document["slips"][0]["name"]) == (1, "signs_of_products")  # type: ignore[index]
+
+
+BALL = '<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.03 0.05 0.04"/>'
+FRAMED = f'<frame euler="0 0 90" pos="0 0 1">{BALL}</frame>'
+LINK = (
+    '<sdf version="1.9">{before}<model name="m"><frame name="f"><pose degrees="1">0 0 0 0 0 90</pose></frame>'
+    '<frame name="g" attached_to="arm"><pose>1 0 0 0 0 0</pose></frame><link name="arm"><pose>0 0 1 0 0 0</pose>'
+    "{exempt}<inertial><pose {form}>0.1 0 0.2 {angles}</pose><mass>2</mass><inertia><ixx>0.03</ixx><iyy>0.05</iyy>"
+    "<izz>0.04</izz></inertia></inertial></link>{joint}</model>{after}</sdf>"
+)
+JOINT = '<joint name="j" type="ball"><parent>world</parent><child>{}</child><pose {}>0 0 -0.5 0 0 0</pose></joint>'
+
+
+def in_mjcf(body: str, before: str = "") -> tuple[str, str]:
+    return "xml", f'<mujoco>{before}<worldbody><body name="arm">{body}</body></worldbody></mujoco>'
+
+
+def in_sdf(
+    form: str = "", angles: str = "0 0 0", joint: str = "", gravity: str = "", exempt: str = ""
+) -> tuple[str, str]:
+    around = (f'<world name="w">{gravity}', "</world>") if gravity else ("", "")
+    return "sdf", LINK.format(form=form, angles=angles, joint=joint, before=around[0], after=around[1], exempt=exempt)
+
+
+# As MuJoCo 4.0.0 and Drake 1.56 read them: centre of mass from the pivot, mass, I11 I22 I33, gravity.
+READ = {
+    "bounds": (in_mjcf(BALL, '<compiler boundmass="5" boundinertia=".045"/>'), "0.1 0 0.2 5 0.045 0.05 0.045 9.81"),
+    "joint in a frame": (
+        in_mjcf(f'<frame pos="0 0 1"><joint type="ball"/></frame>{BALL}'),
+        "0.1 0 -0.8 2 0.03 0.05 0.04 9.81",
+    ),
+    "inertial in a frame": (in_mjcf(FRAMED), "0 0.1 1.2 2 0.05 0.03 0.04 9.81"),
+    "gravity": (in_mjcf(BALL, '<option gravity="0 0 -1.62"/>'), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
+    "no gravity": (in_mjcf(BALL, '<option><flag gravity="disable"/></option>'), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
+    "degrees": (in_sdf('degrees="1"', "90 90 0"), "0.1 0 0.2 2 0.05 0.04 0.03 9.81"),
+    "ball": (in_sdf(joint=JOINT.format("arm", "")), "0.1 0 0.7 2 0.03 0.05 0.04 9.81"),
+    "ball in the model": (
+        in_sdf(joint=JOINT.format("arm", 'relative_to="f"')),
+        "0.1 0 1.7 2 0.03 0.05 0.04 9.81",
+    ),
+    "ball of a frame": (in_sdf(joint=JOINT.format("g", "")), "-0.9 0 0.7 2 0.03 0.05 0.04 9.81"),
+    "moon": (in_sdf(gravity="<gravity>0 0 -1.62</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 1.62"),
+    "world": (in_sdf(gravity="<gui/>"), "0.1 0 0.2 2 0.03 0.05 0.04 9.8"),
+    "exempt": (in_sdf(exempt="<gravity>0</gravity>"), "0.1 0 0.2 2 0.03 0.05 0.04 0"),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_frames_joints_bounds_and_gravity_are_those_of_the_format(tmp_path: Path, name: str) -> None:
+    (suffix, text), numbers = READ[name]
+    (path := tmp_path / f"a.{suffix}").write_text(text)
+    body, expected = read_body(path), [Fraction(number) for number in numbers.split()]
+    given = body.about(None)
+    assert [*given.centre, given.mass, *given.six[:3], body.gravity_down] == expected
+    assert ht.Body.from_file(path).gravity == expected[-1]
+    assert f'gravity = "{numbers.split()[-1]}"' in heavytop("body", path).stdout
+    assert ht.Body.from_file(path, gravity=3).gravity == 3
+
+
+UNREAD = {
+    "two tensors": (in_mjcf(BALL.replace("/>", ' fullinertia="1 1 1 0 0 0"/>')), "fullinertia and diaginertia"),
+    "two inertials": (in_mjcf(BALL + FRAMED), "2 inertials"),
+    "two orientations": (in_mjcf(BALL.replace("pos", 'euler="0 0 1" quat="1 0 0 0" pos')), "quat and euler"),
+    "a bound": (("xml", mjcf(SIX).replace("<world", '<compiler boundinertia=".2"/><world')), "boundinertia"),
+    "global": (in_mjcf(BALL, '<compiler coordinate="global"/>'), "MuJoCo 2.3.3"),
+    "fused": (in_mjcf(BALL, '<compiler fusestatic="true"/>'), "fusestatic"),
+    "gravity along y": (in_mjcf(BALL, '<option gravity="0 -9.81 0"/>'), "--gravity"),
+    "no boolean": (in_sdf('degrees="yes"'), "degrees must be true or false; got 'yes'"),
+    "quaternion": (in_sdf('rotation_format="quat_xyzw" degrees="true"', "0 0 0 1"), "without degrees"),
+    "format": (in_sdf('rotation_format="xyz"'), "euler_rpy"),
+    "inertial elsewhere": (in_sdf('relative_to="f"'), "relative_to 'f'"),
+    "two balls": (in_sdf(joint=2 * JOINT.format("arm", "")), "2 ball joints"),
+    "a frame of none": (in_sdf(joint=JOINT.format("arm", 'relative_to="q"')), "no frame 'q'"),
+    "a circle": (in_sdf(joint=JOINT.format("arm", 'relative_to="j"')), "circle"),
+    "another model": (in_sdf(joint=JOINT.format("n::arm", "")), "another model"),
+    "a fluid": (("sdf", sdf(SIX).replace("<mass>", "<fluid_added_mass/><mass>")), "fluid"),
+    "a rotor": (("toml", 'mass = 1\ninertia = [1, 1, 1]\nrotor = [0, 0, 1]'), "rotor"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNREAD)
+def test_what_a_format_defines_and_is_not_read_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    (suffix, text), fault = UNREAD[name]
+    (path := tmp_path / f"a.{suffix}").write_text(text)
+    run = heavytop("body", path)
+    assert (run.returncode, fault in run.stderr) == (2, True), run.stderr

@@ -18,7 +18,9 @@ def body(
     pivot: Annotated[
         str | None, typer.Option(help="Fixed point x,y,z in the axes of the link; without it a ball joint, or 0,0,0.")
     ] = None,
-    gravity: Annotated[str, typer.Option(help="Acceleration of gravity, of the table that is printed.")] = "9.81",
+    gravity: Annotated[
+        str | None, typer.Option(help="Acceleration of gravity in the printed table; without it the file's, or 9.81.")
+    ] = None,
     json: Json = False,
 ) -> int:
     """Check the inertia tensor in a URDF, MJCF or SDF.

@@ -17,7 +17,6 @@ from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.inertia_slips import MassProperties, Slip, realisable, six_of, slips
 from heavytop.top.stability import Stability, stability
 
-GRAVITY = "9.81"
 _NAMES = ("I11", "I22", "I33", "I12", "I13", "I23")
 _DIGITS, _PRINTED = 17, 6
 _BITS = 64
@@ -36,7 +35,7 @@ class BodyAssessment:
     given: MassProperties
     realisable: bool
     slips: tuple[Slip, ...]
-    gravity: str = GRAVITY
+    gravity: str
 
     @property
     def principal(self) -> PrincipalAxes:
@@ -143,9 +142,13 @@ def _labelled(label: str, text: str) -> list[str]:
     return wrapped(text, " " * 20, f"{label:<20}")
 
 
-def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str = GRAVITY) -> BodyAssessment:
-    """The assessment of a body about a pivot in the axes of its link; None: its ball joint, or the origin."""
+def assess(body: BodyInFile, pivot: Vector | None = None, gravity: str | None = None) -> BodyAssessment:
+    """The assessment of a body about a pivot in the axes of its link; None: its ball joint, or the origin.
+
+    gravity: of the table of a plan; None: that of the file.
+    """
     about_pivot = body.about(pivot)
+    gravity = _decimal(body.gravity_down) if gravity is None else gravity
     return BodyAssessment(
         body.name, about_pivot, realisable(about_pivot.central, about_pivot.slack), tuple(slips(about_pivot)), gravity
     )
