@@ -10,8 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, cases, command, print_json, show_on_terminal
-from heavytop.cli.output import WHOLE_WORDS, Progress
+from heavytop.cli.output import Progress
 from heavytop.errors import ExitCode, InputError
+
+_WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
 
 @command
@@ -44,9 +46,9 @@ def check_integrator(
         width = max(len(check.check) for check in results)
         for result in results:
             head = f"{result.verdict:8}  {result.check:{width}}  "
-            print(fill(result.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **WHOLE_WORDS))
+            print(fill(result.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
         print(f"\n{len(violated)} of {len(results)} violated." if violated else "\nNothing is violated.")
-        print(fill(NOT_TRIED, 80, **WHOLE_WORDS))
+        print(fill(NOT_TRIED, 80, **_WHOLE_WORDS))
     return ExitCode.FINDING if violated else ExitCode.GOOD
 
 
@@ -74,7 +76,7 @@ def new(
         raise InputError("A folder must be named.", "Give DIR, or --into a repository.")
     made = (into or Path()) / (folder or "heavytop")
     files = new_integrator(made, language, method, into, engine)
-    print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **WHOLE_WORDS))
+    print(fill(f"{made}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     first = "cat README.md" if engine else f"{LANGUAGES[language].build}; heavytop check-integrator mine.toml"
     print(f"Next: cd {made}; {first}; heavytop gate --bless")
     return ExitCode.GOOD

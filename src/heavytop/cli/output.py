@@ -9,8 +9,6 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from shutil import get_terminal_size
-from textwrap import fill
 from threading import Event, Thread, Timer
 from time import perf_counter
 from typing import Any, Self, TextIO
@@ -20,7 +18,6 @@ from heavytop.errors import HeavyTopError
 
 _LOSSY = {"strict": "replace", "surrogateescape": "replace"}
 _own: TextIO | None = None
-WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False, "replace_whitespace": False}
 _CAUSES = {errno.EBADF: "it is closed"}
 
 
@@ -100,10 +97,8 @@ def messages() -> TextIO:
 
 
 def say(text: str) -> None:
-    """A message for people, wrapped where the width of a terminal is known."""
-    width = get_terminal_size((0, 0)).columns or len(text) + 12
-    lines = (fill(line, width, subsequent_indent="  ", **WHOLE_WORDS) for line in f"heavytop: {text}".splitlines())
-    print("\n".join(lines), file=messages(), flush=True)
+    """A message for people."""
+    print(f"heavytop: {text}", file=messages(), flush=True)
 
 
 def say_former(names: Iterable[str]) -> None:

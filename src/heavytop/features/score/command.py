@@ -32,7 +32,7 @@ _STATE_SECONDS = 1e-3
 def score(
     trajectories: Annotated[
         list[Path],
-        typer.Argument(metavar="TRAJECTORY...", help="Files as `heavytop docs score` lists them; - reads one."),
+        typer.Argument(metavar="TRAJECTORY...", help="Files of trajectories (`heavytop docs score`); - reads one."),
     ],
     case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
