@@ -1,6 +1,7 @@
 """The same rows from one process, from two, and from a Dask cluster on this machine; with workers killed too."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -102,8 +103,9 @@ def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Pat
     assert lost.finite
     assert digits_kept(lost) == 0
     assert list(contradictions(lost, KINDS["drift"])) == []
-    assert str(ends) in summary_of([lost])
-    assert f"–{ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
+    for text in (summary_of([lost]), brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)):
+        last, first = re.search(r"lost (\d+)–(\d+)", text).groups()
+        assert 200 <= int(last) < int(first) <= ends
 
 
 class Poison:

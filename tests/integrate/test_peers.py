@@ -80,6 +80,11 @@ def test_what_a_library_gives_back_is_judged(states, outcome: Outcome, count: in
     assert run.time_reached == (5 if outcome is Outcome.SUCCESS else Fraction(1, 2))
 
 
+def test_fewer_states_without_an_outcome_are_incomplete() -> None:
+    fake = double_peer("fake", 1, lambda given: Solved([[0.0] * 6], 0.5, 1))
+    assert fake(CASES["euler"].top, CASES["euler"].start, TIMES, DOUBLE).outcome is Outcome.INCOMPLETE
+
+
 def test_what_a_peer_cannot_do_is_refused() -> None:
     case = CASES["euler"]
     both = case.top, case.start

@@ -240,7 +240,7 @@ def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
     assert ">t^1.5 (1.50)</text>" in along.svg
     assert "double: t^1.5, exponent 1.50 [1.40, 1.60]." in along.description
     assert "(1.50)" not in drift.svg
-    lines = {tuple(line[:3]): line[5:7] for line in section.rows}
+    lines = {tuple(line[:3]): line[6:8] for line in section.rows}
     assert lines["euler", "double", "error along"] == ["t^1.5", "1.50 [1.40, 1.60]"]
     assert lines["euler", "double", "drift of energy"] == ["", ""]
 

@@ -416,6 +416,8 @@ def test_a_claim_of_numbers_is_no_claim_of_formulas() -> None:
     assert isinstance(claim_from_table(claim([one("omega", 1, "0.1")]), "x"), ValueClaim)
     with pytest.raises(InputError, match=r"needs the table \[motion\]"):
         claim_from_table({"name": "x", "kind": "motion", "top": TOP, "start": START}, "x")
+    with pytest.raises(InputError, match="kind = 'values' with"):
+        claim_from_table(claim([one("omega", 1, "0.1")]) | {"kind": "values"}, "x")
 
 
 @pytest.mark.slow

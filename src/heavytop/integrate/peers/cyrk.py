@@ -8,6 +8,7 @@ import numpy
 from CyRK import cyjit, nbsolve2_ivp
 
 from heavytop.integrate.peers.double import Request, Solution, Solve, compiled_once, count, double_peer, fill, timed
+from heavytop.integrate.trajectory import Outcome
 from heavytop.top.equations import System
 
 
@@ -41,7 +42,9 @@ def _solver(method: str) -> Solve:
         run = _call(request, method)
         try:
             states = run.y.T.copy()
-            return Solution(states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds)
+            return Solution(
+                states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds, Outcome.STEP_TOO_SMALL
+            )
         finally:
             run.free()
 

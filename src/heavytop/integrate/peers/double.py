@@ -93,7 +93,7 @@ class Solution:
     steps: int
     evaluations: int | None = None
     compile: float = 0.0
-    outcome: Outcome = Outcome.STEP_TOO_SMALL
+    outcome: Outcome = Outcome.INCOMPLETE
 
 
 Solve = Callable[[Request], Solution]

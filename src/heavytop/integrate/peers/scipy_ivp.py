@@ -34,7 +34,7 @@ def _solver(method: str) -> Solve:
             return Solution([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
         covered = request.times[abs(request.times) <= abs(run.t[-1])]
         states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
-        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)
+        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds, Outcome.STEP_TOO_SMALL)
 
     return solve
 

@@ -11,6 +11,7 @@ import numpy
 from sksundae.cvode import CVODE
 
 from heavytop.integrate.peers.double import Request, Solution, compiled_once, compiler, count, double_peer, fill, timed
+from heavytop.integrate.trajectory import Outcome
 from heavytop.top.equations import System
 
 _MOST_STEPS = 10**8
@@ -33,7 +34,8 @@ def _solve(request: Request) -> Solution:
     if len(request.times) == 1:
         # two times are a span: CVODE gives every step in between
         run = solver.solve(numpy.array([0.0, *request.times]), request.start)
-        return Solution(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
+        states = run.y[-1:] if run.success else []
+        return Solution(states, run.t[-1], len(run.t) - 1, run.nfev, seconds, Outcome.STEP_TOO_SMALL)
     # the states of CVODE.solve to the bit, which does not count the steps between more times
     run, end, steps, states = solver.init_step(0.0, request.start), request.times[-1], 0, list[Any]()
     for time in request.times:
@@ -43,7 +45,7 @@ def _solve(request: Request) -> Solution:
         if not run.success:
             break
         states.append(solver.step(time, tstop=end).y)
-    return Solution(states, run.t, int(steps), run.nfev, seconds)
+    return Solution(states, run.t, int(steps), run.nfev, seconds, Outcome.STEP_TOO_SMALL)
 
 
 cvode = double_peer("sundials:CVODE", 12, _solve, attitude=True)

@@ -114,7 +114,9 @@ class Lines:
             return
         if widths[0] + 2 <= room < wides[0]:
             wides[0] = room
-        while sum(wides) + 2 * len(wides) > options.max_width:  # the widest is made narrower, no cell than its words
+        while (
+            sum(wides) + 2 * (len(wides) - 1 + edge) > options.max_width
+        ):  # the widest is made narrower, no cell than its words
             wides[max(range(len(wides)), key=lambda index: (wides[index] > widths[index], wides[index]))] -= 1
         made = Table(box=None, pad_edge=edge, header_style="dim")
         for index, (column, wide) in enumerate(zip(columns, wides, strict=True)):

@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed
+from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted
 from heavytop.features.claims.audit.components import UserComponent
 from heavytop.features.claims.audit.context import ClaimFile
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
@@ -75,6 +75,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
         raise InputError(f"{where}: a claim has no key entry.", _REMEDY)
     if rest.get("kind") == "value":
         return _value_claim(rest, entry, where)
+    if "value" in rest:
+        raise InputError(f"{where}: kind = {quoted(rest.get('kind'))} with [[value]].", 'Use "value".')
     try:
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
