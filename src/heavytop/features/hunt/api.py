@@ -66,7 +66,7 @@ def hunt(
     Arguments:
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
         precision, horizon: the format, and the time up to which errors count; negative for backwards.
-        budget: a number of motions, or seconds such as "60s", which the cost of the first 64 makes a number, 64 at least.
+        budget: a number of motions, or seconds such as "60s": a number by the cost of the first 64, at least these.
         family: "any", or tops that are all "euler", "lagrange" or "kovalevskaya", or tops with a rotor,
             "heavy_gyrostat".
         against: an integrator; then the ratio to its error is searched for.
