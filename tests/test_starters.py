@@ -162,7 +162,7 @@ def gate_moves(folder: Path) -> None:
 
     code, said = gate()
     assert code == 2
-    assert "heavytop gate --bless" in said
+    assert "heavytop gate --workers 1 --bless" in said
     assert not (folder / ".heavytop").exists()
     code, said = gate("--bless")
     assert code == 0

@@ -90,7 +90,8 @@ def parse(name: str) -> Precision:
         if re.fullmatch(r"real:[1-9][0-9]{0,8}", name):
             return real(int(name[5:]))
     raise InputError(
-        f"Unknown precision {quoted(name)}.", "Use double, extended, double-double, quad or real:BITS such as real:237."
+        f"Unknown precision {quoted(name)}.",
+        "Use double, extended, double-double, quad or real:BITS (real:24).",
     )
 
 

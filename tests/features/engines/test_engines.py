@@ -114,7 +114,9 @@ def faulty(fault: str) -> Trajectory:
     problem = Problem.of(GENERIC.top, GENERIC.start, DOUBLE, xi=xi)
     seen = of_states(GENERIC.top, GENERIC.start, times, [[Fraction(1)] * 9], xi)
     course = simulate(
-        FAULTS.get(fault, lambda data: data)(seen.body), seen.start.begin(seen.said, seen.body.tensor), times
+        FAULTS.get(fault, lambda data: data)(seen.body),
+        seen.start.begin(seen.said, seen.body.tensor),
+        tuple(map(float, times)),
     )
     rotation = course.rotation.transpose(0, 2, 1) if fault == "conjugate" else course.rotation
     states = np.hstack([course.omega, rotation[:, 2], rotation[:, 0]])

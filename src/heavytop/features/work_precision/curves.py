@@ -62,11 +62,11 @@ class WorkPrecisionLine:
     @property
     def order(self) -> float | None:
         """The order that whole runs show: between the finest step whose error is more than rounding and the next one
-        that is not nearly equal; None where a coarser one has no larger error.
+        that is not nearly equal; None where one up to that has no larger error.
         """
         points = sorted((point for point in self.points if point.step), key=lambda point: point.step)
         coarse = next((point for point in points if point.step >= _APART * points[0].step), None)
-        if coarse is None or min(point.log10 for point in points[1:]) <= points[0].log10:
+        if coarse is None or any(point.log10 <= points[0].log10 for point in points[1 : points.index(coarse) + 1]):
             return None
         return (coarse.log10 - points[0].log10) / math.log10(coarse.step / points[0].step)
 

@@ -335,6 +335,8 @@ def _data(suppositions: Suppositions) -> Iterator[_Try]:
             body, _ = body_of(numpy.array([float(factor) - 1]))
             is_round = Fraction(decimal_text(factor, _ROUND)) == factor and factor != 1
             numbers = {**numbers, "factor": decimal_text(factor, 8)}
+            if key == "rotor" and factor == -1:
+                kind, numbers = "rotor_sign", {}
             yield _Try(kind, numbers, body=body, drop=FITTED_DROP, is_round=is_round)
 
 

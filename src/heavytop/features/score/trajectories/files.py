@@ -181,7 +181,8 @@ def _numbers(key: str, text: str) -> list[str]:
     numbers = re.split(r"\s*[,;]\s*|\s+", text)
     counts = _COUNTS.get(key, (3,))
     if "," in text and (len(numbers) not in counts or _DECIMAL_COMMAS.match(text)):
-        raise InputError(f"{key} must be {counts[0]} numbers; got {quoted(text)}.", _POINT)
+        remedy = _POINT if len(numbers) > counts[0] or _DECIMAL_COMMAS.match(text) else "Give each of them."
+        raise InputError(f"{key} must be {counts[0]} numbers; got {quoted(text)}.", remedy)
     return numbers
 
 
@@ -195,7 +196,7 @@ def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
 
 def _no_header(missing: list[str], names: Sequence[str] = ()) -> InputError:
     among = f" among {', '.join(name[:20] for name in names[:9])}" if names else ""
-    said = f": {', '.join(missing)} not found{among}" if missing else ""
+    said = f": {', '.join(missing)} not found{among}" if missing else ": the file has no line but comments"
     return InputError(f"The header is not {','.join(COLUMNS)}{said}.", f"{logs.NAMES} {REMEDY}")
 
 
