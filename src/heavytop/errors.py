@@ -63,7 +63,7 @@ def why(error: Exception) -> str:
 
 
 def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str:
-    """The known name that an unknown one misspells, with so large a part alike; "" where there is none."""
+    """The known name nearest to a misspelt one, "" where none is; alike: the ratio of difflib that it must reach."""
     names = {entry.lower(): entry for entry in sorted(known)}
     return next((names[near] for near in get_close_matches(name.lower(), names, 1, alike)), "")
 
