@@ -279,7 +279,7 @@ def test_what_is_0_all_over_the_unit_sphere_is_0_on_no_thin_set():
     off = sum(x**2 for x in STATE[3:]) - 1
     flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(off,))
     statement = Statement("", 1, "", ALL, off, "", Formulas(), flow)
-    setting = Setting(TIME, (), ())
+    setting = Setting(TIME)
     field = Field(setting.assumptions(0), [off, STATE[0]])
     region = Region(field, setting, statement, [])
     assert not region.is_zero_nowhere_dense(field.enter(off).numerator)

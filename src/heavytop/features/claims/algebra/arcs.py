@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from math import gcd
+from math import gcd, prod
 
 import sympy
 from flint import arb, fmpq_mpoly, fmpz_mat
@@ -18,18 +18,17 @@ from flint import arb, fmpq_mpoly, fmpz_mat
 from heavytop.exact.flint.balls import working_precision
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Field, Regularity
-from heavytop.features.claims.algebra.ring import Quotient, Unprovable, used
+from heavytop.features.claims.algebra.functions import INVERSE, turned
+from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS
 from heavytop.features.claims.algebra.statement import Place
 
-_ARCS = ("asin", "acos", "atan", "atan2")
 _BITS = 192
 _LARGEST = 128
 _MOST_ARCS = 10
 # of the degree of a product of vectors that are no numbers
 _MOST_TURNS = 12
 _PLACES = 3
-Vector = tuple[Quotient, Quotient]
 
 
 class Arcs:
@@ -62,7 +61,7 @@ class Arcs:
         generators = self._field.tower.generators
         known, self._known = self._known, len(generators)
         for index in range(known, self._known):
-            if generators[index].kind in (*_ARCS, "log") and len(self._free) < _MOST_ARCS:
+            if generators[index].kind in (*INVERSE, "log") and len(self._free) < _MOST_ARCS:
                 try:
                     form = self._form_of(index)
                 except Unprovable:
@@ -100,8 +99,8 @@ class Arcs:
         if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
             return None
         weights = {index: factor for index, factor in zip(logarithms, factors, strict=True) if factor}
-        parts = [tower.power(tower.generators[index].arguments[0], factor) for index, factor in weights.items()]
-        if tower.product(parts) != tower.number(1):
+        parts = (tower.generators[index].arguments[0] ** factor for index, factor in weights.items())
+        if prod(parts, start=tower.number(1)) != tower.number(1):
             return None
         last = logarithms[-1]
         total = sum((tower.gens[i] * factor for i, factor in weights.items() if i != last), tower.context.constant(0))
@@ -144,13 +143,12 @@ class Arcs:
         numbers = tower.signs.numbers.keys()
         if sum(abs(weight) for arc, weight in weights.items() if arc not in numbers) > _MOST_TURNS:
             return False
-        total = _times(field, (tower.number(1), tower.number(0)), _turn(field, -angle))
+        total = field.transcendental.circle_of_turn(-angle)
         for arc, weight in weights.items():
-            x, y = _vector(field, arc)
-            vector = x, tower.product((tower.number(1 if weight > 0 else -1), y))
+            sine, cosine = field.transcendental.direction(arc)
             for _ in range(abs(weight)):
-                total = _times(field, total, vector)
-        return not total[1].numerator
+                total = turned(total, (sine if weight > 0 else -sine, cosine))
+        return not total[0].numerator
 
     def _is_small_by_ranges(self, weights: dict[int, int], angle: Fraction) -> bool:
         """|Σ weight · arc − angle · π| < π by the ranges of the functions."""
@@ -206,30 +204,3 @@ def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
         if any(factors) and max(map(abs, factors)) <= _LARGEST and all(abs(int(v)) < 2**16 for v in short[count:]):
             return factors
     return None
-
-
-def _vector(field: Field, index: int) -> Vector:
-    """A vector of the angle that an inverse function is, but for a multiple of π."""
-    t, g = field.tower, field.tower.generators[index]
-    u = g.arguments[0]
-    if g.kind == "atan":
-        return t.polynomial(u.denominator), t.polynomial(u.numerator)
-    if g.kind == "atan2":
-        return g.arguments[1], u
-    other = t.root(t.sum((t.number(1), t.product((t.number(-1), u, u)))))
-    return (other, u) if g.kind == "asin" else (u, other)
-
-
-def _turn(field: Field, angle: Fraction) -> Vector:
-    """(cos, sin) of a multiple of π/12."""
-    whole = sympy.pi * sympy.Rational(angle.numerator, angle.denominator)
-    return field.enter(sympy.cos(whole)), field.enter(sympy.sin(whole))
-
-
-def _times(field: Field, a: Vector, b: Vector) -> Vector:
-    t = field.tower
-    minus = t.number(-1)
-    return (
-        t.sum((t.product((a[0], b[0])), t.product((minus, a[1], b[1])))),
-        t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
-    )

@@ -13,12 +13,12 @@ from math import comb, prod
 import sympy
 from flint import arb, fmpq_mpoly
 
-from heavytop.features.claims.algebra.elliptic import modulus, wpinverse
+from heavytop.features.claims.algebra.elliptic import JACOBI, modulus, wpinverse
 from heavytop.features.claims.algebra.evaluate import evaluate
 from heavytop.features.claims.algebra.fields import Assumptions, Field, SolvedRelation
 from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import Sign
-from heavytop.features.claims.algebra.structure import NAMES, Defined, at_values, sign_of
+from heavytop.features.claims.algebra.structure import Defined, at_values, rationals, sign_of
 
 _LONGEST = 120
 _BITS = 512
@@ -136,7 +136,7 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
 
 _P, _N = ConditionKind.POSITIVE, ConditionKind.NONNEGATIVE
 _OF_PARAMETER: dict[str, tuple[ConditionKind | None, ConditionKind]] = {
-    **dict.fromkeys((*NAMES, "am"), (_N, _N)),
+    **dict.fromkeys((*JACOBI, "am"), (_N, _N)),
     **dict.fromkeys(("Theta", "Eta", "thetan", "jacobiZeta", "modulus", *(f"theta{i}" for i in range(1, 5))), (_N, _P)),
     **dict.fromkeys(("nome", "thetaRate", "thetaArgument"), (_P, _P)),
     **dict.fromkeys(("ellipticF", "ellipticK", "ellipticPi"), (None, _P)),
@@ -189,7 +189,7 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
 
     if not all(need.is_met(values) for need in conditions_of([expression])):
         return None
-    exact = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
+    exact = rationals(values)
     try:
         value = at_values(expression, exact)
     except ValueError:

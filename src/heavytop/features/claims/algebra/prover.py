@@ -112,14 +112,14 @@ class Region:
 
     def _is_kept(self, p: fmpq_mpoly, flow: Flow) -> bool:
         try:
-            expression = self.field.expression(Quotient(p, self.field.tower.one))
+            expression = self.field.expression(self.field.tower.polynomial(p))
             if not expression.free_symbols & flow.state:
                 return False
             rate = flow.rate(expression)
             field = Field(self.field.assumptions, [expression, rate])
             divisors = list(field.tower.divisors.values())
             value = field.enter(expression)
-            cofactor = field.tower.divide(field.enter(rate), value)
+            cofactor = field.enter(rate) / value
         except Unprovable:
             return False
         regularity = Regularity(field)
@@ -204,7 +204,7 @@ class Region:
     def _is_nonzero_at_some_state(self, p: fmpq_mpoly, flow: Flow) -> bool:
         """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
         try:
-            expression = self.field.expression(Quotient(p, self.field.tower.one)).xreplace(dict(flow.names))
+            expression = self.field.expression(self.field.tower.polynomial(p)).xreplace(dict(flow.names))
             values = {symbol: _SOME_STATE.get(str(symbol)) for symbol in expression.free_symbols}
             others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(values)))
             return not evaluate(
@@ -336,7 +336,7 @@ class Region:
         """True only where p is 0 all over the region for no values of the parameters."""
         flow, domain = self._statement.flow, self._statement.domain
         try:
-            e = self.field.expression(Quotient(p, self.field.tower.one))
+            e = self.field.expression(self.field.tower.polynomial(p))
         except Unprovable:
             return False
         if flow is not None:
@@ -356,7 +356,7 @@ class Region:
         if open_part is None and need.kind is ConditionKind.NONZERO:
             with suppress(Unprovable):
                 factors = self._factors(self.field.enter(need.expression).numerator)
-                parts = [self.field.expression(Quotient(f, self.field.tower.one)) for f in factors]
+                parts = [self.field.expression(self.field.tower.polynomial(f)) for f in factors]
                 alone = [part for part in parts if part.free_symbols <= parameters]
                 open_part = sympy.Mul(*(part for part in alone if not is_never_zero(part, self.field.assumptions)))
         if open_part is None or not open_part.free_symbols:
@@ -383,7 +383,7 @@ class Region:
                 )
             if not self._divisors[forced, text]:
                 try:
-                    yield str(self.field.expression(Quotient(p, self.field.tower.one)))
+                    yield str(self.field.expression(self.field.tower.polynomial(p)))
                 except Unprovable:
                     yield text
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import signal
 import sys
 import tomllib
@@ -20,9 +21,9 @@ import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, invalid, meant, prefixed, quoted
 from heavytop.features.claims.audit.components import UserComponent
-from heavytop.features.claims.audit.context import ClaimFile
+from heavytop.features.claims.audit.context import ClaimFile, FileClaim
 from heavytop.features.claims.audit.guard import Answer, AuditEnded, in_time, limit_process
-from heavytop.features.claims.audit.judge import Assuming, Audit, Auditable, StatementVerdict, judge, verdict_of
+from heavytop.features.claims.audit.judge import Audit, Auditable, StatementVerdict, judge, verdict_of
 from heavytop.features.claims.audit.stability import UserStability
 from heavytop.features.claims.audit.user_claims import UserIntegral, UserMotion
 from heavytop.features.claims.audit.values import ValueClaim, ValueFile
@@ -102,7 +103,8 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
         with prefixed(where):
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error)}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+        cause = re.sub(r"\bvalue\[(\d+)\]", lambda match: f"value {int(match[1]) + 1}", invalid(error))
+        raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
 
 
 PAPER = ("ershkov-general", "ershkov-partial")
@@ -166,7 +168,7 @@ def audit_claim(
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
-    unused = claim.unused if isinstance(claim, Assuming) else ()
+    unused = claim.unused if isinstance(claim, FileClaim) else ()
     table = claim.content.integral if isinstance(claim, UserIntegral) else None
     return Audit(*said, deciding, unused, tuple(table.where) if table else ())
 
@@ -187,7 +189,7 @@ def would_decide(
 
     seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.
     """
-    if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
+    if not isinstance(claim, FileClaim) or verdict_of(rows) != "undecided":
         return ()
     missing = [c.assumption for row in rows for c in row.conditions if c.assumption and not c.discharged]
     deciding: list[tuple[str, str]] = []
@@ -334,7 +336,9 @@ def child() -> None:
         signal.alarm(int(last))
     limit_process(int(seconds))
     try:
-        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
+        claim = find_claim(path)
+        with prefixed(path):
+            answer = Answer(report=audit_claim(claim, system(system_name) if system_name else None))
     except HeavyTopError as error:
         # a path may hold bytes that are no characters
         answer = Answer(error=(error.cause.encode(errors="replace").decode(), error.remedy))

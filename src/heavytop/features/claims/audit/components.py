@@ -20,12 +20,11 @@ from heavytop.features.claims.algebra.conditions import ConditionKind, Need, con
 from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.rational import forces_zero
 from heavytop.features.claims.algebra.reader import Formula, parse, symbol
-from heavytop.features.claims.algebra.statement import ALL, Flow, Formulas, Place, Setting, Statement
-from heavytop.features.claims.algebra.structure import at_values, rate_along
+from heavytop.features.claims.algebra.statement import ALL, TIME, Flow, Formulas, Place, Setting, Statement
+from heavytop.features.claims.algebra.structure import at_values, rate_along, rationals
 from heavytop.features.claims.audit.context import (
     DOMAINS,
     STATE,
-    TIME,
     ComponentTable,
     IntegralTable,
     needs_of,
@@ -119,7 +118,7 @@ class UserComponent(UserIntegral):
         """The start where it is rational at these parameters; states on the conditions where none is given."""
         if not self.start:
             return super()._states(conditions, parameters)
-        numbers = {x: sympy.Rational(value.numerator, value.denominator) for x, value in parameters.items()}
+        numbers = rationals(parameters)
         values = [part.expression.xreplace(numbers) for part in self.start]
         exact = [Fraction(int(value.p), int(value.q)) for value in values if value.is_Rational]
         return [dict(zip(STATE, exact, strict=True))] if len(exact) == len(values) else []

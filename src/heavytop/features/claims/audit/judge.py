@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import msgspec
 import sympy
@@ -275,7 +275,7 @@ def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str |
         residual = field_.enter(statement.residual)
         for name, part in (("", sympy.Integer(1)), *setting.parts.get(statement.branch, ())):
             value = field_.enter(part)
-            factor = field_.tower.divide(residual, value) if value.numerator else None
+            factor = residual / value if value.numerator else None
             if factor is not None and field_.is_constant(factor):
                 return _product_text(_constant_text(factor, setting, field_), name)
         text = str(field_.expression(residual))
@@ -287,7 +287,7 @@ def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str |
 def _constant_text(factor: Quotient, setting: Setting, field_: Field) -> str:
     tower = field_.tower
     for name, constant in setting.constants:
-        ratio = tower.divide(factor, field_.enter(constant))
+        ratio = factor / field_.enter(constant)
         for number, sign in ((1, ""), (-1, "-")):
             if ratio == tower.number(number):
                 return f"{sign}({name})"
@@ -303,7 +303,7 @@ def _product_text(factor: str, name: str) -> str:
     return f"{factor}*{name}" if simple or re.fullmatch(r"-?\d+(/\d+)?", factor) else f"({factor})*{name}"
 
 
-# What can be audited: a claim as statements, and one of which more may be assumed.
+# What can be audited: a claim as statements.
 
 
 class Auditable(Protocol):
@@ -337,23 +337,4 @@ class Auditable(Protocol):
 
         rows: the verdicts about the system ``about``, so that they need not be found again.
         """
-        ...
-
-
-@runtime_checkable
-class Assuming(Auditable, Protocol):
-    """A claim with parameters, of which more may be assumed."""
-
-    @property
-    def unassumed(self) -> list[str]:
-        """Parameters of which the claim assumes nothing."""
-        ...
-
-    @property
-    def unused(self) -> tuple[str, ...]:
-        """Parameters that no formula holds."""
-        ...
-
-    def assuming(self, bound: str) -> Auditable:
-        """The claim with one assumption more; raises InputError where a sample breaks it."""
         ...

@@ -24,11 +24,10 @@ from heavytop.features.claims.algebra.fields import Assumptions, Field
 from heavytop.features.claims.algebra.prover import shortest
 from heavytop.features.claims.algebra.reader import Formula, parse
 from heavytop.features.claims.algebra.ring import Unprovable
-from heavytop.features.claims.algebra.statement import AFTER, ALL, Flow, Formulas, Place, Setting, Statement
-from heavytop.features.claims.algebra.structure import Names, rate_along
+from heavytop.features.claims.algebra.statement import AFTER, ALL, TIME, Flow, Formulas, Place, Setting, Statement
+from heavytop.features.claims.algebra.structure import Names, rate_along, rationals
 from heavytop.features.claims.audit.context import (
     STATE,
-    TIME,
     ClaimedMotionTable,
     ClaimFile,
     Clock,
@@ -233,7 +232,7 @@ def states_on(
     parameters: Mapping[sympy.Symbol, Fraction],
 ) -> Iterator[dict[sympy.Symbol, Fraction]]:
     """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters; none if not found."""
-    numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in parameters.items()}
+    numbers = rationals(parameters)
     # divisors that are 0 there are refused where the state is checked
     equations = [
         # one zero of sin u is as good as another
