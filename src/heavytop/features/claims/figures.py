@@ -311,8 +311,8 @@ def _continuous(angles: NDArray[numpy.float64], states: NDArray[numpy.float64]) 
     for index in (0, 2):
         away = numpy.delete(angles[:, index], pole)
         turned = numpy.array(unwrap(list(away), 2 * numpy.pi))
-        whole = numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2)
-        columns.append(whole - 2 * numpy.pi * numpy.floor(whole[pole] / (2 * numpy.pi) + 0.25))
+        column = numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2)
+        columns.append(column - 2 * numpy.pi * numpy.floor(column[pole] / (2 * numpy.pi) + 0.25))
     return numpy.stack([columns[1], columns[0], columns[2]], axis=1)
 
 

@@ -21,29 +21,33 @@ from heavytop.features.claims.algebra.fields import Field, Regularity
 from heavytop.features.claims.algebra.functions import INVERSE, turned
 from heavytop.features.claims.algebra.ring import Unprovable, used
 from heavytop.features.claims.algebra.signs import NUMBER_BITS
-from heavytop.features.claims.algebra.statement import Place
+from heavytop.features.claims.algebra.statement import Point
 
 _BITS = 192
 _LARGEST = 128
 _MOST_ARCS = 10
 # of the degree of a product of vectors that are no numbers
 _MOST_TURNS = 12
-_PLACES = 3
+_SAMPLES = 3
 
 
 class Arcs:
     """The relations between the inverse functions in a field over a region, found as they are asked for.
 
-    everywhere: what is regular all over the region.  places: some of it.  is_connected: whether it is, as far as the
+    everywhere: what is regular all over the region.  points: some of it.  is_connected: whether it is, as far as the
     symbols in these generators go.
     """
 
     def __init__(
-        self, field: Field, everywhere: Regularity, places: Sequence[Place], is_connected: Callable[[set[int]], bool]
+        self,
+        field: Field,
+        everywhere: Regularity,
+        points: Sequence[Point],
+        is_connected: Callable[[set[int]], bool],
     ) -> None:
         self._field = field
         self._everywhere = everywhere
-        self._places = places
+        self._points = points
         self._is_connected = is_connected
         self._known = 0
         self._free: list[int] = []
@@ -79,7 +83,7 @@ class Arcs:
         arcs = [*alike, index]
         if is_log:
             return self._form_of_logarithm(arcs)
-        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _PLACES])
+        factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _SAMPLES])
         if factors is None or not factors[-2]:
             return None
         weights = {arc: factor for arc, factor in zip(arcs, factors[:-1], strict=True) if factor}
@@ -107,31 +111,31 @@ class Arcs:
         return total / -weights[last]
 
     def _values(self, index: int) -> list[arb]:
-        """Its values at a few places of the region; of a number, the number."""
+        """Its values at a few sample points of the region; of a number, the number."""
         field = self._field
         if index in field.tower.signs.numbers:
-            return [field.tower.signs.numbers[index]] * _PLACES
-        places = self._places[:_PLACES]
-        if not places:
+            return [field.tower.signs.numbers[index]] * _SAMPLES
+        points = self._points[:_SAMPLES]
+        if not points:
             raise Unprovable("No place to look at.")
         try:
-            values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in places]
+            values = [evaluate(field.meaning(index), point, NUMBER_BITS) for point in points]
         except KeyError:
             raise Unprovable("No value at a place.") from None
         if not all(value.is_finite() for value in values):
             raise Unprovable("No value at a place.")
-        return [values[i % len(values)] for i in range(_PLACES)]
+        return [values[i % len(values)] for i in range(_SAMPLES)]
 
     # --- proofs -------------------------------------------------------------------------------------------------------
 
     def _is_proven(self, weights: dict[int, int], turns: int) -> bool:
         """Σ weight · arc = turns · π all over the region."""
         common = gcd(*weights.values())
-        whole = next(
+        multiple = next(
             h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0
         )
-        weights = {arc: weight * whole // common for arc, weight in weights.items()}
-        angle = Fraction(whole * turns, common)
+        weights = {arc: weight * multiple // common for arc, weight in weights.items()}
+        angle = Fraction(multiple * turns, common)
         return self._is_multiple_of_pi(weights, angle) and (
             self._is_small_by_ranges(weights, angle) or self._is_small_somewhere(weights, angle)
         )

@@ -332,8 +332,8 @@ class Transcendental:
     def _logarithm_of_number(self, value: Fraction) -> Quotient:
         """ln of a positive fraction, over its primes where they are small."""
         t, total = self._tower, self._tower.number(0)
-        for whole, weight in ((value.numerator, 1), (value.denominator, -1)):
-            primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        for integer, weight in ((value.numerator, 1), (value.denominator, -1)):
+            primes = fmpz(integer).factor() if integer.bit_length() <= _FACTORED_BITS else [(integer, 1)]
             for prime, power in primes:
                 if prime != 1:
                     total = total + weight * int(power) * self.function("log", (t.number(int(prime)),))

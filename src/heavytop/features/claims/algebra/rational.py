@@ -239,11 +239,11 @@ class Tower(PolynomialRing):
 
     def root_of_number(self, value: Any) -> Quotient:
         """√(p/q) = √(p q)/q, over the primes of p q."""
-        whole = int(value.p) * int(value.q)
-        root = isqrt(whole)
-        if root * root == whole:
+        radicand = int(value.p) * int(value.q)
+        root = isqrt(radicand)
+        if root * root == radicand:
             return self.number(Fraction(root, int(value.q)))
-        primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        primes = fmpz(radicand).factor() if radicand.bit_length() <= _FACTORED_BITS else [(radicand, 1)]
         result = self.one / fmpq(value.q)
         for prime, power in primes:
             result *= int(prime) ** (int(power) // 2)

@@ -233,10 +233,10 @@ class _Parser(Descent):
             )
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
-        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        factors = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
         n = base.size
         size = ExpressionBounds(
-            n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole)
+            n.nodes + 1, n.bits * factors, n.degree * factors, comb(min(n.terms, _MAX_TERMS) + factors - 1, factors)
         )
         self._check(size)
         if exponent.q == 2:
@@ -406,7 +406,7 @@ _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = 
     sympy.acos: (-1, arb.cos, lambda c: c > 0 and c < arb.pi()),
     sympy.sqrt: (1, lambda c: c * c, lambda c: c >= 0),
 }
-"""Of functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
+"""Functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
 
 
 def _through_monotone(bound: Bound) -> Iterator[Bound]:

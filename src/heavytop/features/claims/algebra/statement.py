@@ -12,7 +12,7 @@ from heavytop.features.claims.algebra.conditions import ConditionKind, Need, is_
 from heavytop.features.claims.algebra.fields import Assumptions, SolvedRelation
 
 TIME = sympy.Symbol("t", real=True)
-Place = dict[sympy.Symbol, Fraction]
+Point = dict[sympy.Symbol, Fraction]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class Setting(Assumptions):
         """Expressions that are 0 wherever the claim is made."""
         return (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
 
-    def places(self, statement: Statement) -> Iterator[Place]:
+    def sample_points(self, statement: Statement) -> Iterator[Point]:
         """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
         for sample in self.samples:
             if not all(need.is_met(sample) for need in self.bodies):

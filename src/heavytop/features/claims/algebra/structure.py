@@ -165,9 +165,9 @@ class Names:
         parts = {part: self.put_into(part) for part in e.args}
         left = [part for part, named in parts.items() if named.free_symbols & self._state]
         done = [named for part, named in parts.items() if part not in left]
-        whole = sympy.Add(*left)
-        name = self._name(whole) if left else whole
-        return sympy.Add(*done, name) if name != whole else sympy.Add(*parts.values())
+        moving = sympy.Add(*left)
+        name = self._name(moving) if left else moving
+        return sympy.Add(*done, name) if name != moving else sympy.Add(*parts.values())
 
     def _name(self, e: sympy.Expr) -> sympy.Expr:
         if e not in self._names:

@@ -179,7 +179,7 @@ def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str,
 
 
 _ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
-"""Place of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
+"""Position of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
 _REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
 
 
@@ -229,8 +229,8 @@ def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[symp
 
 
 def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
-    places = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
-    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
+    indices = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
+    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in indices)
 
 
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
@@ -238,7 +238,7 @@ RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variabl
 """Names that no parameter may have: an elliptic function is one only before a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
-"""Of numerator and denominator of a number in a sample: 2000 digits."""
+"""Bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 

@@ -42,7 +42,7 @@ ABOUT = {
 """The subject of the formulas of each kind of claim."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
-"""Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
+"""Bits of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
 _LONGEST = 160
 
 
@@ -208,9 +208,9 @@ def _row(
     witness: Mapping[str, Any] | None = None,
 ) -> StatementVerdict:
     name, note = s.domain.label, s.domain.note
-    said = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
+    readable = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
     return StatementVerdict(
-        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said
+        s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, readable
     )
 
 
@@ -219,9 +219,9 @@ def _witnesses(
 ) -> Iterator[dict[str, Any]]:
     """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
     always = () if statement.flow is None else statement.flow.always
-    places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
+    sample_points = [v for v in prover.sample_points(statement) if all(is_exactly_zero(zero, v) for zero in always)]
     for bits in precisions:
-        for values in places:
+        for values in sample_points:
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
                 value, radius = _texts(ball)
@@ -255,8 +255,8 @@ def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: i
 
 
 def _bound(statement: Statement, prover: Prover) -> str:
-    places = [point for point in prover.places(statement) if prover.is_defined(statement, point)]
-    balls = [_ball(statement.residual, values, _BITS[-1]) for values in places]
+    sample_points = [point for point in prover.sample_points(statement) if prover.is_defined(statement, point)]
+    balls = [_ball(statement.residual, values, _BITS[-1]) for values in sample_points]
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
     if not bounds:
         return "undefined at every sample point"

@@ -76,7 +76,7 @@ class UserStability(UserMotion):
         """Samples at which the opposite is proven in exact rationals."""
         p, y = self.context.parameters(about), self.motion.state
         at_once = Statement("", 1, "", replace(ALL, points=(Fraction(0),)), sympy.Integer(0), "")
-        for sample in self.setting.places(at_once):
+        for sample in self.setting.sample_points(at_once):
             numbers = rationals(sample)
             exact = [e.xreplace(numbers) for e in (*p.inertia, *p.moment, *y)]
             if not all(value.is_Rational for value in exact):

@@ -234,25 +234,25 @@ class ValueClaim:
     entry: Entry | None = None
     kind: str = "value"
     figures: tuple[Figure, ...] = field(init=False)
-    given: tuple[HeavyTop | Body, State] = field(init=False)
+    motion: tuple[HeavyTop | Body, State] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "figures", tuple(_figures(self.content.value)))
-        object.__setattr__(self, "given", _given(self.content))
+        object.__setattr__(self, "motion", _read_motion(self.content))
 
     def about(self, asked: System | None) -> System:
         """The system asked for, else the file's, else `heavy_gyrostat` where there is a rotor, else `heavy_top`.
 
         Raises InputError where the file names another one, or the system does not admit the body.
         """
-        usual = HEAVY_TOP if self.given[0].rotor is None else HEAVY_GYROSTAT
+        usual = HEAVY_TOP if self.motion[0].rotor is None else HEAVY_GYROSTAT
         about = of_file(asked, self.content.system, usual)
-        require_no_other_rotor(about, self.given[0])
+        require_no_other_rotor(about, self.motion[0])
         return about
 
     def rows(self, about: System) -> tuple[StatementVerdict, ...]:
         """A verdict on each number, in the order of the file; raises InputError for a quantity that is not known."""
-        motion = _KnownNumbers(*self.given, about)
+        motion = _KnownNumbers(*self.motion, about)
         motion.require(self.figures)
         try:
             motion.require_handy(self.figures)
@@ -296,7 +296,7 @@ def _number(text: str, what: str) -> Fraction:
         return exact(text)
 
 
-def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
+def _read_motion(content: ValueFile) -> tuple[HeavyTop | Body, State]:
     """The body and its start; raises InputError for an invalid one."""
     if (content.top is None) == (content.body is None):
         raise InputError(
@@ -471,9 +471,9 @@ class _KnownNumbers:
             return [arb("nan"), arb("nan"), dot([ball(value) for value in self.body.centre], state[3:6])]
 
     @whole_evaluation
-    def _output(self, output: Output, whole: Sequence[arb], bits: int) -> list[arb]:
+    def _output(self, output: Output, motion: Sequence[arb], bits: int) -> list[arb]:
         with working_precision(bits + _SPARE_BITS):
-            components = list(output.at(whole[:3], whole[3:6], whole[6:], self.body.centre, FUNCTIONS, ball))
+            components = list(output.at(motion[:3], motion[3:6], motion[6:], self.body.centre, FUNCTIONS, ball))
         if not all(value.is_finite() for value in components):
             raise OutOfReach(f"The {output.name} is not known to {bits} bits.")
         return components
