@@ -17,9 +17,7 @@ from dataclasses import dataclass
 from math import ceil, expm1, log
 from typing import Any, NamedTuple, NoReturn, Protocol, Self
 
-import numpy as np
 from flint import arb, arb_mat, arb_series, fmpq
-from numpy.typing import NDArray
 
 from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.flint.balls import (
@@ -32,8 +30,8 @@ from heavytop.exact.flint.balls import (
 )
 from heavytop.exact.separable.oscillation import Approach, Gap, Roots
 
-_FLOAT_BITS = 52
-_ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
+_FEW_BITS = 53
+_ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-6
 _REPEATED = 6
 
 
@@ -74,10 +72,6 @@ class Variable(Protocol):
 
     def integrals(self, phase: arb) -> list[arb]:
         """F_j at the phase."""
-        ...
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        """F_j in floats."""
         ...
 
 
@@ -127,54 +121,47 @@ class Inversion:
             cells = periods.solve(aim).entries()
         except ZeroDivisionError:
             return lost
-        turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
-        rest = aim - periods * arb_mat([[n] for n in turns])
-        first = [float(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         if not all(cell.is_finite() for cell in cells):
             return lost
+        turns = [nearest_integer(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
+        rest = aim - periods * arb_mat([[n] for n in turns])
+        first = [(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         try:
-            with np.errstate(all="ignore"):
-                estimated = self._estimated(first, rest)
-            return self._refined(estimated, rest), turns
-        except (ZeroDivisionError, np.linalg.LinAlgError):
+            return self._refined(self._estimated(first, rest), rest), turns
+        except ZeroDivisionError:
             return lost
 
-    def _estimated(self, phases: list[float], rest: arb_mat) -> list[float]:
-        """Newton's iteration in floats, every step as short as it must be to come nearer."""
-        aim, signs = np.array([float(r) for r in rest.entries()]), np.array(self.signs, float)
+    def _defect(self, phases: Sequence[arb], target: arb_mat) -> arb_mat:
+        return arb_mat([[value] for value in self.values(phases)]) - target
 
-        def defect(at: NDArray[np.float64]) -> NDArray[np.float64]:
-            total = -aim
-            for sign, variable, phase in zip(signs, self.variables, at, strict=True):
-                total = total + sign * variable.estimates(float(phase))
-            return total
+    def _estimated(self, phases: list[arb], rest: arb_mat) -> list[arb]:
+        """Newton's iteration in few bits, every step as short as it must be to come nearer."""
+        with working_precision(_FEW_BITS):
+            now = [phase.mid() for phase in phases]
+            defect = self._defect(now, rest)
+            for _ in range(_ITERATIONS):
+                step, share, error = (self._inverse(now) * defect).entries(), arb(1), _size(defect)
+                while True:
+                    following = [(x - share * s).mid() for x, s in zip(now, step, strict=True)]
+                    defect = self._defect(following, rest)
+                    if not _size(defect) > error or share < _SHORTEST:
+                        break
+                    share /= 2
+                now = following
+                if all(abs(s * share) < _SETTLED * (1 + abs(x)) for s, x in zip(step, now, strict=True)):
+                    break
+        return now
 
-        now = np.array(phases)
-        error = defect(now)
-        for _ in range(_ITERATIONS):
-            with working_precision(53):
-                slopes = np.array(self.slopes([arb(float(x)) for x in now]).entries(), float).reshape(len(now), -1)
-            step, share = np.linalg.solve(slopes, error), 1.0
-            following = defect(now - step)
-            while np.abs(following).sum() > np.abs(error).sum() and share > _SHORTEST:
-                share /= 2
-                following = defect(now - share * step)
-            now, error = now - share * step, following
-            if np.abs(share * step).max() < _SETTLED * (1 + np.abs(now).max()):
-                break
-        return [float(x) for x in now]
-
-    def _refined(self, phases: list[float], rest: arb_mat) -> list[arb]:
+    def _refined(self, near: list[arb], rest: arb_mat) -> list[arb]:
         """Newton's iteration in balls at growing precision, and the proof at the last."""
         needed, precisions = current_precision() // 2 + 8, []
-        while needed > _FLOAT_BITS:
+        while needed > _FEW_BITS:
             precisions.append(needed)
             needed = needed // 2 + 8
-        near = [arb(x) for x in phases]
         for precision in reversed(precisions):
             with working_precision(precision):
                 for _ in range(_REPEATED):
-                    step = (self._inverse(near) * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+                    step = (self._inverse(near) * self._defect(near, rest)).entries()
                     near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
                     # the next one would be of the size of its square
                     if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
@@ -187,7 +174,7 @@ class Inversion:
     def _proven(self, near: list[arb], rest: arb_mat) -> list[arb]:
         """Krawczyk's image of a box around the phases, if it lies inside the box."""
         inverse = self._inverse(near)
-        step = (inverse * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+        step = (inverse * self._defect(near, rest)).entries()
         floor = arb(2) ** (-current_precision())
         for widening in (2, 16, 256):
             off = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
@@ -200,6 +187,10 @@ class Inversion:
             if all(wide.contains_interior(narrow) for wide, narrow in zip(box, image, strict=True)):
                 return image
         return [arb("nan")] * len(near)
+
+
+def _size(column: arb_mat) -> arb:
+    return sum((abs(value).mid() for value in column.entries()), arb(0))
 
 
 def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
@@ -251,9 +242,6 @@ class Rest:
     def integrals(self, phase: arb) -> list[arb]:
         return [arb(0), arb(0)]
 
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        return np.zeros(2)
-
 
 class RestingVariable:
     """``variable`` with the one integral H for a variable at rest at ``point``, outside its gap."""
@@ -277,10 +265,6 @@ class RestingVariable:
 
     def integrals(self, phase: arb) -> list[arb]:
         return [self._combined(*self.variable.integrals(phase))]
-
-    def estimates(self, phase: float) -> NDArray[np.float64]:
-        first, second = self.variable.estimates(phase)
-        return np.array([second - float(self.place) * first])
 
 
 # What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
