@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, expm1, log
-from typing import Any, NamedTuple, NoReturn, Protocol, Self
+from typing import Any, NamedTuple, NoReturn, Self, TypeAlias
 
 from flint import arb, arb_mat, arb_series, fmpq
 
@@ -35,51 +35,11 @@ _ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-6
 _REPEATED = 6
 
 
-class Variable(Protocol):
-    """A variable of an :class:`Inversion`: swinging (:class:`heavytop.exact.separable.oscillation.Gap`), or tending to
-    a double root.
-
-    turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
-    what its integrals grow by with every unit of the phase, at last.  periodic: which of both.  middle: of its gap.
-    """
-
-    turn: float
-    periodic: bool
-    middle: arb
-
-    @property
-    def column(self) -> list[arb]: ...
-
-    def position(self, phase: Balls) -> Balls:
-        """v at the phase, a number or series."""
-        ...
-
-    def density(self, v: Balls) -> Balls:
-        """dF_0 by dphase, > 0."""
-        ...
-
-    def ends(self, phase: Balls) -> tuple[Balls, Balls]:
-        """√(v − lo) and √(hi − v), each with a sign that makes it analytic."""
-        ...
-
-    def bend(self, phase: Balls) -> Balls:
-        """−dv/dphase over the product of :meth:`ends`."""
-        ...
-
-    def phase(self, v: arb, slope: arb) -> arb:
-        """The phase where the variable is v and dv/dphase is ``slope``."""
-        ...
-
-    def integrals(self, phase: arb) -> list[arb]:
-        """F_j at the phase."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Inversion:
     """G of one or two variables; signs: ε."""
 
-    variables: tuple[Variable, ...]
+    variables: tuple[Moving, ...]
     signs: tuple[int, ...]
 
     def values(self, phases: Sequence[arb]) -> list[arb]:
@@ -193,7 +153,7 @@ def _size(column: arb_mat) -> arb:
     return sum((abs(value).mid() for value in column.entries()), arb(0))
 
 
-def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
+def phase_at(variable: Moving, moment: arb) -> tuple[arb, int]:
     """θ and whole turns of a single variable whose G is ``moment``; raises Undecided where that is not proven."""
     (phase,), (turns,) = Inversion((variable,), (1,)).phases([moment])
     if not phase.is_finite():
@@ -212,14 +172,10 @@ def phase_at(variable: Variable, moment: arb) -> tuple[arb, int]:
 
 
 class Rest:
-    """The variable at rest at ``point``; its phase stays 0."""
+    """The variable at rest at ``middle``; its phase stays 0."""
 
-    turn = 1.0
-    periodic = False
-
-    def __init__(self, point: arb) -> None:
-        self.middle = point
-        self.column = [arb(0), arb(0)]
+    def __init__(self, middle: arb) -> None:
+        self.middle = middle
 
     def position(self, phase: Balls) -> Balls:
         return phase * 0 + self.middle
@@ -239,32 +195,42 @@ class Rest:
         """0."""
         return arb(0)
 
-    def integrals(self, phase: arb) -> list[arb]:
-        return [arb(0), arb(0)]
-
 
 class RestingVariable:
-    """``variable`` with the one integral H for a variable at rest at ``point``, outside its gap."""
+    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
 
-    def __init__(self, variable: Variable, point: arb) -> None:
-        self.variable, self.place = variable, point
-        self.turn, self.periodic, self.middle = variable.turn, variable.periodic, variable.middle
-        self.position, self.ends = variable.position, variable.ends
-        self.bend, self.phase = variable.bend, variable.phase
+    def __init__(self, variable: Gap | Approach, place: arb) -> None:
+        self.variable, self.place = variable, place
+        self.turn, self.periodic, self.position = variable.turn, variable.periodic, variable.position
 
-    def _combined(self, first: Balls, second: Balls) -> Balls:
-        return second - first * self.place
+    def _combined(self, first: arb, second: arb) -> list[arb]:
+        return [second - first * self.place]
 
     @property
     def column(self) -> list[arb]:
-        return [self._combined(*self.variable.column)]
+        return self._combined(*self.variable.column)
 
     def density(self, v: Balls) -> Balls:
         """dH by dphase, of either sign."""
-        return (v - self.place) * self.variable.density(v)
+        slope: Balls = (v - self.place) * self.variable.density(v)
+        return slope
 
     def integrals(self, phase: arb) -> list[arb]:
-        return [self._combined(*self.variable.integrals(phase))]
+        return self._combined(*self.variable.integrals(phase))
+
+
+Moving: TypeAlias = Gap | Approach | RestingVariable
+"""A variable of an :class:`Inversion`.
+
+turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
+what its integrals grow by with every unit of the phase, at last.  periodic: which of both.
+position: v at a phase.  density: dF_0 by dphase at v, > 0.  integrals: F_j at a phase.
+"""
+Variable: TypeAlias = Gap | Approach | Rest
+"""A separated variable.  middle: of its gap.  phase: that where it is v and dv/dphase is ``slope``.
+
+ends: √(v − lo) and √(hi − v), each with a sign that makes it analytic; bend: −dv/dphase over their product.
+"""
 
 
 # What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
@@ -337,16 +303,16 @@ class Line:
         cls, variables: tuple[Variable, ...], signs: tuple[int, int], slopes: tuple[int, int], phases: Sequence[arb]
     ) -> Line:
         """From the phases at t = 0; signs: ε, slopes: of G_0 and G_1."""
-        moving = tuple(k for k in (0, 1) if not isinstance(variables[k], Rest))
-        inversion, rates = Inversion(variables, signs), tuple(map(arb, slopes))
-        for k in (0, 1):
-            if k not in moving:
-                # of ε_o (G_1 − e G_0), one number
-                middle, other = variables[k].middle, 1 - k
-                inversion = Inversion((RestingVariable(variables[other], middle),), (1,))
-                rates = (signs[other] * (slopes[1] - middle * slopes[0]),)
+        moving = {k: variable for k, variable in enumerate(variables) if not isinstance(variable, Rest)}
+        inversion, rates = Inversion(tuple(moving.values()), signs), tuple(map(arb, slopes))
+        if len(moving) == 1:
+            # of ε (G_1 − e G_0), one number
+            ((k, variable),) = moving.items()
+            place = variables[1 - k].middle
+            inversion = Inversion((RestingVariable(variable, place),), (1,))
+            rates = (signs[k] * (slopes[1] - place * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
-        return cls(variables, moving, inversion, tuple(origin), rates)
+        return cls(variables, tuple(moving), inversion, tuple(origin), rates)
 
     def phases(self, time: arb) -> tuple[list[arb], list[int]]:
         """The phases in the first turns, 0 for a variable at rest, and whole turns.
