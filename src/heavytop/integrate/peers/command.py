@@ -27,7 +27,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy
 
-from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.errors import InputError, PeerFailed, Unsupported, argument
 from heavytop.guard import Guard, how_it_ended, stopwatch, waited_for_processor
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, said
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -181,9 +181,8 @@ class CommandIntegrator:
         control = self.command.control
         for name in settings:
             if name != control:
-                raise InputError(
-                    f"The integrator {self.command.name} has no {name}.", f"It is set by: {control or '-'}."
-                )
+                remedy = f"Leave it out: {argument(control)} sets its accuracy." if control else "Leave it out."
+                raise InputError(f"The integrator {self.command.name} has no {argument(name)}.", remedy)
         if not control:
             return None
         value = settings.get(control)
