@@ -12,7 +12,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.multiword.codegen import code_cache
-from heavytop.multiword.codegen.machine_code import DOUBLES, POINTER, Machine, compiled, function, ir, once, pointer
+from heavytop.multiword.codegen.machine_code import POINTER, Machine, compiled, function, ir, once, pointer
 
 CHANGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda _: b"",
@@ -39,7 +39,7 @@ def thrice(calls: list[int]) -> Callable[[int], Machine]:
         (vector,) = code.arguments
         code.store(code.load(vector, 0) * float(factor), vector, 0)
         code.builder.ret_void()
-        return compiled(module, {"multiply": (None, [DOUBLES])})
+        return compiled(module)
 
     return once(make)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +13,6 @@ import numpy
 
 from heavytop.extras import Stub
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     LANES,
     POINTER,
@@ -269,7 +267,7 @@ def _machine(size: int) -> Machine:
 
     code.loop(0, orders, order, [])
     code.builder.ret_void()
-    return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
+    return compiled(module)
 
 
 def _product(

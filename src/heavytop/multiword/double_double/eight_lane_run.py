@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import reduce
 from operator import and_
@@ -13,11 +11,9 @@ from typing import Any
 import numpy
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     INT_POINTER,
     INT_VECTOR,
-    INTEGERS,
     LANES,
     POINTER,
     Doubles,
@@ -93,12 +89,7 @@ def build(system: System, processor: Processor | None = None) -> Machine:
     module = ir.Module("lanes")
     _Round(module, system).write()
     _write_sample(module)
-    integer = ctypes.c_int64
-    signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]] = {
-        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
-        "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
-    }
-    return compiled(module, signatures, processor)
+    return compiled(module, processor)
 
 
 def _write_sample(module: ir.Module) -> None:

@@ -11,7 +11,6 @@ The step is h = ρ exp(reach), with the radius ρ from the last two coefficients
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,10 +18,8 @@ from typing import Any
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     POINTER,
     Code,
     Following,
@@ -353,16 +350,7 @@ def build(system: System, attitude: bool, processor: Processor | None = None) ->
     advance.write()
     _write_sample(module, layout, system)
     _Follow(module, layout, system).write(advance.made)
-    integer, double = ctypes.c_int64, ctypes.c_double
-    return compiled(
-        module,
-        {
-            "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
-            "sample": (None, [DOUBLES, integer, integer, double, double, DOUBLES]),
-            "follow": (None, [*[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 4, INTEGERS, integer, integer, DOUBLES]),
-        },
-        processor,
-    )
+    return compiled(module, processor)
 
 
 def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:

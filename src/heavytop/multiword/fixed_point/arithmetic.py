@@ -18,7 +18,6 @@ are the same, and as exact (:attr:`Grid.relative`).
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -26,7 +25,6 @@ from fractions import Fraction
 import numpy
 
 from heavytop.multiword.codegen.machine_code import (
-    DOUBLES,
     INT,
     LANES,
     POINTER,
@@ -446,7 +444,7 @@ def machine(grid: Grid, vectors: int) -> Machine:
 
     code.loop(0, orders + 1, order, [])
     code.builder.ret_void()
-    return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 5])})
+    return compiled(module)
 
 
 def component(code: Code, left: Operand) -> Operand:

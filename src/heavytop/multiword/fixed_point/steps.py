@@ -8,18 +8,15 @@ coefficients and sum their products. The series ends where two coefficients in a
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial, reduce
 from typing import Any
 
 from heavytop.multiword.codegen.machine_code import (
     DOUBLE,
-    DOUBLES,
     INT,
     INT_POINTER,
-    INTEGERS,
     POINTER,
     Code,
     Following,
@@ -381,21 +378,13 @@ def build(
     """
     module = ir.Module("grid")
     series = SeriesCode(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
-    made, integer = series.write(), ctypes.c_int64
-    pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
-    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
-        "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
-    }
+    made = series.write()
     if stepping and not grid.relative:
         advance = _Advance(module, grid, series.vectors, made)
         advance.write()
         samples = write_samples(module, grid, series.vectors)
         _Follow(module, grid, series.vectors, samples).write(advance.made)
-        signatures["advance"] = (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer])
-        signatures["samples"] = (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES])
-        follow = [*pointers, *[DOUBLES] * 2, INTEGERS, *[DOUBLES] * 2, INTEGERS, integer, integer, DOUBLES]
-        signatures["follow"] = (None, follow)
-    return compiled(module, signatures, processor)
+    return compiled(module, processor)
 
 
 class _Advance(Stepping):
