@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from heavytop.errors import InputError
 from heavytop.exact.resolved import resolve
 from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, Precision, Vector, exact, number
 from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.bodies import Body, Frame
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-_SPLIT = 134217729.0
-"""2^27 + 1, by which Dekker splits a double."""
 
 
 def framed(run: Trajectory, frame: Frame) -> Trajectory:
@@ -70,29 +68,11 @@ def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> 
 
 
 def _in_double(part: NDArray[numpy.float64], frame: Frame) -> NDArray[numpy.float64]:
-    """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
-    high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
-    low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
-    values = numpy.empty_like(part)
+    """A times each vector in two doubles: rounded once."""
+    axes = Pairs.nearest(frame.axes)
     with numpy.errstate(invalid="ignore", over="ignore"):
-        for i in range(3):
-            total, rest = numpy.zeros(len(part)), numpy.zeros(len(part))
-            for j in range(3):
-                product, error = _product(part[:, j], high[i, j])
-                before, total = total, total + product
-                back = total - before
-                rest += (before - (total - back)) + (product - back) + error + part[:, j] * low[i, j]
-            values[:, i] = total + rest
-    return values
-
-
-def _product(a: NDArray[numpy.float64], b: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-    """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
-    product = a * b
-    scaled, other = _SPLIT * a, _SPLIT * b
-    a_high, b_high = scaled - (scaled - a), other - (other - b)
-    a_low, b_low = a - a_high, b - b_high
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+        rows = (axes[i, 0] * part[:, 0] + axes[i, 1] * part[:, 1] + axes[i, 2] * part[:, 2] for i in range(3))
+        return numpy.stack([row.high for row in rows], axis=1)
 
 
 # A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.

@@ -22,11 +22,12 @@ from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.harness.sweeps import Lazy, Random, Sweep
 from heavytop.integrate.heyoka.lanes import states_on_a_grid
-from heavytop.integrate.multiword.lanes import Pairs, double_double_states, propagate_multiword_ensemble
+from heavytop.integrate.multiword.lanes import double_double_states, propagate_multiword_ensemble
 from heavytop.integrate.registry import Integrator, described
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.measure.truth import Known, known_motion
+from heavytop.multiword.pairs import Pairs
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.records import HEYOKA
 from heavytop.top.equations import HEAVY_TOP, Integral, Parameters, System, holding
@@ -133,11 +134,7 @@ def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
 def _drawn_pairs(problems: Sequence[Problem]) -> Pairs:
     """Their numbers, which two doubles hold: of formats of 106 bits at most."""
     rows = [[*problem.system.entering(problem.parameters), *problem.start.flat] for problem in problems]
-    high = numpy.array(rows, float)
-    low = [
-        [float(v - Fraction(h)) for v, h in zip(*pair, strict=True)] for pair in zip(rows, high.tolist(), strict=True)
-    ]
-    return Pairs(high, numpy.array(low))
+    return Pairs.nearest(rows)
 
 
 def _integrals(case: Case) -> tuple[Integral, ...]:

@@ -35,8 +35,9 @@ from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, P
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
-from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
+from heavytop.multiword.double_double.eight_lane_run import LEFT, Eight, exact_state
 from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
+from heavytop.multiword.pairs import Numerators, Pairs
 from heavytop.multiword.problem import Scaled
 from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, Parameters
@@ -271,120 +272,12 @@ def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem)
     work.finish(index, integrate_to_samples(problem, work.targets, tolerance, work.step_limit, observer, work.check))
 
 
-# Arrays of double-doubles as a ring, so that first integrals written once are evaluated for many motions at once.
-#
-# Relative errors of a few 2^-104 an operation (Dekker 1971; Joldes, Muller, Popescu 2017), while no product of two
-# words leaves the normal range: |values| from 1e-140 to 1e140.
-
-
-_SPLIT = 134217729.0
-"""2^27 + 1, of Dekker's splitting."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pairs:
-    """high + low, arrays of one shape with |low| <= ulp(high)/2."""
-
-    high: NDArray[numpy.float64]
-    low: NDArray[numpy.float64]
-
-    @classmethod
-    def of(cls, value: Pairs | Doubles | float) -> Pairs:
-        """An array or a number that doubles hold."""
-        if isinstance(value, Pairs):
-            return value
-        high = numpy.asarray(value, float)
-        return cls(high, numpy.zeros_like(high))
-
-    def __add__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        total, off = _two_sum(self.high, one.high)
-        low, rest = _two_sum(self.low, one.low)
-        total, off = _quick(total, off + low)
-        return type(self)(*_quick(total, off + rest))
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Pairs:
-        return type(self)(-self.high, -self.low)
-
-    def __sub__(self, other: Pairs | Doubles | float) -> Pairs:
-        return self.__add__(-Pairs.of(other))
-
-    def __rsub__(self, other: Pairs | Doubles | float) -> Pairs:
-        opposite = -self
-        return opposite.__add__(other)
-
-    def __mul__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        product, off = _two_product(self.high, one.high)
-        return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Pairs | Doubles | float) -> Pairs:
-        one = Pairs.of(other)
-        first = self.high / one.high
-        rest = self - one * first
-        second = rest.high / one.high
-        third = (rest - one * second).high / one.high
-        two = Pairs(*_quick(*_two_sum(first, second)))
-        return two.__add__(third)
-
-    def __getitem__(self, where: Any) -> Pairs:
-        return type(self)(self.high[where], self.low[where])
-
-    def __abs__(self) -> Pairs:
-        sign = numpy.where(self.high < 0, -1.0, 1.0)
-        return Pairs(sign * self.high, sign * self.low)
-
-
-class Numerators(Pairs):
-    """Pairs whose quotients have three words each, as constants of the machine code have: (3, ...).
-
-    The words are right to some 2^-150 where divisor and dividend are sums of few doubles.
-    """
-
-    __slots__ = ()
-
-    def __truediv__(self, other: Any) -> Any:
-        words, rest = [], self
-        for _ in range(3):
-            words.append(rest.high / other.high)
-            rest = rest.__sub__(other * words[-1])  # type: ignore[assignment]
-        return numpy.array(words)
-
-
-def _two_sum(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-def _quick(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    total = a + b
-    return total, b - (total - a)
-
-
-def _halves(a: Doubles) -> tuple[Doubles, Doubles]:
-    product = _SPLIT * a
-    high = product - (product - a)
-    return high, a - high
-
-
-def _two_product(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    product = a * b
-    (a1, a2), (b1, b2) = _halves(a), _halves(b)
-    return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
-
-
 # Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
 #
 # What the code above does motion by motion, for usual ones: doubles of moderate size,
 # forwards.
 
 
-_ROUNDS = 4096
 _LARGE = 2.0**60
 _RESTING = 2.0 ** (-2 * TINY_BITS)
 _UNITS = numpy.eye(6).tolist()
@@ -433,7 +326,7 @@ class _Grid:
         self.order = numpy.argsort(numpy.maximum(speed, numpy.sqrt(torque)), kind="stable")
         self.usual = self._are_usual()
         self.good = numpy.zeros(len(starts), bool)
-        self.found = numpy.full((len(starts), len(times), 12), numpy.nan)
+        self.samples = numpy.full((len(starts), len(times), 12), numpy.nan)
 
     def _are_usual(self) -> Any:
         """Motions of which double-double keeps every component, that do not rest."""
@@ -460,22 +353,19 @@ class _Grid:
             self._eight(eight, eights, step_limit)
             outgrown = [eight.status(lane) is None for lane in range(LANES)]
             larger += eights[outgrown].tolist()
-            self.good[eights] = (eight.flags == 0) & (eight.left_all() > 0)
+            self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
 
     def _eight(self, eight: Eight, eights: Any, step_limit: int) -> None:
         words = numpy.zeros((12, LANES))
         words[:6] = self.begin[eights].T
-        eight.put_all(words, self.constants[:, :, eights], step_limit)
+        eight.begin(slice(None), words, self.constants[:, :, eights], True, step_limit)
         for sample, targets in enumerate(self.times[eights].T):
-            eight.aim_all(targets)
-            while eight.advance(_ROUNDS) == _ROUNDS:
-                pass
-            self.found[eights, sample] = eight.sample_all(targets).T
+            self.samples[eights, sample] = eight.reach_all(targets).T
 
     def states(self) -> Pairs:
         """In the units of the problems; NaN where they are not good."""
-        high, low = (numpy.ldexp(self.found[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
+        high, low = (numpy.ldexp(self.samples[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
         total = high + low
         bad = ~self.good
         total[bad] = numpy.nan
