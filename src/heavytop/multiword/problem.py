@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 from math import isqrt
-from threading import local
 
 import numpy
 
@@ -204,10 +203,13 @@ def variation(slopes: Doubles) -> Doubles:
     orders, size, _ = slopes.shape
     if isinstance(ir, Stub):
         return _variation_by_numpy(slopes)
-    room = _rooms.of(orders, size)
-    room.given[:] = slopes.ravel()
-    _machine(size).functions["variation"](*room.pointers, orders)
-    return room.table[:, :, :size].copy()
+    width = _width(size)
+    given, powers = doubles(slopes.size), doubles((orders + 1) * size * width)
+    given[:] = slopes.ravel()
+    table = powers.reshape(orders + 1, size, width)
+    table[0, :, :size] = numpy.eye(size)
+    _machine(size).functions["variation"](pointer(given), pointer(powers), orders)
+    return table[:, :, :size]
 
 
 def _variation_by_numpy(slopes: Doubles) -> Doubles:
@@ -217,30 +219,6 @@ def _variation_by_numpy(slopes: Doubles) -> Doubles:
     for n in range(orders):
         powers[n + 1] = numpy.einsum("mij,mjk->ik", slopes[: n + 1], powers[n::-1]) / (n + 1)
     return powers
-
-
-class _Room:
-    """The arrays that one thread computes with; V_0 stays."""
-
-    def __init__(self, orders: int, size: int) -> None:
-        width = _width(size)
-        self.given, products = doubles(orders * size * size), doubles((orders + 1) * size * width)
-        self.table = products.reshape(orders + 1, size, width)
-        self.table[0, :, :size] = numpy.eye(size)
-        self.pointers = pointer(self.given), pointer(products)
-
-
-class _Rooms(local):
-    def __init__(self) -> None:
-        self.made: dict[tuple[int, int], _Room] = {}
-
-    def of(self, orders: int, size: int) -> _Room:
-        if (orders, size) not in self.made:
-            self.made[orders, size] = _Room(orders, size)
-        return self.made[orders, size]
-
-
-_rooms = _Rooms()
 
 
 def _width(size: int) -> int:

@@ -57,6 +57,11 @@ class Work:
     send: Callable[[Any], None] = field(init=False)
     room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
 
+    @property
+    def moves(self) -> bool:
+        """Whether any step is asked for."""
+        return bool(self.targets[-1] != 0) and (self.step_limit is None or self.step_limit > 0)
+
     def take(self) -> tuple[int, Problem] | None:
         """A problem that no thread has taken yet."""
         try:

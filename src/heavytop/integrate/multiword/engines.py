@@ -87,9 +87,17 @@ class Arithmetic(ABC):
     tolerance: Fraction
 
     @property
-    @abstractmethod
     def flags(self) -> dict[str, str]:
         """Everything that can change bits; they are those of every processor."""
+        return self._bits() | {"tolerance": decimal_text(self.tolerance, 6)} | self._steps()
+
+    @abstractmethod
+    def _bits(self) -> dict[str, str]:
+        """The name of this arithmetic, its words and bits."""
+
+    def _steps(self) -> dict[str, str]:
+        """Its order, where that is fixed, and the rule of its steps."""
+        return {"step_rule": "powers of two, by the number of orders"}
 
     @abstractmethod
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
@@ -114,13 +122,11 @@ class DoubleDouble(Arithmetic):
     schedule: OrderSchedule
     in_lanes: OrderSchedule
 
-    @property
-    def flags(self) -> dict[str, str]:
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "double-double", "words": "2", "bits": str(double_double_run.BITS)}
+
+    def _steps(self) -> dict[str, str]:
         return {
-            "arithmetic": "double-double",
-            "words": "2",
-            "bits": str(double_double_run.BITS),
-            "tolerance": decimal_text(self.tolerance, 6),
             "order": str(self.schedule.order),
             "step_rule": f"radius of convergence times 2^{self.schedule.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.schedule.room - 53:.1f}",
@@ -157,15 +163,8 @@ class Words(Arithmetic):
     tolerance: Fraction
     grid: Grid
 
-    @property
-    def flags(self) -> dict[str, str]:
-        return {
-            "arithmetic": "fixed grids",
-            "words": str(self.grid.words),
-            "bits": str(self.grid.total),
-            "tolerance": decimal_text(self.tolerance, 6),
-            "step_rule": "powers of two, by the number of orders",
-        }
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "fixed grids", "words": str(self.grid.words), "bits": str(self.grid.total)}
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return Fixed(scaled, self.grid, forwards)
@@ -183,14 +182,8 @@ class WholeNumbers(Arithmetic):
     tolerance: Fraction
     bits: int
 
-    @property
-    def flags(self) -> dict[str, str]:
-        return {
-            "arithmetic": "integers",
-            "bits": str(self.bits),
-            "tolerance": decimal_text(self.tolerance, 6),
-            "step_rule": "powers of two, by the number of orders",
-        }
+    def _bits(self) -> dict[str, str]:
+        return {"arithmetic": "integers", "bits": str(self.bits)}
 
     def begin(self, scaled: Scaled, forwards: bool) -> ResumableRun:
         return IntegerMotion(scaled, self.bits, forwards)

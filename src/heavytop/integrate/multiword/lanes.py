@@ -19,9 +19,7 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
-from heavytop.errors import InputError
-from heavytop.guard import processors
-from heavytop.integrate.ensemble import in_threads, one_kind
+from heavytop.integrate.ensemble import in_threads, work_of
 from heavytop.integrate.heyoka.lanes import LaneRun, Work
 from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.multiword.motions import (
@@ -39,9 +37,8 @@ from heavytop.multiword.double_double.eight_lane_run import LEFT, Eight, exact_s
 from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
 from heavytop.multiword.pairs import Numerators, Pairs
 from heavytop.multiword.problem import Scaled
-from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
+from heavytop.precision import DOUBLE_DOUBLE
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.top.heavy_top import check_times
 
 _FIRST_CHUNK = 64
 _RISE = 2
@@ -146,7 +143,7 @@ class WordsLanes:
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
-                self._record(motion, motion.exactly(scaled.state))
+                self.work.keep(motion, motion.exactly(scaled.state))
             self._finish(motion, Outcome.SUCCESS, Fraction(0), 0)
         return None
 
@@ -154,7 +151,7 @@ class WordsLanes:
         """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
         motion = self.lanes[lane]
         if not motion.times and not motion.target:
-            self._record(motion, motion.exactly(motion.scaled.state))
+            self.work.keep(motion, motion.exactly(motion.scaled.state))
         if len(motion.times) == len(self.work.times):
             steps = eight.taken(lane, self.work.step_limit)
             self._leave(eight, lane, Outcome.SUCCESS, steps + 1)
@@ -188,17 +185,11 @@ class WordsLanes:
         samples = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
         for lane, words in samples.items():
             motion = self.lanes[lane]
-            if self._record(motion, motion.native(words)):
-                self._aim(eight, lane)
-            else:
+            if (native := motion.native(words)) is None:  # too large for the format
                 self._leave(eight, lane, Outcome.NON_FINITE, eight.taken(lane, self.work.step_limit))
-
-    def _record(self, motion: _Motion, native: Any) -> bool:
-        """Keep a sample, or send it to the observer; False where absent, being too large for the format."""
-        if native is None:
-            return False
-        self.work.keep(motion, native)
-        return True
+            else:
+                self.work.keep(motion, native)
+                self._aim(eight, lane)
 
     def _leave(self, eight: Eight, lane: int, outcome: Outcome, steps: int) -> None:
         motion = self.lanes.pop(lane)
@@ -234,23 +225,12 @@ def propagate_multiword_ensemble(
     Raises InputError for no problems, for problems of several kinds, for times out of order, for fewer than 1 thread,
     and what that raises.
     """
-    first = one_kind(problems)
-    require(first.precision)
-    targets = [number(time, first.precision) for time in check_times(times)]
-    threads = processors() if threads is None else threads
-    if threads < 1:
-        raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
+    first, work = work_of(problems, times, step_limit, observer)
     arithmetic = floats(wanted_tolerance(first.precision, tolerance))
-    work = Work(
-        None, targets, [exact(t) for t in targets], step_limit, observer is not None, deque(enumerate(problems))
-    )
-    moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
-    if arithmetic is not None and first.xi is None and moves:
-        seconds = compiled_lanes(first.system)
-        in_lanes = partial(_in_lanes, work, arithmetic, tolerance, seconds)
-        return in_threads(in_lanes, work, min(threads, -(-len(problems) // LANES)), observer, finished)
-    one_by_one = partial(_one_by_one, work, tolerance)
-    return in_threads(one_by_one, work, min(threads, len(problems)), observer, finished)
+    if arithmetic is not None and first.xi is None and work.moves:
+        run = partial(_in_lanes, work, arithmetic, tolerance, compiled_lanes(first.system))
+        return in_threads(run, work, threads, LANES, observer, finished)
+    return in_threads(partial(_one_by_one, work, tolerance), work, threads, 1, observer, finished)
 
 
 def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:

@@ -557,13 +557,18 @@ class Stepping(ABC):
 class Following(ABC):
     """Writes a function that takes steps and samples by turns, until all times are done or there were enough steps.
 
-    arrays: what the function ``advance`` takes but its number of steps.  counts, status: as of :class:`Stepping`.
+    arrays: what the function ``advance`` takes but its number of steps.  clock, counts, status: as of
+    :class:`Stepping`.
     progress: times and steps done.  times_count: of the times.  most: of the steps.  result: of the samples.
     """
 
-    def __init__(self, code: Code, arrays: Sequence[Operand], counts: Operand, status: int) -> None:
-        self.code, self.arrays, self.counts, self.status = code, arrays, counts, status
+    def __init__(self, code: Code, arrays: Sequence[Operand], clock: Operand, counts: Operand, status: int) -> None:
+        self.code, self.arrays, self.clock, self.counts, self.status = code, arrays, clock, counts, status
         self.progress, self.times_count, self.most, self.result = code.arguments[-4:]
+
+    def time(self, index: int) -> Operand:
+        """A double of the clock."""
+        return self.code.load_one(self.clock, index)
 
     @abstractmethod
     def covered(self, index: Operand) -> Operand:

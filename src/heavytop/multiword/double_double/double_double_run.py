@@ -215,9 +215,8 @@ class Floating(ResumableRun):
         return step if self.forwards else -step
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
-        step = self.time - self._time(dd.BEGAN)
-        power = (step if self.forwards else -step) ** n
-        return tuple(value * power for value in _exact_state(self._row(n), len(self.problem.state)))
+        power = self.length**n
+        return tuple(value * power for value in self.derivatives(n))
 
     def _row(self, n: int) -> Doubles:
         """Both words of y_n, vector by vector."""

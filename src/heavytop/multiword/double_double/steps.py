@@ -382,16 +382,16 @@ class _Follow(Following):
     def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:5], code.arguments[2], STATUS)
+        super().__init__(code, code.arguments[:5], *code.arguments[1:3], STATUS)
         self.times, self.layout = (code.arguments[5], code.arguments[6]), layout
         self.rows = Recurrence(code, layout, system, code.null, self.arrays[-1])
 
     def covered(self, index: Operand) -> Operand:
-        return covered((self._clock(TIME), self._clock(TIME_LOW)), self._target(index))
+        return covered((self.time(TIME), self.time(TIME_LOW)), self._target(index))
 
     def aim(self, index: Operand) -> None:
         for word, at in zip(self._target(index), (TARGET, TARGET_LOW), strict=True):
-            self.code.store_one(word, self.arrays[1], at)
+            self.code.store_one(word, self.clock, at)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         one = self.code.builder.append_basic_block("one")
@@ -404,11 +404,11 @@ class _Follow(Following):
         where one of these times takes exact numbers.
         """
         code, b = self.code, self.code.builder
-        began, put = (self._clock(BEGAN), self._clock(BEGAN_LOW)), b.append_basic_block("put")
+        began, put = (self.time(BEGAN), self.time(BEGAN_LOW)), b.append_basic_block("put")
         sure, times, end = code.true, [], done
         for k in range(count):
             index = code.smaller(done + k, self.times_count - 1)
-            at, known = behind(code, self._target(index), began, self._clock(SIGN))
+            at, known = behind(code, self._target(index), began, self.time(SIGN))
             is_covered = self.covered(index)
             sure &= known | ~is_covered
             end += is_covered.extended()
@@ -416,16 +416,13 @@ class _Follow(Following):
         b.cbranch(sure, put, otherwise)
         b.position_at_end(put)
         result = code.address(self.result, done * (16 * self.layout.vectors))
-        low_order, order = (code.load_one(self.arrays[2], offset) for offset in (USED, ORDER))
+        low_order, order = (code.load_one(self.counts, offset) for offset in (USED, ORDER))
         _put_samples(self.rows, (low_order, order), times, result)
         code.store_one(code.smaller(end, self.times_count), self.progress, 0)
         b.branch(head)
 
     def _target(self, index: Operand) -> Pair:
         return self.code.load_one(self.times[0], index), self.code.load_one(self.times[1], index)
-
-    def _clock(self, index: int) -> Operand:
-        return self.code.load_one(self.arrays[1], index)
 
 
 class _Step(Stepping):

@@ -449,15 +449,15 @@ class _Follow(Following):
         arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
         kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:10], code.arguments[9], STATUS)
+        super().__init__(code, code.arguments[:10], *code.arguments[8:10], STATUS)
         self.grid, self.row, self.samples = grid, sample_row(grid, vectors), samples
         self.times, self.at = code.arguments[10:12]
 
     def covered(self, index: Operand) -> Operand:
-        return self.code.load_one(self.times, index) <= self._clock(TIME)
+        return self.code.load_one(self.times, index) <= self.time(TIME)
 
     def aim(self, index: Operand) -> None:
-        self.code.store_one(self.code.load_one(self.times, index), self.arrays[8], TARGET)
+        self.code.store_one(self.code.load_one(self.times, index), self.clock, TARGET)
 
     def put(self, done: Operand, head: Any, otherwise: Any) -> None:
         code = self.code
@@ -486,7 +486,7 @@ class _Follow(Following):
         time − began is exact where began is 0, or no more than time ≤ 2 began (Sterbenz); a step is a power of two.
         """
         code, grid = self.code, self.grid
-        time, began, end = code.load_one(self.times, index), self._clock(BEGAN), self._clock(TIME)
+        time, began, end = code.load_one(self.times, index), self.time(BEGAN), self.time(TIME)
         rest = (time - began) / (end - began)
         near = time <= began + began
         known = (time <= end) & (near | (began == 0))
@@ -504,9 +504,6 @@ class _Follow(Following):
         row = self.code.address(self.result, index * self.row)
         largest = self.code.load(row, self.row - 8)
         return self.code.all_of(largest <= most_of(self.grid))
-
-    def _clock(self, index: int) -> Operand:
-        return self.code.load_one(self.arrays[8], index)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:
