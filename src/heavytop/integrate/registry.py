@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 from types import FunctionType
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -77,17 +77,8 @@ _AGAIN_SECONDS = 1.0
 """A longer call of an integrator of another package is made once."""
 
 
-class IntegratorSource(Protocol):
-    """An integrator that is defined outside this program and every package."""
-
-    @property
-    def name(self) -> str:
-        """In rows and messages."""
-        ...
-
-    def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where absent."""
-        ...
+IntegratorSource: TypeAlias = "Command | PythonFile | PythonObject | Integrator"
+"""Where an integrator is defined that is neither this program's nor a package's; a record in no table is its own."""
 
 
 @dataclass(frozen=True, slots=True)

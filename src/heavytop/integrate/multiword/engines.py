@@ -9,6 +9,7 @@ from fractions import Fraction
 from functools import lru_cache
 from math import ceil, factorial
 from threading import Lock
+from typing import Any
 
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, XI, derivatives, known_parameters
@@ -255,32 +256,35 @@ def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
     return int(arithmetic.flags["bits"]) - _GUARD_BITS - fixed_point_run.spread(scaled) - fixed_point_run.excess(scaled)
 
 
-_made: dict[tuple[type, Grid | None, str, bool], float] = {}
+_made: dict[tuple[Any, ...], float] = {}
 _making = Lock()
+
+
+def _once(key: tuple[Any, ...], make: Callable[[], float]) -> float:
+    """What ``make`` gave for this key; other threads that ask wait."""
+    with _making:
+        if key not in _made:
+            _made[key] = make()
+        return _made[key]
 
 
 def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
     """The seconds that compiling took, once for each arithmetic and system; it is checked then."""
     key = (type(arithmetic), getattr(arithmetic, "grid", None), system.name, attitude)
-    with _making:
-        if key not in _made:
-            _made[key] = arithmetic.make(system, attitude)
-        return _made[key]
+    return _once(key, lambda: arithmetic.make(system, attitude))
 
 
 def compiled_lanes(system: System) -> float:
     """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
-    key = (eight_lane_run.Eight, None, system.name, False)
-    with _making:
-        if key not in _made:
-            seconds = eight_lane_run.machine(system).seconds
-            check(
-                system,
-                False,
-                lambda scaled: eight_lane_run.OneOfEight(scaled, _ALLOWED, _ALLOWED.order - 1),
-                double_double_run.BITS,
-            )
-            check(system, False, lambda scaled: eight_lane_run.OneOfEight(scaled, _SPLIT_ALLOWED, 30), _SPLIT_BITS)
-            check(system, False, lambda scaled: eight_lane_run.OneOfEight(scaled, _PLAIN, 3), _PLAIN_BITS)
-            _made[key] = seconds
-        return _made[key]
+    return _once((eight_lane_run.Eight, system.name), lambda: _make_lanes(system))
+
+
+def _make_lanes(system: System) -> float:
+    def begin(schedule: OrderSchedule, low_order: int) -> Callable[[Scaled], Steps]:
+        return lambda scaled: eight_lane_run.OneOfEight(scaled, schedule, low_order)
+
+    seconds = eight_lane_run.machine(system).seconds
+    check(system, False, begin(_ALLOWED, _ALLOWED.order - 1), double_double_run.BITS)
+    check(system, False, begin(_SPLIT_ALLOWED, 30), _SPLIT_BITS)
+    check(system, False, begin(_PLAIN, 3), _PLAIN_BITS)
+    return seconds

@@ -368,10 +368,7 @@ def grid_for(bits: int) -> Grid | None:
 
 def digits(value: Fraction, grid: Grid) -> list[float]:
     """``value`` rounded to a multiple of the last unit, as words."""
-    top, bottom = value.as_integer_ratio()
-    whole, rest = divmod(top << grid.total, bottom)
-    whole += 2 * rest > bottom or (2 * rest == bottom and whole & 1)  # to nearest, a tie to even
-    return words_of(whole, grid)
+    return words_of(round(value * 2**grid.total), grid)
 
 
 def words_of(whole: int, grid: Grid) -> list[float]:
