@@ -31,7 +31,13 @@ INTEGERS = ctypes.POINTER(ctypes.c_int64)
 
 Signatures: TypeAlias = Mapping[str, Sequence[str]]
 """Of each function the types of its result and of its arguments, as LLVM names them."""
-_TYPES = {"void": None, "i64": ctypes.c_int64, "double": ctypes.c_double, "i64*": INTEGERS, "double*": DOUBLES}
+_TYPES: dict[str, Any] = {
+    "void": None,
+    "i64": ctypes.c_int64,
+    "double": ctypes.c_double,
+    "i64*": INTEGERS,
+    "double*": DOUBLES,
+}
 
 P = ParamSpec("P")
 

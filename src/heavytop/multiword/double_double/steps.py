@@ -382,7 +382,7 @@ class _Follow(Following):
     def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         kinds = [POINTER, POINTER, INT_POINTER, *[POINTER] * 4, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:5], *code.arguments[1:3], STATUS)
+        super().__init__(code, code.arguments[:5], code.arguments[1], code.arguments[2], STATUS)
         self.times, self.layout = (code.arguments[5], code.arguments[6]), layout
         self.rows = Recurrence(code, layout, system, code.null, self.arrays[-1])
 

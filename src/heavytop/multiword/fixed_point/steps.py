@@ -449,7 +449,7 @@ class _Follow(Following):
         arrays = [*[POINTER] * 5, INT_POINTER, *[POINTER] * 3, INT_POINTER]
         kinds = [*arrays, POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
         _, code = function(module, "follow", ir.VoidType(), kinds)
-        super().__init__(code, code.arguments[:10], *code.arguments[8:10], STATUS)
+        super().__init__(code, code.arguments[:10], code.arguments[8], code.arguments[9], STATUS)
         self.grid, self.row, self.samples = grid, sample_row(grid, vectors), samples
         self.times, self.at = code.arguments[10:12]
 
