@@ -37,10 +37,10 @@ def in_frame(values: NDArray[numpy.float64], frame: Frame, precision: Precision)
     if not len(values):
         return values
     rotated = numpy.array(values, copy=True)
-    whole = [[entry.denominator == 1 for entry in row] for row in frame.axes]
+    is_integral = [[entry.denominator == 1 for entry in row] for row in frame.axes]
     for begin in range(0, rotated.shape[1], 3):
         part = values[:, begin : begin + 3]
-        if all(map(all, whole)):
+        if all(map(all, is_integral)):
             turned = _permuted(part, frame)
         elif precision == DOUBLE:
             turned = _in_double(part.astype(float), frame)
@@ -108,17 +108,17 @@ class Setup:
         """The motion of a body from ``start``."""
         if isinstance(body, HeavyTop) and start.attitude is None:
             return cls(body, start, None, system, precision, None)
-        found = resolve(body, start, precision.bits + _SPARE_BITS)
-        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
-        if not found.is_rotated:
-            return cls(found.top, found.start, xi, system, precision, None)
+        resolved = resolve(body, start, precision.bits + _SPARE_BITS)
+        xi = perpendicular(resolved.start.gamma) if resolved.xi is None else resolved.xi
+        if not resolved.is_rotated:
+            return cls(resolved.top, resolved.start, xi, system, precision, None)
         if system is GYROSTAT:
             raise InputError(
                 "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
                 "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
             )
-        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
-        return cls(found.top, found.start, xi, system, precision, frame)
+        frame = Frame(resolved.axes, body.centre, start.gamma, rotated(resolved.axes, xi))
+        return cls(resolved.top, resolved.start, xi, system, precision, frame)
 
     def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
         """A vector of the axes given, in principal axes."""
@@ -140,7 +140,7 @@ class Setup:
         if self.frame is None:
             return state
         axes = self.frame.axes
-        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
+        return [value for first in range(0, len(state), 3) for value in rotated(axes, state[first : first + 3])]
 
     def watched(self, observer: Callable[[Fraction, Any], object] | None) -> Callable[[Fraction, Any], object] | None:
         """An observer that is given the states in the axes given."""

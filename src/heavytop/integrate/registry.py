@@ -140,7 +140,7 @@ class Integrator:
             raise missing(extra_of(entry.lacks), f"The integrator {self.name}")
         try:
             with quiet():
-                found = load(entry.function)
+                function = load(entry.function)
         except ImportError as error:
             cause = f"is not available: {said(error)}."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy) from error
@@ -149,10 +149,10 @@ class Integrator:
         except BaseException as error:  # whatever another package's module does when it is imported
             reason = f"{type(error).__name__}: {said(error)}"
             raise InputError(f"The integrator {self.name} is broken: {reason}.", entry.remedy) from error
-        if not callable(found):
+        if not callable(function):
             cause = f"is broken: {entry.function} is not callable."
             raise InputError(f"The integrator {self.name} {cause}", entry.remedy)
-        return found  # type: ignore[no-any-return]
+        return function  # type: ignore[no-any-return]
 
     def _of_package(self) -> Integrator:
         """The entry of another package's; raises InputError where absent."""
@@ -306,10 +306,10 @@ def name_of(which: str | IntegratorSource) -> str:
 def described(which: str | IntegratorSource, set_to: tuple[str, Fraction] | None = None) -> Integrator:
     """The record, without a look at the integrator: of another package's or a file's it says nothing."""
     if isinstance(which, str):
-        found = INTEGRATORS.get(which) or foreign(which)
+        record = INTEGRATORS.get(which) or foreign(which)
     else:
-        found = which if isinstance(which, Integrator) else foreign(which.name, source=which)
-    return found if set_to is None else replace(found, set_to=set_to)
+        record = which if isinstance(which, Integrator) else foreign(which.name, source=which)
+    return record if set_to is None else replace(record, set_to=set_to)
 
 
 def load(source: str | Callable[..., Any]) -> Any:

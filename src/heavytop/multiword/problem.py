@@ -41,7 +41,7 @@ class Status(Enum):
 
 
 class Steps(ABC):
-    """One motion on its way, in scaled units; its time is |τ|.
+    """A motion on its way, in scaled units; its time is |τ|.
 
     steps: taken so far.  forwards: whether time is positive.
     """
@@ -78,7 +78,7 @@ class Steps(ABC):
 
 
 class ResumableRun(Steps):
-    """One that can be taken up again where it was left."""
+    """A motion that can be taken up again where it was left."""
 
     @abstractmethod
     def place(self) -> tuple[str, ...]:
@@ -204,11 +204,11 @@ def variation(slopes: Doubles) -> Doubles:
     if isinstance(ir, Stub):
         return _variation_by_numpy(slopes)
     width = _width(size)
-    given, powers = doubles(slopes.size), doubles((orders + 1) * size * width)
-    given[:] = slopes.ravel()
+    entries, powers = doubles(slopes.size), doubles((orders + 1) * size * width)
+    entries[:] = slopes.ravel()
     table = powers.reshape(orders + 1, size, width)
     table[0, :, :size] = numpy.eye(size)
-    _machine(size).functions["variation"](pointer(given), pointer(powers), orders)
+    _machine(size).functions["variation"](pointer(entries), pointer(powers), orders)
     return table[:, :, :size]
 
 

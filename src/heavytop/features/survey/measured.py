@@ -175,7 +175,7 @@ _ALWAYS = holding(HeavyTop((4, 5, 6), 1, (1, 1, 1)), State((1, 0, 0), (0, 0, 1))
 DRIFTS = ("gamma_squared", "area", "energy", "further")
 """Integrals whose drift is a column; further: the largest drift of all others that the motion has."""
 _TOLERANCES = Fraction(1, 2**96), Fraction(1, 2**84)
-"""Of both runs in double; other orders and steps.  In extended: of double-double itself, and the first."""
+"""The tolerances of both runs in double; other orders and steps.  In extended: double-double's own, and the first."""
 _MODERATE = 1e4
 """Larger data, and times, are looked at motion by motion."""
 _STEP_LIMIT = 1_000_000
@@ -287,7 +287,7 @@ def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tup
 
 
 def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
-    """One run in double-double, of all motions."""
+    """A run in double-double, of all motions."""
     count = len(drawn.problems)
     states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
     if drawn.system is HEAVY_TOP and tolerance is not None and _usual(drawn, times, precision):

@@ -220,7 +220,7 @@ class Compiled:
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
 _compiling: dict[tuple[Any, ...], RLock] = {}
-"""One lock a key: what one thread compiles, another that needs the same waits for."""
+"""A lock for each key: what one thread compiles, another that needs the same waits for."""
 
 
 @cache

@@ -133,7 +133,7 @@ class LaneRun:
 
 @dataclass(slots=True, eq=False)
 class _Run(LaneRun):
-    """One in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
+    """A run in a lane, or out of it and waiting for its last samples.  asked: how many samples it has passed."""
 
     parameters: Any
     asked: int = 0
@@ -158,7 +158,7 @@ class _Sample(NamedTuple):
 
 
 class Lanes:
-    """One thread's lanes; each takes the next problem as soon as its own is over.
+    """The lanes of a thread; each takes the next problem as soon as its own is over.
 
     mover and sampler: two copies of the batch engine.
     """

@@ -32,7 +32,7 @@ _LATER = Fraction(7, 11)
 
 
 def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits: int, bounded: bool = False) -> None:
-    """One step against the exact series of a known motion: coefficients, the new state, and a sample inside the step.
+    """Compare a step with the exact series of a known motion: coefficients, the new state, a sample inside the step.
 
     begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
     Raises Contradiction.
@@ -72,8 +72,8 @@ def _require(fine: bool, what: str, bits: int) -> None:
 
 LOOSEST = Fraction(1, 10**6)
 _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
-"""Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
-eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
+"""Bits beyond those of a format that double-double exceeds: a long run adds its local errors up, and the sum shall stay
+below half an eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
 _FINEST = Fraction(1, 2 ** (double_double_run.BITS - 1))
 """The tolerance of double-double."""
@@ -261,7 +261,7 @@ _making = Lock()
 
 
 def _once(key: tuple[Any, ...], make: Callable[[], float]) -> float:
-    """What ``make`` gave for this key; other threads that ask wait."""
+    """The result of ``make`` for this key, called once; other threads that ask wait."""
     with _making:
         if key not in _made:
             _made[key] = make()

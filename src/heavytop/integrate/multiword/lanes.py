@@ -75,7 +75,7 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
 
 
 class WordsLanes:
-    """One thread's eight lanes.
+    """The eight lanes of a thread.
 
     seconds: of compiling.  others: where problems go that need another arithmetic.
     """

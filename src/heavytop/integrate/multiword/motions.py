@@ -301,7 +301,7 @@ class _Pace(SampledRun):
 
     @property
     def steps(self) -> int:
-        """That stand."""
+        """Steps that stand."""
         return self.run.steps
 
     @property

@@ -30,7 +30,7 @@ DOUBLES = ctypes.POINTER(ctypes.c_double)
 INTEGERS = ctypes.POINTER(ctypes.c_int64)
 
 Signatures: TypeAlias = Mapping[str, Sequence[str]]
-"""Of each function the types of its result and of its arguments, as LLVM names them."""
+"""The types of the result and of the arguments of each function, as LLVM names them."""
 _TYPES: dict[str, Any] = {
     "void": None,
     "i64": ctypes.c_int64,

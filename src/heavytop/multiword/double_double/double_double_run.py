@@ -454,8 +454,8 @@ class LaneOrders:
             if sign < 0:
                 a, rest = -a, -rest
             at = 3 * (component % 3)
-            whole = code.load(right, LANES * second)
-            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
+            unsplit = code.load(right, LANES * second)
+            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, unsplit))):
                 result[at + k] = code.fma(one, factor, result[at + k])
         return result
 

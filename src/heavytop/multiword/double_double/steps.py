@@ -143,9 +143,9 @@ def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]
             high, lost = code.two_sum(total[0], product)
             total = high, total[1] + (rest + lost)
     assert total is not None
-    whole, inverse = divisor
+    integer, inverse = divisor
     quotient = total[0] * inverse
-    rest = code.fma(-quotient, whole, total[0]) + total[1]
+    rest = code.fma(-quotient, integer, total[0]) + total[1]
     return code.quick_two_sum(quotient, rest * inverse)
 
 
@@ -296,11 +296,11 @@ class SplitOrders:
 
     def _added(self, one: list[Operand], other: list[Operand], sums: list[Operand]) -> list[Operand]:
         """Three sums of each vector, with the products of L of one order and R of another."""
-        whole, coarse, fine = other[:3]
+        unsplit, coarse, fine = other[:3]
         result = []
         for v in self.series.vectors:
             a, rest = one[3 + 2 * v : 5 + 2 * v]
-            for left, right, total in zip((a, a, rest), (coarse, fine, whole), sums[3 * v : 3 * v + 3], strict=True):
+            for left, right, total in zip((a, a, rest), (coarse, fine, unsplit), sums[3 * v : 3 * v + 3], strict=True):
                 result.append(self.series.code.fma(left, right, total))
         return result
 

@@ -199,7 +199,7 @@ class SeriesCode:
         gathered_bits = code.load(seen, 0).bits()
         result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
         for factors, source in self.sources(vector, gathered, y):
-            result.add_product(factors, source, each=True, below=not grid.whole)
+            result.add_product(factors, source, watched=True, below=not grid.whole)
         result.look_at_all()
         code.store(result.seen.of_bits(), seen, 0)
         return summed(code, grid, result.sums)
