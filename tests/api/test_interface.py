@@ -147,6 +147,8 @@ def test_everything_prints_as_a_small_table() -> None:
         ht.drift(run),
         ht.read_report(ROOT / "results" / "default"),
     ]
+    assert "shown to 15 digits" in repr(ht.propagate(TOP, START, TIMES, ht.QUAD))
+    assert "shown to" not in repr(run)
     for each in shown:
         assert 2 < len(repr(each).splitlines()) < 20
         html = each._repr_html_()

@@ -580,6 +580,8 @@ class Trajectory(LazyStates, Tabular, InSpace):
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
         names = NAMES if self.problem.xi is None or self.attitude is not None else (*NAMES, "ξ1", "ξ2", "ξ3")
         notes = []
+        if rows and precision != DOUBLE:
+            notes.append(f"shown to {digits} digits; texts() gives all")
         if self.times and not rows:
             notes.append(f"{len(self.times)} states went to the observer")
         if self.outcome is not Outcome.SUCCESS:

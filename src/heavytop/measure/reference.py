@@ -245,7 +245,7 @@ def as_written(
 DIGITS = range(1, 20001)
 _SHOWN = 15
 """Up to so many digits the components of a state stand beside each other in a table."""
-_WIDE, _ENDS = 52, 2
+_WIDE, _ENDS = 58, 2
 """Characters of a number in a row, and times at either end that are shown of many."""
 
 
