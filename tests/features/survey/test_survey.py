@@ -35,6 +35,8 @@ from heavytop.report.compare.noise import Policy
 from support.in_process import heavytop
 from support.reports import compare
 
+pytestmark = pytest.mark.pictures
+
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """
 [[sweep]]
