@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 
@@ -59,6 +60,7 @@ def other_request(old: Row, new: Row) -> str:
     return ""
 
 
+@lru_cache(1 << 14)
 def impossible(data: Data, starts: int) -> str:
     """Data of a row of so many starts that no run writes, in words; empty without any."""
     for name in _VECTORS:
@@ -91,7 +93,8 @@ def _text(texts: str | tuple[str, ...]) -> str:
 CLOSE = 1e-5
 """Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
 _SUCCESS = Outcome.SUCCESS.value
-_NO_NUMBER = ("nan", "missing")
+_NOT_FINITE = frozenset(("nan", "missing"))
+_NOT_NUMBERS = _NOT_FINITE | {UNRESOLVED, "never"}
 
 _HALF_WAY = 0.25 - NEAR
 """Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
@@ -125,9 +128,22 @@ def _reached(row: Row) -> Iterator[str]:
     failed = row.metrics.get("starts_failed")
     if failed is not None and failed.value != "0":
         yield f"starts_failed: a success with {failed.value} starts that failed"
-    with suppress(InputError):  # what is evaluated exactly has no format, and a law has several
-        if parse(row.precision).bits != row.bits:
-            yield f"bits: {row.bits} in {row.precision}"
+    if (bits := _bits(row.precision)) not in (None, row.bits):
+        yield f"bits: {row.bits} in {row.precision}"
+    yield from _seconds(row)
+
+
+def _seconds(row: Row) -> Iterator[str]:
+    if row.seconds.get("least", 0.0) > row.seconds.get("run", math.inf):
+        yield "seconds: the fastest run is slower than the median"
+
+
+@lru_cache
+def _bits(precision: str) -> int | None:
+    """The bits of a format; None of the precision of a row that has none, or several."""
+    with suppress(InputError):
+        return parse(precision).bits
+    return None
 
 
 def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
@@ -135,10 +151,17 @@ def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
     for metric in metrics.values():
         quantity = metric.quantity
         if quantity is not None and metric.log10 is not None and quantity.statistic == "max":
-            for part in ("rms", "final"):
-                other = metrics.get(quantity.over(part).text)
+            for name in _keys(quantity)[1:]:
+                other = metrics.get(name)
                 if other is not None and other.log10 is not None and other.log10 > metric.log10 + CLOSE:
-                    yield f"{quantity.over(part).text}: larger than the largest"
+                    yield f"{name}: larger than the largest"
+
+
+@lru_cache(1 << 12)
+def _keys(quantity: Quantity) -> tuple[str, str, str]:
+    """The keys of the largest value of a quantity, of its root mean square and of its last value."""
+    largest, rms, last = (quantity.over(statistic).text for statistic in ("max", "rms", "final"))
+    return largest, rms, last
 
 
 def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
@@ -148,24 +171,29 @@ def _series(row: Row, kind: ReportedKind) -> Iterator[str]:
         if len(series.times) != len(series.values):
             yield f"{name}: not one value for each time"
             continue
-        if row.finite and any(value in _NO_NUMBER for value in series.values):
+        if row.finite and not _NOT_FINITE.isdisjoint(series.values):
             yield f"finite: said to be finite, but {name} holds nan or missing"
         if series.quantity is not None and not kind.series_has_more(series.quantity):
             yield from _against_metrics(series.quantity, series, row)
 
 
 def _against_metrics(quantity: Quantity, series: Series, row: Row) -> Iterator[str]:
-    values = sizes(series)
-    largest, last = (row.metrics.get(quantity.over(part).text) for part in ("max", "final"))
-    if largest is not None and values and max(values) > bound(largest) + CLOSE:
-        yield f"{quantity.text}: the series is larger than {quantity.over('max').text}"
+    of_largest, _, of_last = _keys(quantity)
+    largest, last = row.metrics.get(of_largest), row.metrics.get(of_last)
+    if largest is not None and (size := peak(series)) is not None and size > bound(largest) + CLOSE:
+        yield f"{quantity.text}: the series is larger than {of_largest}"
     if last is not None and ended(series, row):
-        yield from _last(quantity.over("final").text, series.values[-1], last)
+        yield from _last(of_last, series.values[-1], last)
 
 
-def sizes(series: Series) -> list[float]:
-    """log10 of the values of a series that are numbers, -1e9 for 0."""
-    return [size for value in series.values if (size := size_of(value)) is not None]
+def peak(series: Series) -> float | None:
+    """log10 of the largest size among the values of a series, -1e9 for 0; None where none is a number."""
+    numbers = series.values if _NOT_NUMBERS.isdisjoint(series.values) else list(filter(is_number, series.values))
+    with suppress(ValueError):
+        sizes = list(map(abs, map(float, numbers)))
+        if 1e-300 < sum(sizes) < 1e300:
+            return math.log10(max(sizes))
+    return max(map(log_size, numbers), default=None)
 
 
 def ended(series: Series, row: Row) -> bool:
@@ -187,9 +215,21 @@ def _floor(size: float | None) -> float:
 
 def size_of(value: str) -> float | None:
     """log10 of a value of a series, -1e9 for 0; None for a word."""
-    if value in (*_NO_NUMBER, UNRESOLVED, "never"):
-        return None
-    return log_size(value)
+    return log_size(value) if is_number(value) else None
+
+
+def is_number(value: str) -> bool:
+    """Whether a value of a series is no word."""
+    return value not in _NOT_NUMBERS
+
+
+def log_sizes(texts: Sequence[str]) -> list[float]:
+    """:func:`log_size` of each number."""
+    with suppress(ValueError):
+        sizes = list(map(abs, map(float, texts)))
+        if 1e-300 < min(sizes) <= sum(sizes) < 1e300:
+            return list(map(math.log10, sizes))
+    return list(map(log_size, texts))
 
 
 def log_size(text: str) -> float:
@@ -271,8 +311,18 @@ def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
                     _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
     _check_series(file, rows)
     for row in rows:
-        for problem in contradictions(row, kind_of(row, kinds)):
-            raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
+        _refuse_first(file, row, contradictions(row, kind_of(row, kinds)))
+
+
+def check_seconds(file: Path, rows: Iterable[Row]) -> None:
+    """Raises InputError where the seconds of a row contradict themselves; all else of it is checked."""
+    for row in rows:
+        _refuse_first(file, row, _seconds(row) if row.outcome == _SUCCESS else ())
+
+
+def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
+    for problem in problems:
+        raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
 
 
 def _check_series(file: Path, rows: Iterable[Row]) -> None:
