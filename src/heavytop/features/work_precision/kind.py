@@ -215,7 +215,10 @@ class WorkPrecision(Kind):
         largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
         if len(both) < 2 or largest is None:
             return
-        if max((size for series in both if (size := peak(series)) is not None), default=-math.inf) > bound(largest) + CLOSE:
+        if (
+            max((size for series in both if (size := peak(series)) is not None), default=-math.inf)
+            > bound(largest) + CLOSE
+        ):
             yield "error_max: smaller than its series"
         if last is None or last.log10 is None:
             return

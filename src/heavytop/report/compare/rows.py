@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from itertools import chain
+from operator import sub
 from statistics import median
 from typing import Any, Literal
 
@@ -104,6 +105,8 @@ def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Ju
     for law in (old, new):
         if problem := inconsistent(law):
             return Verdict.INCOMPARABLE, problem
+    if old == new:
+        return SAME
     if old.growth != new.growth:
         if "unresolved" not in (old.growth, new.growth) and not (rerun and _between_classes(old, new)):
             worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
@@ -227,8 +230,10 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
         most = Fraction(allowed) * max(abs(a) for a, _ in values)
         off = any(abs(b - a) > most for a, b in values)
         return (Verdict.WORSE, "a value that must agree does not") if off else SAME
-    sizes = ([max(size, floor) for size in log_sizes(texts)] for texts in (before, after))
-    grown = median(b - a for a, b in zip(*sizes, strict=True))
+    sizes = [log_sizes(texts) for texts in (before, after)]
+    if min(map(min, sizes)) < floor:
+        sizes = [[max(size, floor) for size in part] for part in sizes]
+    grown = median(map(sub, sizes[1], sizes[0]))
     return (Verdict.WORSE, f"{grown / BITS:.1f} bits lost at half of the samples") if grown > allowed else SAME
 
 

@@ -128,7 +128,7 @@ def _reached(row: Row) -> Iterator[str]:
     failed = row.metrics.get("starts_failed")
     if failed is not None and failed.value != "0":
         yield f"starts_failed: a success with {failed.value} starts that failed"
-    if (bits := _bits(row.precision)) not in (None, row.bits):
+    if _bits(row.precision) not in (None, row.bits):
         yield f"bits: {row.bits} in {row.precision}"
     yield from _seconds(row)
 
@@ -258,6 +258,7 @@ def law_text(law: Law) -> str:
     return f"{law.growth}, exponent {law.exponent:.3g}{span}"
 
 
+@lru_cache(1 << 12)
 def inconsistent(law: Law) -> str:
     """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
     if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
@@ -301,17 +302,9 @@ def check_keys(file: Path | str, rows: Iterable[Row]) -> None:
 
 def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
     """Raises InputError where a row cannot be, or contradicts itself, naming it and its field."""
+    doubtful = _doubtful([metric for row in rows for metric in row.metrics.values()])
     for row in rows:
-        _check_row(file, row, kind_of(row, kinds))
-    metrics = [metric for row in rows for metric in row.metrics.values()]
-    if doubtful := _doubtful(metrics):
-        for row in rows:
-            for name, metric in row.metrics.items():
-                if id(metric) in doubtful:
-                    _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
-    _check_series(file, rows)
-    for row in rows:
-        _refuse_first(file, row, contradictions(row, kind_of(row, kinds)))
+        _refuse_first(file, row, _problems(row, kind_of(row, kinds), doubtful))
 
 
 def check_seconds(file: Path, rows: Iterable[Row]) -> None:
@@ -322,27 +315,100 @@ def check_seconds(file: Path, rows: Iterable[Row]) -> None:
 
 def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:
     for problem in problems:
-        raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
+        where = f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
+        raise InputError(f"{where}, {printable(problem)[:260].rstrip('.')}.", REMEDY)
 
 
-def _check_series(file: Path, rows: Iterable[Row]) -> None:
-    """Raises InputError where the values of a series are not as many as its times, or a text that is not a number."""
-    for row in rows:
-        for name, series in row.series.items():
-            if len(series.times) != len(series.values):
-                raise InputError(f"{_where(file, row)}, {printable(name)[:60]}: not one value for each time.", REMEDY)
-            if not all(map(isfinite, _floats([*series.times, *series.values]))):
-                for text in (*series.times, *(value for value in series.values if value not in WORDS["value"])):
-                    _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
+def _problems(row: Row, kind: ReportedKind, doubtful: set[int]) -> Iterator[str]:
+    """What of a row cannot be, as ``FIELD: REASON``; only the first counts, as later ones may follow from it.
+
+    doubtful: ids of the metrics that are looked at one by one.
+    """
+    yield from _of_fields(row, kind)
+    for name, law in row.laws.items():
+        yield from (f"growth {name[:60]}, {problem}" for problem in _of_law(law))
+    if doubtful:
+        for name, metric in row.metrics.items():
+            if id(metric) in doubtful:
+                yield from (f"{name[:60]}: {problem}" for problem in _of_metric(metric, row.finite))
+    for name, series in row.series.items():
+        yield from (f"{name[:60]}: {problem}" for problem in _of_series(series))
+    yield from contradictions(row, kind)
 
 
-def _floats(texts: Sequence[str]) -> list[float]:
-    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
-    joined = "".join(texts)
+def _of_fields(row: Row, kind: ReportedKind) -> Iterator[str]:
+    for name in ("horizon", "time_reached"):
+        if cause := _cause(getattr(row, name)):
+            yield f"{name}: {cause}"
+    if row.outcome not in _OUTCOMES:
+        yield f"outcome: must be a known one; got {row.outcome[:60]!r}"
+    if not row.bits and row.precision != "exact":
+        yield "bits: a format without any"
+    if row.time_reached != row.horizon:
+        reached, horizon = exact(row.time_reached), exact(row.horizon)
+        # a time is rounded to the format, the horizon need not be
+        if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
+            yield f"time_reached: {row.time_reached} is beyond {row.horizon}"
+    lacking = [name for name in kind.needed if name not in row.metrics]
+    if lacking and row.outcome not in UNMEASURED:
+        yield f"metrics: a row of {kind.name} without {', '.join(lacking)}"
+
+
+def _of_law(law: Law) -> Iterator[str]:
+    for name in ("first", "last", "detects", "lost_at"):
+        text = getattr(law, name)
+        if text is not None and (cause := _cause(text) or _negative(text)):
+            yield f"{name}: {cause}"
+
+
+_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
+WORDS = {
+    "error": ("nan", "missing", UNRESOLVED),
+    "duration": ("nan", "missing", "never"),
+    "value": ("nan", "missing", "never", UNRESOLVED),
+}
+"""Words in the place of a number, for each kind of metric."""
+
+
+def _of_metric(metric: Metric, finite: bool) -> Iterator[str]:
+    if metric.bound is not None and (cause := _cause(metric.bound) or _negative(metric.bound)):
+        yield f"its bound: {cause}"
+    if metric.value in WORDS[metric.kind]:
+        if metric.log10 is not None:
+            yield f"{metric.value} with a logarithm"
+        if finite and metric.value == "nan":
+            yield "said to be finite, but holds a NaN"
+        return
+    if cause := _cause(metric.value):
+        yield cause
+    if metric.kind != "value" and (negative := _negative(metric.value)):
+        yield negative
+    stated, expected = metric.log10, log10(exact(metric.value))
+    if (stated is None) != (expected is None) or (
+        stated is not None and expected is not None and not abs(stated - expected) < CLOSE
+    ):
+        yield f"value {metric.value} and log10 {stated} disagree"
+
+
+def _of_series(series: Series) -> Iterator[str]:
+    if len(series.times) != len(series.values):
+        yield "not one value for each time"
+    if not all(map(isfinite, _floats([*series.times, *series.values]))):
+        numbers = (value for value in series.values if value not in WORDS["value"])
+        yield from filter(None, map(_cause, (*series.times, *numbers)))
+
+
+def _cause(text: str) -> str:
+    """Why a text is not a number; empty where it is."""
     try:
-        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
-    except ValueError:
-        return [math.nan]
+        exact(text)
+    except InputError as error:
+        return error.cause
+    return ""
+
+
+def _negative(text: str) -> str:
+    return f"{text} is negative" if exact(text) < 0 else ""
 
 
 def _doubtful(metrics: Sequence[Metric]) -> set[int]:
@@ -355,64 +421,10 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
-def _where(file: Path, row: Row) -> str:
-    return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
-
-
-def _check_row(file: Path, row: Row, kind: ReportedKind) -> None:
-    where = _where(file, row)
-    horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
-    if row.outcome not in _OUTCOMES:
-        raise InputError(f"{where}: outcome must be a known one; got {printable(row.outcome)[:60]!r}.", REMEDY)
-    if not row.bits and row.precision != "exact":
-        raise InputError(f"{where}, bits: a format without any.", REMEDY)
-    # a time is rounded to the format, the horizon need not be
-    if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
-        raise InputError(f"{where}, time_reached: {row.time_reached} is beyond {row.horizon}.", REMEDY)
-    lacking = [name for name in kind.needed if name not in row.metrics]
-    if lacking and row.outcome not in UNMEASURED:
-        raise InputError(f"{where}: a row of {kind.name} without {', '.join(lacking)}.", REMEDY)
-    for name, law in row.laws.items():
-        _check_law(f"{where}, growth {printable(name)[:60]}", law)
-
-
-def _check_law(where: str, law: Law) -> None:
-    for name in ("first", "last", "detects", "lost_at"):
-        text = getattr(law, name)
-        if text is not None and _number(f"{where}, {name}", text) < 0:
-            raise InputError(f"{where}, {name}: {text} is negative.", REMEDY)
-
-
-_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
-WORDS = {
-    "error": ("nan", "missing", UNRESOLVED),
-    "duration": ("nan", "missing", "never"),
-    "value": ("nan", "missing", "never", UNRESOLVED),
-}
-"""Words in the place of a number, for each kind of metric."""
-
-
-def _check_metric(where: str, metric: Metric, finite: bool) -> None:
-    if metric.bound is not None and _number(where, metric.bound) < 0:
-        raise InputError(f"{where}: a negative bound {metric.bound}.", REMEDY)
-    if metric.value in WORDS[metric.kind]:
-        if metric.log10 is not None:
-            raise InputError(f"{where}: {metric.value} with a logarithm.", REMEDY)
-        if finite and metric.value == "nan":
-            raise InputError(f"{where}: said to be finite, but holds a NaN.", REMEDY)
-        return
-    number = _number(where, metric.value)
-    if number < 0 and metric.kind != "value":
-        raise InputError(f"{where}: a negative {metric.kind} {metric.value}.", REMEDY)
-    stated, expected = metric.log10, log10(number)
-    if (stated is None) != (expected is None) or (
-        stated is not None and expected is not None and not abs(stated - expected) < CLOSE
-    ):
-        raise InputError(f"{where}: value {metric.value} and log10 {stated} disagree.", REMEDY)
-
-
-def _number(where: str, value: str) -> Fraction:
+def _floats(texts: Sequence[str]) -> list[float]:
+    """Numbers, without the cost of exact ones; nan alone for text that is not a number outside Python."""
+    joined = "".join(texts)
     try:
-        return exact(value)
-    except InputError as error:
-        raise InputError(f"{where}: {error.cause}", REMEDY) from None
+        return list(map(float, texts)) if joined.isascii() and "_" not in joined else [math.nan]
+    except ValueError:
+        return [math.nan]

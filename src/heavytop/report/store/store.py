@@ -102,8 +102,8 @@ class _Rows:
         twin = None if self.twins is None else self.twins._checked.get(number)
         if self.twins is None or twin is None:
             return None
-        (head, old, tail), (own_head, new, own_tail) = (_around_seconds(rows._rows[number]) for rows in (self.twins, self))
-        if (head, tail) != (own_head, own_tail):
+        (*rest, old), (*own_rest, new) = (_without_seconds(rows._rows[number]) for rows in (self.twins, self))
+        if rest != own_rest:
             return None
         if new == old:
             return twin
@@ -139,12 +139,12 @@ class _Rows:
             yield from rows
 
 
-def _around_seconds(row: msgspec.Raw) -> tuple[bytes, bytes, bytes]:
-    """The text of a row before, in and after its seconds; all of it before these where it does not hold them once."""
+def _without_seconds(row: msgspec.Raw) -> tuple[bytes, bytes, bytes]:
+    """The text of a row before, after and in its seconds; all of it before these where it does not hold them once."""
     text = bytes(row)
     head, _, rest = text.partition(_SECONDS)
     seconds, end, tail = rest.partition(b"}")
-    return (text, b"", b"") if _SECONDS in tail or not end else (head, seconds + end, tail)
+    return (text, b"", b"") if _SECONDS in tail or not end else (head, tail, seconds + end)
 
 
 AnyReport = Report | Brief
