@@ -91,7 +91,7 @@ def parse(name: str) -> Precision:
             return real(int(name[5:]))
     raise InputError(
         f"Unknown precision {quoted(name)}.",
-        "Use double, extended, double-double, quad or real:BITS (real:24).",
+        "Use double, extended, double-double, quad or real:BITS (real:24 is single precision).",
     )
 
 

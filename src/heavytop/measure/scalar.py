@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import reduce
+from functools import partial, reduce
 from math import isfinite
 from sys import float_info
 from typing import Any
@@ -166,6 +166,8 @@ _SPARE = 3
 LEAST = 12
 """Numbers that must agree."""
 _SINGLE = 24
+_FINER = 2
+"""Digits of numbers of single precision, written as decimals, are finer than these by that factor."""
 EXPLAINS = 1.5
 """An error is that of rounding if it is at most so many times the largest rounding, ..."""
 _PART = 0.01
@@ -204,18 +206,26 @@ def explains(rounding: Rounding, error: float) -> bool:
     return _PART * rounding.error <= error <= EXPLAINS * rounding.error
 
 
+def _to_decimals(value: Fraction, digits: int) -> Fraction:
+    return Fraction(round(value * 10**digits), 10**digits)
+
+
+def _to_significant(value: Fraction, digits: int) -> Fraction:
+    return Fraction(decimal_text(value, digits))
+
+
 def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
-    most = precision.digits - _SPARE
-    for digits in range(1, most):
-        unit = Fraction(1, 10**digits)
-        if all(round_to(round(value / unit) * unit, precision.bits) == value for value in numbers):
-            yield Rounding("decimals", digits, 0.5 * 10.0**-digits)
+    worst = float(min(Fraction(1), max(map(abs, numbers))))
+    written: list[Callable[[Fraction], Fraction]] = [lambda value: value]
+    single = Rounding("single", _SINGLE, worst * 2.0**-_SINGLE)
+    for kind, form, scale in (("decimals", _to_decimals, 0.5), ("significant", _to_significant, 5 * worst)):
+        for digits in range(1, precision.digits - _SPARE):
+            if all(round_to(form(value, digits), precision.bits) == value for value in numbers):
+                rounding = Rounding(kind, digits, scale * 10.0**-digits)
+                yield rounding
+                written += [partial(form, digits=digits)] * (_FINER * rounding.error < single.error)
+                break
+    for form_written in written if precision.bits > _SINGLE else ():
+        if all(round_to(form_written(round_to(value, _SINGLE)), precision.bits) == value for value in numbers):
+            yield single
             break
-    for digits in range(1, most):
-        if all(round_to(Fraction(decimal_text(value, digits)), precision.bits) == value for value in numbers):
-            worst = max(abs(value) / max(Fraction(1), abs(value)) for value in numbers)
-            yield Rounding("significant", digits, float(worst) * 0.5 * 10.0 ** (1 - digits))
-            break
-    if precision.bits > _SINGLE and all(round_to(value, _SINGLE) == value for value in numbers):
-        worst = max(abs(value) / max(Fraction(1), abs(value)) for value in numbers)
-        yield Rounding("single", _SINGLE, float(worst) * 2.0**-_SINGLE)

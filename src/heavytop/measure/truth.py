@@ -25,9 +25,6 @@ from heavytop.exact.closed_form import starting_at
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
-from heavytop.integrate.multiword.engines import accuracy, choose
-from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
-from heavytop.integrate.multiword.motions import integrate_to_samples
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
@@ -188,6 +185,8 @@ class _Served:
 
     @classmethod
     def of(cls, request: Given, bits: int) -> _Served:
+        from heavytop.integrate.multiword.engines import accuracy, choose  # a proven reference needs no integrator
+
         problem = request(real(bits))
         arithmetic, scaled = choose(problem, None)
         return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
@@ -254,6 +253,9 @@ def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float)
 
 def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
     """In words; one by itself is not put into lanes."""
+    from heavytop.integrate.multiword.lanes import propagate_multiword_ensemble
+    from heavytop.integrate.multiword.motions import integrate_to_samples
+
     targets = [number(time, problems[0].precision) for time in check_times(times)]
     if len(problems) == 1:
         return [integrate_to_samples(problems[0], targets, step_limit=limit)]

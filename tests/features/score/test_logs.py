@@ -88,6 +88,17 @@ def ephemeris() -> str:
     return "\n".join(parts)
 
 
+def over_a_leap_second(first: int) -> str:
+    """The ephemeris from that tenth of the last minute of 2016 on, which has 61 seconds."""
+    lines = []
+    for k, line in enumerate(line for line in ephemeris().splitlines() if line.startswith("2026-001")):
+        tenth = first + k
+        day = f"2016-12-31T23:59:{tenth / 10:04.1f}" if tenth < 610 else f"2017-001T00:00:{(tenth - 610) / 10:04.1f}Z"
+        lines.append(f"{day} {line.split(maxsplit=1)[1]}")
+    begin, end = ephemeris().split("DATA_START")[0], "DATA_STOP"
+    return "\n".join([begin.replace("META_STOP", "TIME_SYSTEM = UTC\nMETA_STOP") + "DATA_START", *lines, end])
+
+
 def later_ephemeris() -> str:
     """An ephemeris whose first row is behind its START_TIME, of which the comments give the attitude."""
     q = ", ".join(map(str, quaternions()[0]))
@@ -109,6 +120,8 @@ FORMS: dict[str, tuple[str, Callable[[], str]]] = {
     "TUM without a header": ("tum", lambda: tum(False)),
     "ephemeris": ("aem", ephemeris),
     "ephemeris of a later row": ("aem", later_ephemeris),
+    "ephemeris into a leap second": ("aem", lambda: over_a_leap_second(595)),
+    "ephemeris over a leap second": ("aem", lambda: over_a_leap_second(605)),
     "ephemeris below its comments": ("aem", lambda: HEAD + ephemeris().replace(HEAD.replace("# ", "COMMENT "), "")),
     "underscores": (
         "csv",
@@ -229,6 +242,26 @@ def test_repeated_times_are_one_row_or_an_error_and_a_reset_ends_the_log(tmp_pat
     shown = heavytop("score", path)
     assert shown.returncode == 0
     assert "the time goes back at line 16" in shown.stdout + shown.stderr
+    for require, code, says in (("9", 3, "not known, for the time goes back at line 16"), ("17", 1, " are right.")):
+        shown = heavytop("score", path, "--require", require)
+        assert (shown.returncode, says in shown.stdout) == (code, True)
+    assert scored_or_unknown(path, "9")["passed"] is None
+
+
+def scored_or_unknown(path: Path, require: str) -> dict[str, object]:
+    return json.loads(heavytop("score", path, "--json", "--require", require).stdout)
+
+
+def test_stamps_in_double_say_how_many_digits_of_the_time_they_keep(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    off = [time * (1 + time * 1e-6) for time in TIMES]
+    for name, places, kept in (("timestamp", 7, True), ("timestamp", 9, True), ("time", 7, True), ("t", 2, False)):
+        stamps = [f"{1.7e9 + time:.{places}f}" for time in off]
+        lines = [f"{stamp},{line}" for stamp, line in zip(stamps, rows(quaternions()).splitlines(), strict=True)]
+        path.write_text(plain(lines).replace("t,qw", f"{name},qw"))
+        shown = heavytop("score", path)
+        assert "counted from the first row" in shown.stderr
+        assert ("keep 6 digits of the time" in shown.stderr) == kept
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,16 @@
 """Several files at once: a line each, and the order of those that differ in their step alone."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from heavytop.errors import ExitCode
+from heavytop.features.score.diagnose.samples import Diagnosis
 from heavytop.features.score.several import ScoredFile, exit_code, orders, text
+from heavytop.features.score.text import cause
 from support.in_process import heavytop
 
 HEAD = "# name: slow\n# integrator: {}\n# step: {}\n# inertia: 2, 2, 1\n# weight: 1\n# centre: 0, 0, 1/2\n"
@@ -23,6 +26,15 @@ def test_the_order_is_that_of_the_two_finest_steps_above_rounding() -> None:
     (found,) = orders([*files, scored("other", "1/20", 1.0, "euler"), scored("unsaid", "0", 1e-2)])
     assert (found.paths, round(found.order, 9)) == (("a", "b", "c"), 4)
     assert "order 4.0 over 3 steps: a to c" in text(files)
+
+
+def test_an_explanation_is_its_name_and_words_and_says_where_the_names_are() -> None:
+    words = cause(Diagnosis("one_state", {"t": "3", "state": "3 of 9"}, 1.0, 1e-12), "heavy_top")
+    assert words == "Only the state at t = 3 is off (state 3 of 9)"
+    assert cause(Diagnosis("gamma_down", {"of": "columns"}), "heavy_top").startswith("γ points down: with −γ it fits")
+    lines = text([scored("a", "1", 1.0), replace(scored("b", "1", 1.0), explained=f"one_state: {words}")]).splitlines()
+    assert lines[2].endswith(f"5.0  one_state: {words}")
+    assert lines[3].startswith("`heavytop docs score`, What went wrong,")
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from flint import arb
 
-from heavytop.cases import CASES
+from heavytop.cases import CASES, Case
 from heavytop.errors import InputError
 from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.features.score.trajectories.columns import header
-from heavytop.features.score.trajectories.files import TextTable, read, unread
+from heavytop.features.score.trajectories.files import TextTable, read, require_body, require_case, unread
 from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
+from heavytop.top.bodies import Body
+from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]
@@ -159,6 +162,24 @@ def test_a_number_in_degrees_is_converted_to_the_last_digit(tmp_path: Path) -> N
 def test_w_x_y_z_beside_each_other_are_a_quaternion(names: str, places: dict[str, str]) -> None:
     found = header(names.split())
     assert {quantity: "".join(components) for quantity, components in found.places.items()} == places
+
+
+@pytest.mark.parametrize("size", [Fraction(1, 10**6), Fraction(1), Fraction(10**6)])
+@pytest.mark.parametrize("changed", ["inertia", "centre", "gravity"])
+def test_a_body_is_compared_with_a_case_at_its_own_scale(size: Fraction, changed: str) -> None:
+    """One per cent of the moments, of the centre or of the weight is another body, however small the body is."""
+    more = Fraction(101, 100)
+    centre, inertia = [size, Fraction(0), 2 * size], [value * size**2 for value in (30, 40, 50)]
+    top, start = HeavyTop(inertia, 20 * size, centre), State((0, 0, size), (0, 0, 1))
+    case = Case("mine", "", HEAVY_TOP, top, start)
+    data = {"mass": 2, "gravity": 10 * size, "centre": centre, "inertia": inertia, "about": "pivot"}
+    require_body(case, Body(**data))
+    value = data[changed]
+    data[changed] = [more * part for part in value] if isinstance(value, list) else more * value
+    with pytest.raises(InputError, match="in the case mine it is"):
+        require_body(case, Body(**data))
+    with pytest.raises(InputError, match="The file says Ω3"):
+        require_case(case, top, State((0, 0, size * more), (0, 0, 1)), HEAVY_TOP, None)
 
 
 @pytest.mark.parametrize(

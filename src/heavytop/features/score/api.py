@@ -307,7 +307,7 @@ def scored(trajectory: GivenTrajectory, needed: Fraction | None, progress: Calla
         assessment.of_digits,
         assessment.peer,
         tuple(diagnosis_text(diagnosis, row.system) for diagnosis in assessment.diagnoses),
-        passed(row, needed),
+        passed(row, needed, assessment.cut),
         assessment.used,
         assessment,
         needed,

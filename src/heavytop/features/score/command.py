@@ -53,7 +53,7 @@ def score(
     Several files are scored in parallel, a line each; files that differ in their step alone give the order.
 
     Exit 0 where the trajectory reached its end, however few digits are right; with --require 1 where fewer are right;
-    3 where it ended early, or that is not known.
+    3 where it ended early, where its time goes back, or that is not known.
     """
     from heavytop.features.score.api import read_trajectory, scored
     from heavytop.files import replace_all
@@ -85,7 +85,7 @@ def score(
     if html is not None:
         print(f"\nPage: {html}")
     if needed is not None:
-        print(f"\n{requirement(score.row, needed)}")
+        print(f"\n{requirement(score.row, needed, motion.cut)}")
     return score.exit_code
 
 

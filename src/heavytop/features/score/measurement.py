@@ -15,9 +15,8 @@ import numpy
 from heavytop.cases import Case
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
-from heavytop.features.score.diagnose.diagnosis import diagnose, rounded
 from heavytop.features.score.diagnose.readings import Seen, disagreement
-from heavytop.features.score.diagnose.samples import Diagnosis, FileAxes, turning_rate
+from heavytop.features.score.diagnose.samples import WORTH_ASKING, Diagnosis, FileAxes, rounded, turning_rate
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step
@@ -45,7 +44,6 @@ Progress = Callable[[], None]
 # Attitudes, positions and Ω in any axes, scored like a state: how many digits of the columns are right, and why.
 
 
-_WORTH_ASKING = 1e-10
 _OVERLAP = 1e-6
 """Columns that say the same must agree to that."""
 _PART = 0.1
@@ -90,7 +88,7 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
         seen = observed.seen(times)
         said = [] if seen is None else _disagreements(seen, times)
         digits_written = rounded(_amplified(observed, roundings(states, trajectory.precision)), error)
-        if error is not None and (error <= _WORTH_ASKING or digits_written):
+        if error is not None and (error <= WORTH_ASKING or digits_written):
             return said + digits_written
         lengths = _lengths(observed, times, trajectory.precision)
         if lengths is not None and (error is None or float(lengths.error or 0) >= _PART * error):
@@ -98,6 +96,10 @@ def diagnoses(trajectory: GivenTrajectory, error: float | None, errors: Sequence
         if seen is None:
             return said
         states, about["seen"], about["frame"] = _in_axes_of_file(seen), seen, _frame(observed)
+    elif len(errors) == count and max(error or 0.0, *errors) <= WORTH_ASKING:
+        return rounded(roundings(states, trajectory.precision), error)
+    from heavytop.features.score.diagnose.diagnosis import diagnose  # a right file needs none of it
+
     top, start = trajectory.top, trajectory.start
     return said + diagnose(top, start, trajectory.system, times, states, trajectory.precision, error, errors, **about)
 
@@ -194,7 +196,7 @@ class Assessment:
     row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
     diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
     the file, but read off the digits written.  single: whether every number of the states is one of single precision.
-    used: which columns were scored, where these are not Ω and γ in principal axes.
+    used: which columns were scored, where these are not Ω and γ in principal axes.  cut: as in the trajectory.
     """
 
     row: Row
@@ -203,6 +205,7 @@ class Assessment:
     format_guessed: bool = False
     single: bool = False
     used: str = ""
+    cut: str = ""
 
     @property
     def digits_right(self) -> float | None:
@@ -269,7 +272,7 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     peer = _peer(trajectory, scored, count, progress)
     columns = "" if trajectory.observed is None else used(trajectory.observed)
     clock = [] if told is None else [told[0]]
-    return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns)
+    return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns, trajectory.cut)
 
 
 def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
@@ -398,15 +401,16 @@ def _peer(trajectory: GivenTrajectory, measured: Scored, count: int, progress: P
     return Peer(PEER, precision.name, digits, run.steps)
 
 
-def passed(row: Row, needed: Fraction | None) -> bool | None:
+def passed(row: Row, needed: Fraction | None, cut: str = "") -> bool | None:
     """Whether so many digits are right; False where fewer are, also of a run that ended early.
 
     None, not a pass, where it ended early, and where it is not known how many are right, or only that so many are
-    which the reference resolves.  needed: None for no demand.
+    which the reference resolves.  needed: None for no demand.  cut: of the trajectory, whose later rows meet no demand.
     """
-    good = None if not complete(row) else True
+    good = True if complete(row) else None
     if needed is None:
         return good
+    good = None if cut else good
     kept = digits_right(row)
     if kept is None:
         return None

@@ -15,7 +15,7 @@ from typing import Any
 
 from heavytop.errors import ExitCode, InputError
 from heavytop.features.score.api import Score, read_trajectory, scored
-from heavytop.features.score.text import requirement
+from heavytop.features.score.text import cause, requirement
 from heavytop.measure.scalar import RELATIVE, digits_text
 from heavytop.precision import DOUBLE, exact_text
 from heavytop.processes import ChildContext
@@ -75,9 +75,9 @@ def _scored_file(path: str, case: str | None, require: str | None, normalize: bo
     )
     document = {"file": path, **score.to_json()}
     digits = "-" if score.digits_kept is None else digits_text(score.digits_kept)
-    said = "; ".join(diagnosis.kind for diagnosis in score.assessment.diagnoses)
+    said = "; ".join(f"{fit.kind}: {cause(fit, score.row.system)}" for fit in score.assessment.diagnoses)
     method, step = (motion.integrator, *body), motion.step or Fraction(0)
-    required = "" if needed is None else requirement(score.row, needed)
+    required = "" if needed is None else requirement(score.row, needed, motion.cut)
     return ScoredFile(path, document, score.exit_code, digits, said, method, step, _error(score), required)
 
 
@@ -106,6 +106,8 @@ def text(files: Sequence[ScoredFile]) -> str:
     width = min(_WIDTH, max(len(file.path) for file in files))
     lines = [f"{'file':{width}}  digits right  explained by"]
     lines += [f"{clip(file.path, width):{width}}  {file.digits:>12}  {file.explained}".rstrip() for file in files]
+    if any(file.digits and file.explained for file in files):
+        lines.append("`heavytop docs score`, What went wrong, lists the names before a colon.")
     for order in orders(files):
         said = f"order {order.order:z.1f} over {len(order.paths)} steps"
         lines.append(f"{said}: {clip(order.paths[0], width)} to {clip(order.paths[-1], width)}")

@@ -12,8 +12,7 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.features.score.diagnose.diagnosis import AS_AT_START, VARIES
-from heavytop.features.score.diagnose.samples import FLOOR, Diagnosis
+from heavytop.features.score.diagnose.samples import AS_AT_START, FLOOR, VARIES, Diagnosis
 from heavytop.features.score.measurement import Assessment, direction, passed
 from heavytop.measure.attitude_error import ATTITUDE_ERROR, JOINT_VIOLATION, POSITION_ERROR
 from heavytop.measure.scalar import digits_kept, digits_of, digits_right, digits_text
@@ -113,32 +112,25 @@ _CONVENTION_SENTENCES = {
     "body_axes": "The axes of the body are in another order or reversed: 1, 2, 3 are axes {axes}",
     "space_turned": "The axes of space are turned by {angle} degrees",
     "body_turned": "The axes of the body are turned by {angle} degrees",
+    "quaternion_length": "The quaternions have not length 1: it is off by {off} at t = {t}. Their directions are "
+    "scored, and the length counts as an error; --normalize leaves it out",
+    "columns_disagree": "Columns contradict each other: {columns} differ by {by}, from t = {t} on",
 }
 
 
 def is_convention(fit: Diagnosis) -> bool:
     """Whether it is said here."""
-    if fit.kind in ("quaternion_length", "columns_disagree"):
-        return True
     # other files have mistakes of the same names, without a word on where they were found
-    return "of" in fit.numbers and all(kind in _CONVENTION_SENTENCES for kind in fit.kind.split("+"))
+    is_ours = fit.left is None or "of" in fit.numbers
+    return is_ours and all(kind in _CONVENTION_SENTENCES for kind in fit.kind.split("+"))
 
 
 def sentence(fit: Diagnosis) -> str:
     """The mistake with its numbers, how far the error falls, and the digits that are right with it."""
-    numbers = fit.numbers
-    if fit.kind == "quaternion_length":
-        return (
-            f"The quaternions have not length 1: it is off by {numbers['off']} at t = {numbers['t']}. Their directions "
-            "are scored, and the length counts as an error; --normalize leaves it out."
-        )
-    if fit.kind == "columns_disagree":
-        apart = f"{numbers['columns']} differ by {numbers['by']}, from t = {numbers['t']} on"
-        return f"Columns contradict each other: {apart}."
     said = _mistake(fit)
     if fit.error is None or fit.left is None:
         return f"{said}."
-    if numbers.get("of") == "rates":
+    if fit.numbers.get("of") == "rates":
         return f"{said}: they differ by {fit.left:.2e} of Ω with it, by {fit.error:.2e} without."
     digits = -math.log10(max(fit.left, FLOOR))
     more = " or more" if fit.left < FLOOR else ""
@@ -225,6 +217,11 @@ _SENTENCES = {
 _IN_FULL = "written in full they may be better."
 _SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
 _WHOSE = {"omega": "Ω is", "both": "Ω and γ are"}
+
+
+def cause(fit: Diagnosis, system: str) -> str:
+    """What fits, without how far the error falls."""
+    return _mistake(fit) if is_convention(fit) else _said(fit, system)
 
 
 def diagnosis_text(fit: Diagnosis, system: str = "heavy_top") -> str:
@@ -366,16 +363,18 @@ def _without_digits(row: Row) -> str:
     return "How many digits are right is not known: there is no reference. Drift is measured."
 
 
-def requirement(row: Row, needed: Fraction) -> str:
-    """Whether as many digits are right as are required, in a sentence."""
+def requirement(row: Row, needed: Fraction, cut: str = "") -> str:
+    """Whether as many digits are right as are required, in a sentence; ``cut`` as in :func:`passed`."""
     asked = f"{float(needed):g} digits are required"
-    kept, good = digits_right(row), passed(row, needed)
+    kept, good = digits_right(row), passed(row, needed, cut)
     # rounded down, so that what is not enough does not look so
     shown = "" if kept is None else f"{math.floor(kept * 1000) / 1000:g}"
     if good is not None:
         return f"{asked}: " + ("they are right." if good else f"{shown} are right.")
     if row.outcome != "success":
         return f"{asked}: not known, for the run ended early."
+    if cut:
+        return f"{asked}: not known, for {cut}, and later rows are not scored."
     return f"{asked}: not known, for " + ("there is no reference." if kept is None else f"{shown} are resolved.")
 
 

@@ -39,6 +39,7 @@ from heavytop.features.score.diagnose.samples import (
     FITTED_DROP,
     FLOOR,
     LIKELY_DROP,
+    WORTH_ASKING,
     Array,
     Diagnosis,
     looked_at,
@@ -51,8 +52,6 @@ from heavytop.measure.attitude_error import FORMS
 from heavytop.precision import decimal_text, plain_decimal
 from heavytop.top.attitude import SEQUENCES
 
-WORTH_ASKING = 1e-10
-"""Relative errors below it are no mistake of this kind."""
 _NEIGHBOURS = 60
 """Samples whose attitudes are compared with Ω."""
 _TWO_MISTAKES = 0.05

@@ -16,17 +16,20 @@ from sys import float_info
 import numpy
 
 from heavytop.features.score.diagnose import hypotheses
-from heavytop.features.score.diagnose.conventions import AS_LIKELY, WORTH_ASKING, Suppositions
+from heavytop.features.score.diagnose.conventions import AS_LIKELY, Suppositions
 from heavytop.features.score.diagnose.readings import Seen, of_states
 from heavytop.features.score.diagnose.samples import (
     ALIKE,
+    AS_AT_START,
     DROP,
     FIRST,
     FITTED_DROP,
     FLOOR,
     LIKELY_DROP,
     MOST_AT_ONCE,
+    VARIES,
     WITH_ATTITUDE,
+    WORTH_ASKING,
     Array,
     Diagnosis,
     Examined,
@@ -34,8 +37,9 @@ from heavytop.features.score.diagnose.samples import (
     Hypothesis,
     examined,
     in_units,
+    rounded,
 )
-from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, explains, roundings
+from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, roundings
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System, holding
 from heavytop.top.heavy_top import HeavyTop, State
@@ -48,8 +52,6 @@ _CONSTANT = 100.0
 """Integrals are constant but off if they are off by so many times what they vary by, ..."""
 _OFF = 1e-3
 """... and by so much of what they may be; they vary if they vary by as much."""
-VARIES, AS_AT_START = "varies", "that of the start"
-"""Words for first integrals that do not keep another value."""
 _FEWEST_ROWS = 4
 _FEWEST_STILL = 3
 _WHOLE = slice(None)
@@ -96,8 +98,6 @@ def diagnose(
         return [] if frame else roundings([[value for value in row if value] for row in states], precision, least)
 
     measured, written = numpy.array(errors, dtype=float), written_so(LEAST)
-    if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= WORTH_ASKING:
-        return rounded(written, relative_error)
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
         samples = examined(top, start, system, times, states, int(measured.argmax()) if len(measured) else None, frame)
         trusted = None if samples is None or frame is not None else samples.trusted()
@@ -143,12 +143,6 @@ def _explanation(examined: Examined | None, columns: Suppositions | None, column
         exact = columns.of_rates() or columns.of_start()
     likely = None if exact else next((one for n in (None, *FIRST) if (one := told(n, LIKELY_DROP)) is not None), None)
     return exact or likely or (None if examined is None else _looked_at(examined, _integrals_off(examined)))
-
-
-def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
-    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
-    explaining = (each for each in written if error is not None and explains(each, error))
-    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
 
 
 def _only_rounded(written: Rounding, error: float | None, examined: Examined | None) -> bool:

@@ -20,6 +20,7 @@ from heavytop.errors import HeavyTopError
 from heavytop.integrate.heyoka.engines import compiled
 from heavytop.integrate.heyoka.motions import states_at
 from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.scalar import Rounding, explains
 from heavytop.precision import DOUBLE, decimal_text, dot, log10, plain_decimal
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -28,6 +29,10 @@ Array = NDArray[numpy.float64]
 WITH_ATTITUDE = (HEAVY_TOP, HEAVY_GYROSTAT)
 """Systems whose attitude rides along."""
 
+WORTH_ASKING = 1e-10
+"""Relative errors below it are no mistake."""
+VARIES, AS_AT_START = "varies", "that of the start"
+"""Words for first integrals that do not keep another value."""
 MOST_SAMPLES = 24
 _TURNS = 60.0
 """Radians that the body turns until the last sample that is looked at, if there are a few samples before."""
@@ -85,6 +90,12 @@ class Diagnosis:
     looked_at: tuple[int, int, str] | None = None
     likely: bool = False
     others: tuple[Diagnosis, ...] = ()
+
+
+def rounded(written: Sequence[Rounding], error: float | None) -> list[Diagnosis]:
+    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
+    explaining = (rounding for rounding in written if error is not None and explains(rounding, error))
+    return [Diagnosis("rounded", {"to": each.kind, "digits": str(each.digits)}) for each in explaining][:1]
 
 
 class Hypothesis(NamedTuple):

@@ -34,7 +34,7 @@ from heavytop.features.score.trajectories.observed import (
 )
 from heavytop.files import read_whole, without_repeats
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact_text, parse, real, shown
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, Vector, decimal_text, exact_text, parse, real, shown
 from heavytop.top.attitude import SHAPES, key_of
 from heavytop.top.bodies import BODY, CENTRE, Body, body_of
 from heavytop.top.equations import NAMES, VARIABLES, System, system_of
@@ -80,6 +80,7 @@ class TextTable:
         self.keys: dict[str, str | list[str]] = {}
         self.rows: list[list[str]] = []
         self.notes: list[str] = []
+        self.cut = ""
         self.header: observed_columns.Header | None = None
         comments: list[list[str]] = []
         body: list[str] = []
@@ -149,7 +150,7 @@ class TextTable:
         """Leave out rows that repeat one, and those behind a time that goes back."""
         times = [time for row in self.cells if (time := logs.number(row[index])) is not None]
         if len(times) == len(self.cells):
-            kept, notes = logs.without_repeats(times, self.cells, self.lines)
+            kept, notes, self.cut = logs.without_repeats(times, self.cells, self.lines)
             self.cells, self.lines = [self.cells[i] for i in kept], [self.lines[i] for i in kept]
             self.notes += notes
 
@@ -245,22 +246,21 @@ def _split(body: list[str], lines: list[int], separator: str | None, width: int)
 
 # Whether a trajectory file and the case that it is said to be of agree.
 
+_NONE: Vector = (Fraction(0), Fraction(0), Fraction(0))
+
 
 def require_case(case: Case, top: HeavyTop, start: State, which: System, at_start: State | None) -> None:
     """Raises InputError where the file says something else than the case."""
-    said: list[tuple[str, Any, Any]] = [("system", which.name, case.system.name)]
-    said += [("weight", top.weight, case.top.weight)]
-    said += [(f"I{i}", new, old) for i, (new, old) in enumerate(zip(top.inertia, case.top.inertia, strict=True), 1)]
-    said += [
-        (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
-    ]
-    rotors = (top.rotor or (Fraction(0),) * 3 for top in (top, case.top))
-    said += [(f"k{i} of the rotor", new, old) for i, (new, old) in enumerate(zip(*rotors, strict=True), 1)]
-    said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
-    if at_start is not None:
-        rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
-        said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
-    _require_alike(said, case)
+    if which is not case.system:
+        raise _other(case, "system", which.name, case.system.name)
+    _require_alike(case, ("weight",), [top.weight], [case.top.weight])
+    for i, (new, old) in enumerate(zip(top.inertia, case.top.inertia, strict=True), 1):
+        _require_alike(case, (f"I{i}",), [new], [old])
+    _require_alike(case, [f"{name} of the centre" for name in "abc"], top.centre, case.top.centre)
+    _require_alike(case, [f"k{i} of the rotor" for i in (1, 2, 3)], top.rotor or _NONE, case.top.rotor or _NONE)
+    for state, where in ((start, ""), (at_start or start, " of the row t = 0")):
+        for part, names in (("omega", NAMES[:3]), ("gamma", NAMES[3:])):
+            _require_alike(case, [name + where for name in names], getattr(state, part), getattr(case.start, part))
 
 
 def require_body(case: Case, body: Body) -> None:
@@ -268,31 +268,39 @@ def require_body(case: Case, body: Body) -> None:
     principal axis another centre or rotor than the case.
     """
     top, _ = in_principal_axes(body, 64)
-    said = [("weight", top.weight, case.top.weight)]
     moments = sorted(case.top.inertia)
-    pairs = zip(sorted(top.inertia), moments, strict=True)
-    said += [(f"principal moment {i}", new, old) for i, (new, old) in enumerate(pairs, 1)]
+    _require_alike(case, ("weight",), [top.weight], [case.top.weight])
+    for i, (new, old) in enumerate(zip(sorted(top.inertia), moments, strict=True), 1):
+        _require_alike(case, (f"principal moment {i}",), [new], [old])
     for what in ("centre", "rotor") if case.top.weight else ("rotor",):
-        lengths = [[_along(one, what, moment) for one in (top, case.top)] for moment in moments]
-        said += [(f"the {what} along principal axis {i}", new, old) for i, (new, old) in enumerate(lengths, 1)]
-    _require_alike(said, case)
+        names = [f"the {what} along principal axis {i}" for i in (1, 2, 3)]
+        _require_alike(case, names, *([_along(one, what, moment) for moment in moments] for one in (top, case.top)))
 
 
 def _along(top: HeavyTop, what: str, moment: Fraction) -> Fraction:
     """Length of the part of its centre or rotor along the principal axes of that moment, in double."""
-    near = max(moment, Fraction(1)) / 1000
-    parts = zip(top.inertia, getattr(top, what) or (Fraction(0),) * 3, strict=True)
-    return Fraction(math.hypot(*(float(part) for other, part in parts if abs(other - moment) <= near)))
+    parts = zip(top.inertia, getattr(top, what) or _NONE, strict=True)
+    return Fraction(math.hypot(*(float(part) for other, part in parts if _alike(other, moment, moment))))
 
 
-def _require_alike(said: Sequence[tuple[str, Any, Any]], case: Case) -> None:
-    for what, new, old in said:
-        if new != old and (isinstance(new, str) or abs(new - old) > max(abs(old), Fraction(1)) / 1000):  # three digits
-            texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
-            raise InputError(
-                f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
-                f"`heavytop list --case {case.name}` shows the data; without a case the file is scored by its own.",
-            )
+def _alike(new: Fraction, old: Fraction, size: Fraction) -> bool:
+    """Whether two numbers agree to three digits of a size."""
+    return abs(new - old) <= abs(size) / 1000
+
+
+def _require_alike(case: Case, names: Sequence[str], given: Sequence[Fraction], known: Sequence[Fraction]) -> None:
+    """Raises InputError for the first component of a vector that is another, relative to the largest of the case."""
+    size = max(map(abs, known))
+    for name, new, old in zip(names, given, known, strict=True):
+        if not _alike(new, old, size):
+            raise _other(case, name, _briefly(new), _briefly(old))
+
+
+def _other(case: Case, what: str, new: str, old: str) -> InputError:
+    return InputError(
+        f"The file says {what} = {new}, but in the case {case.name} it is {old}.",
+        f"`heavytop list --case {case.name}` shows the data; without a case the file is scored by its own.",
+    )
 
 
 def _briefly(value: Fraction) -> str:
@@ -408,11 +416,11 @@ def _table(text: str, started: bool) -> tuple[dict[str, Any], list[str]]:
     table = TextTable(text, sorted({*_KEYS, "attitude", "joint"} - {"times", "states"}), started)
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
-        more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
-        return table.keys | more, table.notes
-    columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
-    columns["numbers"] = [f"Line {number}" for number in table.lines]
-    return table.keys | columns, table.notes
+        columns: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
+    else:
+        columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
+        columns["numbers"] = [f"Line {number}" for number in table.lines]
+    return table.keys | columns | {"cut": table.cut}, table.notes
 
 
 def _given(document: dict[str, Any], stem: str, case: Case | None, normalize: bool) -> GivenTrajectory:
@@ -502,6 +510,7 @@ def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool)
         "steps": _integer(document.get("steps", "0"), "steps"),
         "flags": {key: named(_text(document, key), key) for key in _FLAGS if key in document},
         "format_guessed": "precision" not in document and "bits" not in document,
+        "cut": document.get("cut", ""),
     }
 
 

@@ -6,6 +6,7 @@ and Parquet.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -23,6 +24,7 @@ KITTI = ("R11", "R12", "R13", "px", "R21", "R22", "R23", "py", "R31", "R32", "R3
 _STAMP = re.compile(r"(?:.*[./_])?(?:stamp|time|clock)[./_](secs?|n(?:ano)?secs?)", re.IGNORECASE)
 _EPOCHS = ("timestamp", "stamp", "epoch")
 """Columns of times that are counted from their first row."""
+_COUNTED = (*_EPOCHS, "t", "time")
 _OF_BODY = r"(?:_(?:rs|s|b|ib|bn|body|local|imu))*"
 """What may say, behind the name of an angular velocity, that it is of the body."""
 _ALIASES = tuple(
@@ -111,6 +113,8 @@ def require_understood(names: Sequence[str], others: Sequence[str], quantities: 
 
 
 _TEN_DAYS = 864_000
+_OF_1970 = 10**9, 4 * 10**9
+"""Seconds since 1970 in the years 2001 to 2096: no motion begins so long before its first row."""
 _LONG = 500
 """Integers that are so far apart are hardly seconds: those of PX4 are microseconds since the start."""
 
@@ -135,7 +139,7 @@ def with_one_time(
         del names[nano]
     plain = [canonical(name) for name in names]
     words = [name.partition(" ")[0] for name in plain]
-    index = next((words.index(word) for word in _EPOCHS if word in words), None)
+    index = next((index for word in _COUNTED for index in _places(word, words, cells)), None)
     if index is None or (words[index] == "epoch" and {"t", "time"} & set(words)):
         return names, cells, []
     names[index] = re.sub(r"^\w+", "t", plain[index])
@@ -148,10 +152,31 @@ def with_one_time(
     if names[index] == "t" and second and second - first >= _LONG and first.denominator == second.denominator == 1:
         apart = f"The first {plain[index]}s are integers {decimal_text(second - first, 12)} apart, without a unit."
         raise InputError(apart, f"Name the column {plain[index]} [us], [ms] or [ns], or [s] for seconds.")
+    note = f"times are counted from the first row, {decimal_text(first, 20)}{_kept([row[index] for row in cells])}"
     for row in cells:
         if (value := number(row[index])) is not None:
             row[index] = exact_text(value - first)
-    return names, cells, [f"times are counted from the first row, {decimal_text(first, 20)}"]
+    return names, cells, [note]
+
+
+def _places(word: str, words: Sequence[str], cells: Sequence[Sequence[str]]) -> list[int]:
+    """The place of a column of that name whose times are counted from the first row; t and time only if since 1970."""
+    if word not in words:
+        return []
+    index = words.index(word)
+    first, last = (number(row[index]) or 0 for row in (cells[0], cells[-1]))
+    return [index] if word in _EPOCHS or (_OF_1970[0] < first < _OF_1970[1] and last - first < first / 1000) else []
+
+
+def _kept(stamps: Sequence[str]) -> str:
+    """What is left of the time where all stamps are doubles, whose digits the epoch takes; empty where none is lost."""
+    values = [(value, _last_unit(text)) for text in stamps if (value := number(text)) is not None]
+    unit, (first, _), (last, _) = min(unit for _, unit in values), values[0], values[-1]
+    spacing = Fraction(math.ulp(float(first)))
+    if spacing < unit or not last > first or any(abs(value - Fraction(float(value))) > unit / 2 for value, _ in values):
+        return ""
+    digits = int(math.log10((last - first) / spacing))
+    return f"; as doubles the stamps keep {digits} digits of the time since then: write nanoseconds as integers"
 
 
 def number(text: str) -> Fraction | None:
@@ -167,8 +192,8 @@ def is_unit(texts: Sequence[str]) -> bool:
 
 def without_repeats(
     times: Sequence[Fraction], rows: list[list[str]], lines: Sequence[int]
-) -> tuple[list[int], list[str]]:
-    """Which rows are kept, and notes: of rows that repeat one the first; none behind a time that goes back.
+) -> tuple[list[int], list[str], str]:
+    """Which rows are kept, notes, and where the time goes back: of rows that repeat one the first; none behind that.
 
     Raises InputError for two rows at one time that differ.
     """
@@ -185,10 +210,10 @@ def without_repeats(
             kept[-1] = max(kept[-1], index, key=lambda row: sum(map(len, rows[row])))  # more digits
             continue
         if len(kept) > 1 and (time - times[kept[-1]]) * (times[kept[1]] - times[kept[0]]) < 0:
-            note = f"the time goes back at line {lines[index]}: what came before is scored, {len(kept)} rows"
-            return kept, [*_repeats(repeated), note]
+            cut = f"the time goes back at line {lines[index]}"
+            return kept, [*_repeats(repeated), f"{cut}: what came before is scored, {len(kept)} rows"], cut
         kept.append(index)
-    return kept, _repeats(repeated)
+    return kept, _repeats(repeated), ""
 
 
 def _agree(one: str, other: str) -> bool:
@@ -294,21 +319,29 @@ def of_ephemeris(text: str) -> str:
         lines.append("# quaternion: space_to_body")
     data = text.partition("DATA_START")[2].partition("DATA_STOP")[0].splitlines()
     rows = [line.split() for line in data if line.strip() and not line.lstrip().startswith(("COMMENT", "#"))]
-    start = _epoch(meta.get("START_TIME") or rows[0][0]) if rows else Fraction(0)
+    system = meta.get("TIME_SYSTEM", "UTC").upper()
+    start = _epoch(meta.get("START_TIME") or rows[0][0], system) if rows else Fraction(0)
     lines.append(",".join(["timestamp", *order]))
-    lines += [",".join([exact_text(_epoch(row[0]) - start), *row[1 : len(order) + 1]]) for row in rows]
+    lines += [",".join([exact_text(_epoch(row[0], system) - start), *row[1 : len(order) + 1]]) for row in rows]
     return "\n".join(lines)
 
 
-def _epoch(text: str) -> Fraction:
-    """Seconds of an epoch, calendar date or day of the year, exactly."""
+_LEAPS = [(year, 1) for year in (*range(1973, 1981), 1988, 1990, 1991, 1996, 1999, 2006, 2009, 2017)]
+_LEAPS += [(year, 7) for year in (1972, 1981, 1982, 1983, 1985, 1992, 1993, 1994, 1997, 2012, 2015)]
+"""Months before which UTC had a leap second."""
+
+
+def _epoch(text: str, system: str = "UTC") -> Fraction:
+    """Seconds of an epoch, calendar date or day of the year, exactly; in UTC with the leap seconds before it."""
     whole, _, part = text.rstrip("Z").partition(".")
+    is_leap = system == "UTC" and whole.endswith(":59:60")
     for pattern in ("%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S"):
         try:
-            seconds = int(datetime.strptime(whole, pattern).replace(tzinfo=UTC).timestamp())
+            moment = datetime.strptime(whole[:-2] + "59" if is_leap else whole, pattern).replace(tzinfo=UTC)
         except ValueError:
             continue
-        return seconds + Fraction(f"0.{part or 0}")
+        leaps = sum(month <= (moment.year, moment.month) for month in _LEAPS) if system == "UTC" else 0
+        return int(moment.timestamp()) + leaps + is_leap + Fraction(f"0.{part or 0}")
     raise InputError(f"{quoted(text)} is not an epoch.", "Write it as 2026-01-31T12:00:00.5.")
 
 
