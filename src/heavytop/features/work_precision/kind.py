@@ -209,7 +209,9 @@ class WorkPrecision(Kind):
         return {"compile": compiling} | figures, alone
 
     def contradictions(self, row: Row) -> Iterator[str]:
-        """The errors are the largest of Ω and γ."""
+        """The errors are the largest of Ω and γ; the median of the seconds is no less than the least of them."""
+        if row.seconds.get("least", 0.0) > row.seconds.get("run", math.inf):
+            yield "seconds: the fastest run is slower than the median"
         names = (Quantity(SOLUTION_ERROR, part).text for part in ("omega", "gamma"))
         both = [row.series[name] for name in names if name in row.series]
         largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))

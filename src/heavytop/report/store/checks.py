@@ -130,12 +130,6 @@ def _reached(row: Row) -> Iterator[str]:
         yield f"starts_failed: a success with {failed.value} starts that failed"
     if _bits(row.precision) not in (None, row.bits):
         yield f"bits: {row.bits} in {row.precision}"
-    yield from _seconds(row)
-
-
-def _seconds(row: Row) -> Iterator[str]:
-    if row.seconds.get("least", 0.0) > row.seconds.get("run", math.inf):
-        yield "seconds: the fastest run is slower than the median"
 
 
 @lru_cache
@@ -307,10 +301,10 @@ def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
         _refuse_first(file, row, _problems(row, kind_of(row, kinds), doubtful))
 
 
-def check_seconds(file: Path, rows: Iterable[Row]) -> None:
-    """Raises InputError where the seconds of a row contradict themselves; all else of it is checked."""
+def check_seconds(file: Path, rows: Iterable[Row], kinds: Kinds) -> None:
+    """Raises InputError where seconds contradict a row of which all else is checked: only kinds look at them."""
     for row in rows:
-        _refuse_first(file, row, _seconds(row) if row.outcome == _SUCCESS else ())
+        _refuse_first(file, row, kind_of(row, kinds).contradictions(row) if row.outcome == _SUCCESS else ())
 
 
 def _refuse_first(file: Path, row: Row, problems: Iterable[str]) -> None:

@@ -130,7 +130,7 @@ class _Rows:
                 where = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {where}.", REMEDY) from None
             check_rows(self._file, [row for n, row in zip(numbers, rows, strict=True) if n not in twins], self._kinds)
-            check_seconds(self._file, twins.values())
+            check_seconds(self._file, twins.values(), self._kinds)
             self._checked = dict(zip(numbers, rows, strict=True))
             hashes = {hash(row.identity) for row in rows}
             if len(hashes) < len(rows) or hashes & seen:
