@@ -271,7 +271,7 @@ class GoryachevMotion:
         phases, turns = self.phases(time)
         with series_length(length):
             moving = self.line.series(phases, self._rates)
-            return self.level.restored(self.turned(moving, turns), length)
+            return self.level.restored(self.turned(moving, turns))
 
     def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
         """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""

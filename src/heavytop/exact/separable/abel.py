@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from math import ceil, expm1, log
 from typing import Any, NamedTuple, NoReturn, Self, TypeAlias
 
-from flint import arb, arb_mat, arb_series, fmpq
+from flint import arb, arb_mat, fmpq
 
 from heavytop.errors import LevelNotDone, OutOfReach
+from heavytop.exact.closed_form import solved
 from heavytop.exact.flint.balls import (
     Balls,
     Undecided,
-    current_length,
     current_precision,
     nearest_integer,
     working_precision,
@@ -334,11 +334,11 @@ class Line:
 
     def series(self, phases: Sequence[arb], rates: Callable[[Any, Any], Sequence[Any]]) -> list[Any]:
         """The phases as power series in t, from their differential equations: rates of both at (v1, v2)."""
-        moving = [arb_series([phase], prec=current_length()) for phase in phases]
-        for _ in range(current_length() - 1):
-            v1, v2 = (variable.position(x) for variable, x in zip(self.variables, moving, strict=True))
-            moving = [phase + rate.integral() for phase, rate in zip(phases, rates(v1, v2), strict=True)]
-        return moving
+
+        def slopes(moving: Sequence[Any]) -> Sequence[Any]:
+            return rates(*(variable.position(x) for variable, x in zip(self.variables, moving, strict=True)))
+
+        return solved(phases, slopes)
 
 
 # The integral of a function on a torus along a straight line: Fourier series of two frequencies with a proven error.
