@@ -398,18 +398,18 @@ class Turned:
         return rotation
 
 
-def starting_at(xi: Vector, gamma: Vector, whole: Attitude) -> Attitude:
+def starting_at(xi: Vector, gamma: Vector, known: Attitude) -> Attitude:
     """Ω, γ, ξ with ξ(0) = ``xi`` out of those with ξ(0) = :func:`perpendicular` of γ(0) = ``gamma``, of length 1.
 
     Turned about γ by the constant angle between the two, whose cosine and sine are rational.
     """
     began = perpendicular(gamma)
     if xi == began:
-        return whole
+        return known
     cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
 
     def turned(working: int, time: Fraction) -> list[arb]:
-        values = whole(time, working)
+        values = known(time, working)
         across = cross(values[3:6], values[6:])
         return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(values[6:], across, strict=True))]
 

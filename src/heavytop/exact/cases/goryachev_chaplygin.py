@@ -371,7 +371,7 @@ _GROWTH, _STEPS = 30.0, 200
 _ROUNDING = 1 + 1e-12
 """More than the rounding of a few sums and products of positive floats."""
 _ROOM = 0.45
-"""Of the way to the other gap that u1 and u2 may each go on the strips."""
+"""The part of the way to the other gap that u1 and u2 may go on the strips."""
 
 
 @dataclass(frozen=True, slots=True)

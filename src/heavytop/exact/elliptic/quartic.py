@@ -183,7 +183,7 @@ class PreparedMotion:
 
 
 Factors = tuple[Any, ...]
-"""What Φ T times (T³, ℘T³, ℘'T³) and Φ' T² times (T², ℘T²) are multiplied by in an F of the second theorem."""
+"""Factors of Φ T times (T³, ℘T³, ℘'T³) and of Φ' T² times (T², ℘T²) in an F of the second theorem."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,14 +199,14 @@ class Companions:
         if self.still:
             return [lift(point.scale * 0)] * len(self.factors)
         phi, slope = map(lift, self.wave.at(point))
-        whole = lift(inverse)
-        phi, slope, square = phi * whole, slope * whole, lift(point.square)
+        factor = lift(inverse)
+        phi, slope, square = phi * factor, slope * factor, lift(point.square)
         # a complex ball times a real one is quick in this order only
         low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
             rest = slope
             if self.wave.index is None:
-                rest = -exponential(point.time, self.wave.rate) * whole
+                rest = -exponential(point.time, self.wave.rate) * factor
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
             parts = low * square, low, steep, rest * square, slope
         else:

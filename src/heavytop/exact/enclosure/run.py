@@ -373,9 +373,9 @@ def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
 
 def _ladder(bits: float) -> int:
     """Multiples of an eighth of the power of two below."""
-    whole = max(64, ceil(bits))
-    unit = 1 << max(4, whole.bit_length() - 4)
-    return -(-whole // unit) * unit
+    least = max(64, ceil(bits))
+    unit = 1 << max(4, least.bit_length() - 4)
+    return -(-least // unit) * unit
 
 
 _PILOT_BITS = 128

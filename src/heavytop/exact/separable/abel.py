@@ -308,9 +308,9 @@ class Line:
         if len(moving) == 1:
             # of ε (G_1 − e G_0), one number
             ((k, variable),) = moving.items()
-            place = variables[1 - k].middle
-            inversion = Inversion((RestingVariable(variable, place),), (1,))
-            rates = (signs[k] * (slopes[1] - place * slopes[0]),)
+            double_root = variables[1 - k].middle
+            inversion = Inversion((RestingVariable(variable, double_root),), (1,))
+            rates = (signs[k] * (slopes[1] - double_root * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
         return cls(variables, tuple(moving), inversion, tuple(origin), rates)
 
