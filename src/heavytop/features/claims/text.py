@@ -50,8 +50,10 @@ def unexpected_text(listing: ClaimLibrary) -> RenderableType:
     lines = [Text(total)]
     for entry in off:
         judged = listing.verdicts[entry.id]
-        said = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(judged.reason)
-        lines.append(Text(fill(said, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
+        difference = f"{entry.id}: {judged.verdict}, expected: {entry.expects}" + f"; {judged.reason}" * bool(
+            judged.reason
+        )
+        lines.append(Text(fill(difference, _WIDTH, subsequent_indent="  "), style=_STYLES[judged.verdict]))
     seconds = sum(judged.seconds for judged in listing.verdicts.values())
     return Group(*lines, Text(f"{seconds:.0f} s of audits."))
 

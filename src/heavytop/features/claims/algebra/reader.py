@@ -24,9 +24,10 @@ import sympy
 from flint import arb, fmpq
 
 from heavytop.errors import InputError, quoted
-from heavytop.features.claims.algebra import structure
+from heavytop.features.claims.algebra import elliptic
 from heavytop.features.claims.algebra.conditions import ConditionKind, Need, condition
 from heavytop.features.claims.algebra.elliptic import FORMULAS
+from heavytop.features.claims.algebra.statement import TIME, Setting
 from heavytop.features.claims.algebra.structure import Defined
 from heavytop.precision import exact
 
@@ -34,7 +35,7 @@ _OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "s
 FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
     "atan2": (sympy.atan2, 2),
-    **{name: (getattr(structure, name), 2) for name in structure.NAMES},
+    **{name: (getattr(elliptic, name), 2) for name in elliptic.JACOBI},
     **FORMULAS,
 }
 _MAX_LENGTH = 10_000
@@ -232,10 +233,10 @@ class _Parser(Descent):
             )
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
-        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        factors = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
         n = base.size
         size = ExpressionBounds(
-            n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole)
+            n.nodes + 1, n.bits * factors, n.degree * factors, comb(min(n.terms, _MAX_TERMS) + factors - 1, factors)
         )
         self._check(size)
         if exponent.q == 2:
@@ -315,17 +316,6 @@ def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
 Bound = tuple[sympy.Expr, sympy.Expr]
 
 
-@dataclass(frozen=True, slots=True)
-class Assumed:
-    """The fields of :class:`~heavytop.features.claims.algebra.statement.Setting` of the same names."""
-
-    positive: tuple[sympy.Symbol, ...]
-    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
-    facts: tuple[sympy.Expr, ...]
-    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
-    weak: tuple[sympy.Expr, ...]
-
-
 def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
     """(larger, smaller, strictly) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
 
@@ -370,7 +360,7 @@ def assume(
     symbols: Iterable[sympy.Symbol],
     apart: Iterable[Bound] = (),
     at_least: Sequence[Bound] = (),
-) -> Assumed:
+) -> Setting:
     """Consequences of left > right of each bound, from what these need to be real, and from positive moments.
 
     apart: the sides of what is assumed to be unequal.  at_least: bounds with left >= right.
@@ -402,7 +392,8 @@ def assume(
     facts += [(left - right) ** 2 for left, right in apart]
     weak = [need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE]
     weak += [left - right for left, right in at_least]
-    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges([*bounds, *at_least])), tuple(weak))
+    ranges = tuple(_ranges([*bounds, *at_least]))
+    return Setting(TIME, positive, tuple(greater), facts=tuple(facts), ranges=ranges, weak=tuple(weak))
 
 
 _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = {
@@ -415,7 +406,7 @@ _MONOTONE: dict[Any, tuple[int, Callable[[arb], arb], Callable[[arb], bool]]] = 
     sympy.acos: (-1, arb.cos, lambda c: c > 0 and c < arb.pi()),
     sympy.sqrt: (1, lambda c: c * c, lambda c: c >= 0),
 }
-"""Of functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
+"""Functions strictly monotone where they are real: 1 or −1, the inverse, and whether a number is a value."""
 
 
 def _through_monotone(bound: Bound) -> Iterator[Bound]:

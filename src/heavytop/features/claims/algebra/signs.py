@@ -18,7 +18,7 @@ from heavytop.features.claims.algebra.combinations import nonnegative_combinatio
 from heavytop.features.claims.algebra.ring import PolynomialRing, Unprovable, used
 
 NUMBER_BITS = 512
-"""Of the balls of generators that are numbers."""
+"""Working precision of the balls of generators that are numbers."""
 
 
 class Sign(NamedTuple):

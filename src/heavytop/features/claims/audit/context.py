@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -26,9 +27,9 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.elliptic import FORMULAS
 from heavytop.features.claims.algebra.evaluate import evaluate
+from heavytop.features.claims.algebra.fields import Field
 from heavytop.features.claims.algebra.reader import FUNCTIONS as FUNCTION_NAMES
 from heavytop.features.claims.algebra.reader import (
-    Assumed,
     Bound,
     Formula,
     assume,
@@ -38,8 +39,8 @@ from heavytop.features.claims.algebra.reader import (
     symbol,
 )
 from heavytop.features.claims.algebra.ring import Unprovable
-from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Setting
-from heavytop.features.claims.algebra.structure import rate_along
+from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, TIME, Domain, Setting
+from heavytop.features.claims.algebra.structure import rate_along, rationals
 from heavytop.features.claims.audit.statements import SYSTEMS
 from heavytop.features.claims.library.entry import Entry
 from heavytop.precision import exact
@@ -178,7 +179,7 @@ def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str,
 
 
 _ORDER = (0, 3, 4, 3, 1, 5, 4, 5, 2)
-"""Place of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
+"""Position of each entry, row by row, among I11, I22, I33, I12, I13, I23."""
 _REMEDY = "Give 3 principal moments, 6 entries I11, I22, I33, I12, I13, I23 of the tensor, or 9, row by row."
 
 
@@ -228,17 +229,16 @@ def minors(inertia: Sequence[sympy.Expr | tuple[sympy.Expr, ...]]) -> tuple[symp
 
 
 def _principal_minors(matrix: sympy.Matrix) -> tuple[sympy.Expr, ...]:
-    places = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
-    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in places)
+    indices = (chosen for size in (1, 2, 3) for chosen in combinations(range(3), size))
+    return tuple(sympy.expand(matrix.extract(chosen, chosen).det()) for chosen in indices)
 
 
-TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 RESERVED = {"t", "pi", *(FUNCTION_NAMES.keys() - FORMULAS.keys()), *(str(variable) for variable in STATE)}
 """Names that no parameter may have: an elliptic function is one only before a parenthesis."""
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
-"""Of numerator and denominator of a number in a sample: 2000 digits."""
+"""Bits of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
@@ -252,7 +252,7 @@ class Context:
 
     names: dict[str, Formula]
     symbols: dict[str, sympy.Symbol]
-    assumed: Assumed
+    assumed: Setting
     samples: tuple[dict[sympy.Symbol, Fraction], ...]
     relations: tuple[sympy.Expr, ...]
     top: Parameters
@@ -395,15 +395,34 @@ def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variab
 def _check_samples(context: Context, *compared: Sequence[Bound]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in context.samples:
-        shown = ", ".join(f"{name} = {value}" for name, value in sample.items()) or "without parameters"
+        values = ", ".join(f"{name} = {value}" for name, value in sample.items())
         broken = next(_broken(context, sample, *compared), None)
         if broken is not None:
-            raise InputError(f"The sample {shown} breaks the {written(broken)}.", "Change the sample.")
+            cause = f"The sample {values or 'without parameters'} breaks the {written(broken)}."
+            raise InputError(cause, "Change the sample.")
         for index, moment in enumerate(minors(context.top.inertia), 1):
-            if not _at(moment, sample) > 0:
-                full = isinstance(context.top.inertia[0], tuple)
-                what = "the tensor of inertia not positive definite" if full else f"I{index} not positive"
-                raise InputError(f"The sample {shown} makes {what}.", "Change the sample.")
+            if not (ball := _at(moment, sample)) > 0:
+                is_full = isinstance(context.top.inertia[0], tuple)
+                name = "The principal minor" if is_full else f"I{index} ="
+                at_sample = moment.subs(rationals(sample))
+                number = written(str(at_sample)) if at_sample.is_Rational else ball.str(6, radius=False)
+                got = f"; it is {number} at the sample {values}" if moment.free_symbols else ""
+                cause = f"{name} {written(str(moment))} of top.inertia must be positive{got}."
+                raise InputError(cause, _cure(context, moment, *compared))
+
+
+def _cure(
+    context: Context, moment: sympy.Expr, bounds: Sequence[Bound], at_least: Sequence[Bound], unequal: Sequence[Bound]
+) -> str:
+    """The remedy for a moment that is not positive: no sample is one where no parameters make it so."""
+    others = [other for other in minors(context.top.inertia) if other != moment]
+    for facts in ((), others):
+        assumed = assume(bounds, (), facts, context.symbols.values(), unequal, at_least)
+        with suppress(Unprovable):
+            field_ = Field(assumed.assumptions(0), [moment])
+            if field_.tower.sign(field_.enter(-moment)).value > 0:
+                return "Change top.inertia: no values of the parameters make it positive."
+    return "Change the sample."
 
 
 def _broken(
@@ -431,7 +450,7 @@ def _at_equality(
     for pair in at_least:
         for parameter, other in (pair, pair[::-1]):
             for sample in context.samples if parameter.is_Symbol else ():
-                value = other.subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+                value = other.subs(rationals(sample))
                 if not value.is_Rational:
                     continue
                 at_end = {**sample, parameter: Fraction(int(value.p), int(value.q))}
@@ -452,19 +471,14 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
 
 def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
-    a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
     parameters = frozenset(context.symbols.values())
-    setting = Setting(
-        variable,
-        a.positive,
-        context.samples,
-        a.greater,
+    setting = replace(
+        context.assumed,
+        variable=variable,
         relations=relations,
-        facts=a.facts,
-        weak=a.weak,
-        ranges=a.ranges,
         parameters=parameters,
+        samples=context.samples,
         bodies=_body_needs(context.top.inertia),
     )
     known = replace(setting.assumptions(0), relations=())
@@ -655,6 +669,6 @@ def _end(fact: sympy.Expr, u: sympy.Symbol, sample: Mapping[sympy.Symbol, Fracti
     slope = sympy.diff(fact, u)
     if u in slope.free_symbols or slope == 0:
         return None
-    value = (u - fact / slope).subs({s: sympy.Rational(n.numerator, n.denominator) for s, n in sample.items()})
+    value = (u - fact / slope).subs(rationals(sample))
     value = sympy.expand(value)
     return Fraction(int(value.p), int(value.q)) if value.is_Rational else None

@@ -98,8 +98,8 @@ class ClaimEvaluation(Kind):
         measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
         against = Against("proven", "the same form exactly evaluated from the same rounded data")
         row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
-        whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
-        return replace(row, finite=whole)
+        is_finite = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return replace(row, finite=is_finite)
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
@@ -128,9 +128,9 @@ class ClaimEvaluation(Kind):
         for row in rows:
             if row.bits == bits and row.metrics:
                 forms.setdefault(row.key.subject.form, []).append(row)
-        said = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
-        if said:
-            yield Headline(f"In {next(iter(forms.values()))[0].precision} {said}.")
+        sentences = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
+        if sentences:
+            yield Headline(f"In {next(iter(forms.values()))[0].precision} {sentences}.")
         yield Cells(
             "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
             ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω NaN/inf from |t|"],
