@@ -44,6 +44,25 @@ def undiagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.features.score.measurement.diagnose", lambda *_, **__: [])
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without what matplotlib writes of their pictures, half of the time of a page: where it is not looked at."""
+    _leave_pictures_out(monkeypatch)
+
+
+def _leave_pictures_out(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr("heavytop.report.document.svg._inline", lambda figure, name: "")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def pictures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pages of a file are undrawn unless it is marked ``pictures``."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.get_closest_marker("pictures"):
+            _leave_pictures_out(patch)
+        yield
+
+
 def _needed(error: BaseException | None) -> str:
     """The extra for want of which an error arose, also in a command that a test ran; "" for any other error."""
     if isinstance(error, ModuleNotFoundError):

@@ -24,6 +24,8 @@ from heavytop.report.document.svg import quiet_style
 from heavytop.report.render.plots import draw_report
 from support.reports import Row, summary
 
+pytestmark = pytest.mark.pictures
+
 KIND = ("svg", "pdf")
 
 

@@ -130,8 +130,8 @@ def _map(cells: CellMap, label: str, digits: float, name: str) -> Picture:
         paint(0.3 + 0.4 * step / _SHADES, 1.005, 0.4 / _SHADES, 0.03, lost, transform=axes.transAxes, clip_on=False)
     for position, lost, side in ((0.28, high, "right"), (0.72, low, "left")):
         axes.text(position, 1.005, f"{digits - lost:.1f}", transform=axes.transAxes, ha=side, size=7)
-    said = f"From {digits - high:.1f} digits right, the strongest colour, to {digits - low:.1f}, the faintest."
-    return finish(axes, f"Digits right over {x} and {y}: {label}", said, name, said)
+    caption = f"From {digits - high:.1f} digits right, the strongest colour, to {digits - low:.1f}, the faintest."
+    return finish(axes, f"Digits right over {x} and {y}: {label}", caption, name, caption)
 
 
 def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
@@ -155,8 +155,8 @@ def _paths(row: Row, worst: Sequence[Worst], label: str, name: str) -> Picture:
     axes.set_ylim(-2.9 * ((len(worst) - 1) // _IN_A_ROW) - 1.8, 1.2)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    said = "The worst first, by their index in the sweep; a dot is where γ begins."
-    return finish(axes, f"The worst {len(worst)} motions: {label}", said, name, said)
+    caption = "The worst first, by their index in the sweep; a dot is where γ begins."
+    return finish(axes, f"The worst {len(worst)} motions: {label}", caption, name, caption)
 
 
 def _gamma(row: Row, motion: Worst) -> Any:

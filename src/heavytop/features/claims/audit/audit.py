@@ -80,7 +80,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     try:
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise InputError(f"{where}: {invalid(error)}.", _REMEDY) from None
+        raise InputError(f"{where}: {invalid(error, ClaimFile)}.", _REMEDY) from None
     if content.kind not in _TABLES:
         raise InputError(f"{where}: kind = {content.kind[:40]!r}.", f"Use {', '.join(_TABLES)} or value.")
     wanted, made = _TABLES[content.kind]
@@ -102,7 +102,7 @@ def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> V
         with prefixed(where):
             return ValueClaim(msgspec.convert(table, ValueFile), entry)
     except (msgspec.ValidationError, RecursionError) as error:
-        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", _place, invalid(error))
+        cause = re.sub(r"\bvalue\[(\d+)\](\.)?", _place, invalid(error, ValueFile))
         raise InputError(f"{where}: {cause}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
 
 
