@@ -469,7 +469,7 @@ def reference(
         states = [known_texts(known.state(time, bits), known.method, time, digits) for time in instants]
         return msgspec.structs.replace(result, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
-    method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
+    method, whole = known.known_attitude(latest, bits_of(digits) + GUARD_BITS)
     motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
     parts = [known_texts(motion.at(index), method, time, digits) for index, time in enumerate(instants)]
     result = msgspec.structs.replace(
