@@ -444,7 +444,7 @@ def reference(
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
-        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give such as 50.")
+        raise InputError(f"digits must be from 1 to 20000; got {quoted(digits)}.", "Give, for example, 50.")
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder, effort)
     require_handy(known.resolved.top, known.resolved.start, instants)
