@@ -243,6 +243,9 @@ def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
         assert done.returncode == 2
         assert "heavytop: " in done.stderr
         assert "Traceback" not in done.stderr
+    assert "Name one of the reports in it: one, two" in run("show", ".", cwd=finished).stderr
+    (finished / "motion.csv").write_text("t,omega1\n")
+    assert "`heavytop score motion.csv` reads a trajectory" in run("show", "motion.csv", cwd=finished).stderr
 
 
 def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
@@ -420,3 +423,11 @@ def test_a_gate_without_a_baseline_names_the_command_that_makes_it(tmp_path: Pat
     done = run(*asked, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.endswith(" heavytop gate --plan smoke --baseline 'my base' --bless\n")
+
+
+def test_a_gate_of_no_plan_leaves_the_report_of_before(tmp_path: Path) -> None:
+    before = tmp_path / ".heavytop" / "new" / "message.txt"
+    before.parent.mkdir(parents=True)
+    before.write_text("Move the baseline\n")
+    assert run("gate", "--plan", "gaet.toml", "--bless", cwd=tmp_path).returncode == 2
+    assert before.read_text() == "Move the baseline\n"

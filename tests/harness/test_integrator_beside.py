@@ -114,3 +114,11 @@ def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: 
         with pytest.raises(InputError, match=cause) as caught:
             read(name, KINDS, integrator=integrator)
         assert caught.value.remedy
+
+
+def test_a_format_that_an_integrator_lacks_is_unsupported_and_no_failure(tmp_path: Path) -> None:
+    file = tmp_path / "formats.toml"
+    file.write_text(PLAN.replace('precision = "double"', 'precision = "quad"', 1))
+    _, _, tasks = read(str(file), KINDS, integrator="scipy:DOP853")
+    (task,) = [task for task in tasks if task.key.kind == "drift" and task.key.subject.name == "scipy:DOP853"]
+    assert measure(task).outcome == "unsupported"
