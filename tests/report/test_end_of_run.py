@@ -27,7 +27,8 @@ def test_every_plan_ends_in_few_lines_that_are_not_cut(name: str) -> None:
     lines = brief(report, report.rows, KINDS).splitlines()
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
-    said_of_plan = f"Plan {name}: {len(report.rows)} measurements, all finished."
+    ended = "1 aborted." if name == "peers" else "all finished."  # CVODE, whose step became too small
+    said_of_plan = f"Plan {name}: {len(report.rows)} measurements, {ended}"
     assert (lines[0].startswith("heyoka in double: ") and said_of_plan in lines) or lines[0] == said_of_plan
     assert not any("lines more" in line for line in lines)
 
