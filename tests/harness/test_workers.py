@@ -265,9 +265,9 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
     ]
     theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
     before = worker_pids()
-    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=4.0))
+    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=2.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
-    assert found[1].against == "nothing: mine.py:stuck was stopped after 4 s, in pendulum"
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 2 s, in pendulum"
     assert "mine.py:dies ended its process 3 times, with exit code 3, in pendulum" in found[2].against
     assert worker_pids() == before
     assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout
