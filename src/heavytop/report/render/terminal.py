@@ -6,20 +6,19 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 from itertools import chain, islice
-from math import inf
 
 from msgspec.structs import replace
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
 from heavytop.display import plural, printable
-from heavytop.measure.scalar import digits_kept, digits_text
+from heavytop.measure.scalar import digits_text
 from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR
 from heavytop.records import HEYOKA, MULTIWORD, UNMEASURED, Quantity, Report, Row, Series
 from heavytop.report.compare.verdicts import size
 from heavytop.report.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points, short
 from heavytop.report.document.kind import Kinds, document, headlines
-from heavytop.report.render.text import WORD_STYLES, Lines, failed, failure, head, title, unsupported, wrapped
+from heavytop.report.render.text import WORD_STYLES, Lines, Tally, failed, failure, head, title, unsupported, wrapped
 
 WIDTH = 80
 LINES = 21
@@ -164,18 +163,14 @@ def _without_middle(part: Sequence[str], size: int) -> list[str]:
 
 def _counted(rows: Iterable[Row]) -> list[str]:
     """How rows of each kind and format ended, and the fewest digits."""
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    fewest: dict[tuple[str, str], tuple[float, str]] = {}
+    tally = Tally()
     for row in rows:
-        group = row.key.kind, row.precision
-        counts.setdefault(group, Counter())[row.outcome] += 1
-        if (kept := digits_kept(row)) is not None:
-            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
+        tally.take(row)
     lines = []
-    for group, outcomes in counts.items():
-        line = f"{' in '.join(group)}: " + ", ".join(f"{n} {outcome}" for outcome, n in sorted(outcomes.items()))
-        if group in fewest:
-            kept, case = fewest[group]
+    for group in tally.ended:
+        line = tally.outcomes(group)
+        if group in tally.fewest:
+            kept, case = tally.fewest[group]
             line += f"; fewest digits right {digits_text(kept)} ({case})"
         lines += wrapped(line)
     return lines
