@@ -176,9 +176,9 @@ def junit(report: Report, kinds: Kinds) -> str:
             ElementTree.SubElement(case, "skipped", message=printable(row.against))
         elif _is_lost(row, kinds):
             ElementTree.SubElement(case, "error", message=printable(row.against), type=row.outcome)
-        said = [kind_of(row, kinds).line(row)] if row.metrics else []
-        said += [f"{number.name}: {number.value:.6g} {number.unit}" for number in measures(row)]
-        if text := "\n".join(filter(None, said)):
+        output = [kind_of(row, kinds).line(row)] if row.metrics else []
+        output += [f"{number.name}: {number.value:.6g} {number.unit}" for number in measures(row)]
+        if text := "\n".join(filter(None, output)):
             ElementTree.SubElement(case, "system-out").text = printable(text)
     return _xml(suite)
 
@@ -306,8 +306,8 @@ def escaped(text: str) -> str:
 def to_json(report: Report, kinds: Kinds) -> dict[str, Any]:
     """The blocks of each kind, without charts: a cell is text, or an object that says what it is."""
     blocks = document(report, kinds, In.FULL)
-    said = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
-    return {"plan": report.plan, "measurements": len(report.rows), "kinds": said}
+    kinds_blocks = [{"kind": name, "blocks": [_block(block) for block in blocks]} for name, blocks in blocks.items()]
+    return {"plan": report.plan, "measurements": len(report.rows), "kinds": kinds_blocks}
 
 
 def _block(block: Block) -> dict[str, Any]:
@@ -332,9 +332,9 @@ def _block(block: Block) -> dict[str, Any]:
 def _cell(cell: Cell) -> Any:
     match cell:
         case Value():
-            known = cell.metric
-            said = None if known is None else (known.value, known.log10, known.band, known.kind)
-            return said and dict(zip(("value", "log10", "band", "kind"), said, strict=True))
+            metric = cell.metric
+            parts = None if metric is None else (metric.value, metric.log10, metric.band, metric.kind)
+            return parts and dict(zip(("value", "log10", "band", "kind"), parts, strict=True))
         case Word():
             return {"verdict": cell.text}
         case Quantity():

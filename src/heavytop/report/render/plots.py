@@ -337,8 +337,8 @@ def _digits_right(section: Section, precision: str, lanes: dict[str, list[_Run]]
         ends.append(End(texts[lane], COLOURS[0], kept or 0.0, -index))
     axes.set(xlim=(-0.02 * most, 1.02 * most), ylim=(0.7 - len(lanes), 0.7), yticks=[])
     axes.axvline(most, color=COLOURS[_GREY], lw=0.9, ls=DASHED)
-    said = spoken([f"{text}." for text in texts.values()], 24)
-    return finish(axes, f"Digits right in {precision}", said, name, ends=ends)
+    words = spoken([f"{text}." for text in texts.values()], 24)
+    return finish(axes, f"Digits right in {precision}", words, name, ends=ends)
 
 
 def _kept(row: Row) -> float | None:

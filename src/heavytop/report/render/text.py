@@ -151,8 +151,10 @@ def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) 
     for first, *rest in rows:
         yield first
         pairs = zip(columns[1:], rest, strict=True)
-        said = ";  ".join(f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip())
-        yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(said, "    ", "    ", width - 4))
+        named_cells = ";  ".join(
+            f"{column} {_glued(cell.plain)}".strip() for column, cell in pairs if cell.plain.strip()
+        )
+        yield from (Text(line.replace("\u00a0", " ")) for line in wrapped(named_cells, "    ", "    ", width - 4))
 
 
 def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:
