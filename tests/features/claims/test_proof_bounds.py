@@ -19,6 +19,7 @@ from heavytop.features.claims.algebra.conditions import (
 )
 from heavytop.features.claims.algebra.fields import Assumptions, Field, Regularity
 from heavytop.features.claims.algebra.prover import Prover, Region
+from heavytop.features.claims.algebra.reader import FUNCTIONS
 from heavytop.features.claims.algebra.ring import used
 from heavytop.features.claims.algebra.signs import Sign
 from heavytop.features.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
@@ -90,6 +91,12 @@ def test_a_sign_meets_what_follows_from_it(sign: Sign, nonzero: bool, positive: 
 )
 def test_a_function_needs_what_it_needs(function: str, needs: set[str]) -> None:
     assert words(condition(function, (T, A) if function == "atan2" else (T,))) == needs
+
+
+def test_every_function_of_a_formula_has_conditions_on_its_own_arguments() -> None:
+    symbols = sympy.symbols("u v m", real=True)
+    for name, (_, count) in FUNCTIONS.items():
+        assert all(need.expression.free_symbols <= {*symbols[:count]} for need in condition(name, symbols[:count]))
 
 
 def test_a_number_that_meets_a_need_is_none_and_one_that_does_not_stays() -> None:

@@ -187,9 +187,12 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         if file.suffix == ".gz":
             content = gzip.decompress(content)
     except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", REMEDY) from None
+        inside = sorted(entry.parent.name for entry in file.parent.glob(f"*/{FILE}*"))
+        remedy = f"Name one of the reports in it: {', '.join(dict.fromkeys(inside))}." if inside else REMEDY
+        raise InputError(f"{str(file)[:_NAME]} holds no report: {why(error)}.", remedy) from None
     if not content.lstrip().startswith(b"{"):
-        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", REMEDY)
+        remedy = f"`heavytop score {file}` reads a trajectory." if file.suffix == ".csv" else REMEDY
+        raise InputError(f"{str(file)[:_NAME]} is not a whole report: it is not JSON.", remedy)
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

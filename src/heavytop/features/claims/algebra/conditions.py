@@ -503,6 +503,4 @@ def is_never_zero(e: sympy.Expr, assumptions: Assumptions) -> bool:
         value = field.enter(e)
     except Unprovable:
         return False
-    return field.tower.sign(value).strict or (
-        bool(assumptions.relations) and field.never_zero_on_relations(value.numerator)
-    )
+    return field.tower.sign(value).strict or field.never_zero_on_relations(value.numerator)

@@ -177,20 +177,21 @@ class Field:
         simpler: the same polynomial where more is known of its generators.
         """
         try:
-            numerator = simpler(self.enter(expression).numerator)
-            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+            return self._forces([], simpler(self.enter(expression).numerator), radical=radical)
         except Unprovable:
             return False
-        return self._forces(relations, numerator, radical=radical)
 
-    def never_zero_on_relations(self, p: fmpq_mpoly) -> bool:
-        """True only where the relations of the claim and p = 0 exclude each other."""
-        relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-        return bool(relations) and self._forces([*relations, p], self.tower.one, radical=False)
+    def never_zero_on_relations(self, *zeros: fmpq_mpoly) -> bool:
+        """True only where the relations of the claim exclude each other and that these polynomials are 0."""
+        try:
+            return self._forces(list(zeros), self.tower.one, radical=False)
+        except Unprovable:
+            return False
 
-    def _forces(self, relations: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
-        """Also where a factor that is never 0 has to be divided out of the ideal."""
-        if not relations:
+    def _forces(self, zeros: list[fmpq_mpoly], p: fmpq_mpoly, *, radical: bool) -> bool:
+        """The relations of the claim and ``zeros`` do, also where a factor that is never 0 has to be divided out."""
+        relations = [*(self.enter(relation).numerator for relation in self.assumptions.relations), *zeros]
+        if not self.assumptions.relations:
             return False
         roots = self.tower.relations()
         if forces_zero([*relations, *roots], p, radical=radical):
@@ -239,14 +240,6 @@ class Field:
             return not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1]
         except Unprovable:
             return False
-
-    def relations_exclude_each_other(self) -> bool:
-        """True only where no point lies on all relations."""
-        try:
-            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-        except Unprovable:
-            return False
-        return self._forces(relations, self.tower.one, radical=False)
 
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""

@@ -85,7 +85,7 @@ class Transcendental:
         if len(parts) > 1:
             return prod(map(self.exponential, parts), start=factor)
 
-        def make(base: Quotient, _divisor: int) -> int:
+        def make(base: Quotient) -> int:
             meaning = sympy.exp(self._field.expression(base))
             index = self._new("exp", meaning, (base,), PLUS)
             self._declare_size(index, self._tower.sign(base).value)
@@ -147,7 +147,7 @@ class Transcendental:
             if sign < 0:
                 self._tower.signs.declare_below_one(index)
 
-    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient, int], int]) -> tuple[int, int]:
+    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient], int]) -> tuple[int, int]:
         """(generator, n): the argument is n times the generator's base.
 
         make: adds the generator of a new base, which is the argument over as much as has turned out to be needed.
@@ -170,7 +170,7 @@ class Transcendental:
         base = argument / divisor
         position = len(self._bases)
         self._bases.append((kind, base, -1))
-        self._bases[position] = (kind, base, make(base, divisor))
+        self._bases[position] = (kind, base, make(base))
         return self._bases[position][2], divisor
 
     # --- the circle -------------------------------------------------------------------------------------------------
@@ -191,7 +191,7 @@ class Transcendental:
         if inverse is not None:
             return self._times(*inverse)
 
-        def make(base: Quotient, _divisor: int) -> int:
+        def make(base: Quotient) -> int:
             t, angle = self._tower, self._field.expression(base)
             sine, cosine = sympy.sin(angle, evaluate=False), sympy.cos(angle, evaluate=False)
             index, partner = self._new_pair("sin", sine, "cos", cosine, (base,))

@@ -100,7 +100,7 @@ class Region:
         return self.field.tower.signs.of(p).strict or self._is_apart(p) or self.is_kept(p)
 
     def _is_apart(self, p: fmpq_mpoly) -> bool:
-        return bool(self._setting.relations) and self.field.never_zero_on_relations(p)
+        return self.field.never_zero_on_relations(p)
 
     def is_kept(self, p: fmpq_mpoly) -> bool:
         """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
@@ -324,7 +324,7 @@ class Region:
         """The radicand of a polynomial that is a root by itself; None of another."""
         tower, (index, *others) = self.field.tower, sorted(used(p))
         alone = not others and p == tower.gens[index] and tower.generators[index].kind == "root"
-        return tower.radicand(index) if alone else None
+        return tower.squares[index] if alone else None
 
     def _is_analytic(self, p: fmpq_mpoly) -> bool:
         """In what moves, over a domain in one piece."""
@@ -539,7 +539,7 @@ class Prover:
         if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
             return "at no sample is each principal moment at most the sum of the others: no body has such moments"
         region = self._region(statement, statement.domain.sign, strict=False)
-        if region is not None and region.field.relations_exclude_each_other():
+        if region is not None and region.field.never_zero_on_relations():
             within = " within |gamma| = 1" if statement.flow is not None else ""
             return f"the relations exclude each other{within}: no motion lies on them"
         return _missed(statement, setting)

@@ -57,9 +57,7 @@ def _as_sum(tower: Tower, p: fmpq_mpoly, index: int, depth: int) -> Quotient | N
         return None
     a, b = parts[0], parts[1]
     s = tower.signs.of(b).value
-    radicand = tower.radicand(index)
-    assert radicand is not None  # R is a root
-    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), radicand))
+    norm = tower.reduce(tower.times(a, a) - tower.times(tower.times(b, b), tower.squares[index]))
     if not s or tower.signs.of(a).value <= 0:
         return None
     d = _plain_root(tower, norm, any_sign=s > 0)
@@ -87,7 +85,7 @@ def _plain_root(tower: Tower, p: fmpq_mpoly, *, any_sign: bool = False) -> Quoti
         if power % 2:
             constant = constant * sign
             known = tower.known_root(factor * sign) if sign else None
-            is_nested = any(tower.radicand(i) is not None for i in used(factor))
+            is_nested = bool(tower.squares.keys() & used(factor))
             if not sign or (known is None and is_nested):
                 return None
         elif not sign:
@@ -110,11 +108,10 @@ def _needs_no_sign(power: Any, any_sign: bool) -> bool:
 
 def _through_conjugate(tower: Tower, p: fmpq_mpoly) -> Quotient | None:
     """√p = √(p q)/√q, for a root √q of the tower with p q the square of something plain: √(√2 − 1) = 1/√(√2 + 1)."""
-    for index in reversed(range(len(tower.generators))):
-        q = tower.radicand(index)
-        if q is None or tower.generators[index].kind != "root" or not tower.generators[index].strict:
+    for index, q in reversed(list(tower.squares.items())):
+        if tower.generators[index].kind != "root" or not tower.generators[index].strict:
             continue
-        if len(q) > _MAX_TERMS or not any(tower.radicand(i) is not None for i in used(q) & used(p)):
+        if len(q) > _MAX_TERMS or not tower.squares.keys() & used(q) & used(p):
             continue
         try:
             root = _plain_root(tower, tower.reduce(tower.times(p, q)))

@@ -314,10 +314,14 @@ def _multiplied(a: ExpressionBounds, b: ExpressionBounds) -> ExpressionBounds:
 
 
 Bound = tuple[sympy.Expr, sympy.Expr]
+Comparison = tuple[sympy.Expr, sympy.Expr, ConditionKind]
+"""left, right, and what left − right is."""
+SIGNS = {">": ConditionKind.POSITIVE, ">=": ConditionKind.NONNEGATIVE, "!=": ConditionKind.NONZERO}
+_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
 
 
-def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
-    """(larger, smaller, strictly) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
+def comparisons(text: str, where: str) -> list[tuple[str, str, ConditionKind]]:
+    """(larger, smaller, kind) of ``formula > formula``, and of each link of a chain such as ``0 < k <= 1``.
 
     Raises InputError for anything else.
     """
@@ -326,47 +330,34 @@ def comparisons(text: str, where: str) -> list[tuple[str, str, bool]]:
     if len({sign[0] for sign in signs}) != 1 or not all(sides) or "=" in "".join(sides):
         raise InputError(f"{where}: {text[:60]!r} is not understood.", f"Write: formula > formula{_OR[where]}.")
     pairs = [pair if signs[0][0] == ">" else pair[::-1] for pair in pairwise(sides)]
-    return [(*pair, len(sign) == 1) for pair, sign in zip(pairs, signs, strict=True)]
+    return [(*pair, SIGNS[sign.replace("<", ">")]) for pair, sign in zip(pairs, signs, strict=True)]
 
 
-_OR = {"assume": ", formula >= formula, or formula != formula", "where of [quadrature]": ""}
-Sides = list[tuple[str, str]]
-
-
-def inequalities(texts: Iterable[str]) -> tuple[Sides, Sides, Sides]:
-    """Assumptions of ``assume``: (larger, smaller) of its strict comparisons and of the others, both sides of each !=.
-
-    Raises InputError for anything else.
-    """
-    above: Sides = []
-    at_least: Sides = []
-    apart: Sides = []
+def assumptions(texts: Iterable[str]) -> Iterator[tuple[str, str, ConditionKind]]:
+    """(left, right, kind) of the comparisons of ``assume``, and of each !=; raises InputError for anything else."""
     for text in texts:
         left, sign, right = (part.strip() for part in text.partition("!="))
         if not sign:
-            for larger, smaller, strictly in comparisons(text, "assume"):
-                (above if strictly else at_least).append((larger, smaller))
+            yield from comparisons(text, "assume")
         elif left and right and not set("<>=!") & {*left, *right}:
-            apart.append((left, right))
+            yield left, right, SIGNS[sign]
         else:
             raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula != formula.")
-    return above, at_least, apart
 
 
 def assume(
-    bounds: Sequence[Bound],
+    compared: Iterable[Comparison],
     needs: Iterable[Need],
     moments: Iterable[sympy.Expr],
     symbols: Iterable[sympy.Symbol],
-    apart: Iterable[Bound] = (),
-    at_least: Sequence[Bound] = (),
 ) -> Setting:
-    """Consequences of left > right of each bound, from what these need to be real, and from positive moments.
-
-    apart: the sides of what is assumed to be unequal.  at_least: bounds with left >= right.
-    """
-    at_least = [*at_least, *(implied for bound in at_least for implied in _through_monotone(bound))]
-    bounds = [*bounds, *(implied for bound in bounds for implied in _through_monotone(bound))]
+    """Consequences of what is compared, from what this needs to be real, and from positive moments."""
+    sides: dict[ConditionKind, list[Bound]] = {kind: [] for kind in ConditionKind}
+    for left, right, kind in compared:
+        sides[kind].append((left, right))
+    bounds, at_least = sides[ConditionKind.POSITIVE], sides[ConditionKind.NONNEGATIVE]
+    for pairs in (bounds, at_least):
+        pairs += [implied for pair in pairs for implied in _through_monotone(pair)]
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
@@ -389,7 +380,7 @@ def assume(
     asked = sorted(needs, key=lambda need: need.text)
     facts += [need.expression for need in asked if need.kind is ConditionKind.POSITIVE]
     facts += [need.expression**2 for need in asked if need.kind is ConditionKind.NONZERO]
-    facts += [(left - right) ** 2 for left, right in apart]
+    facts += [(left - right) ** 2 for left, right in sides[ConditionKind.NONZERO]]
     weak = [need.expression for need in asked if need.kind is ConditionKind.NONNEGATIVE]
     weak += [left - right for left, right in at_least]
     ranges = tuple(_ranges([*bounds, *at_least]))

@@ -124,14 +124,6 @@ class PolynomialRing:
         self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
         return len(self.generators) - 1
 
-    def radicand(self, index: int) -> fmpq_mpoly | None:
-        """q of a root R² = q; None for a free generator."""
-        return self.squares.get(index)
-
-    def radicands(self) -> list[tuple[int, fmpq_mpoly]]:
-        """(R, q) of every root R² = q."""
-        return list(self.squares.items())
-
     def relations(self) -> list[fmpq_mpoly]:
         """R² − q for every root R = √q."""
         return [self.gens[index] ** 2 - square for index, square in self.squares.items()]

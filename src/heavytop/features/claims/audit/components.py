@@ -233,7 +233,8 @@ class UserComponent(UserIntegral):
         held = _through(self._u, self.quantity.expression, zeros, _rate_of_angle(name, omega))
         if held is None:
             raise InputError(f"The rate of {name} is no function of {self._u}.", f"Give {name} by its rate alone.")
-        return replace(symbol(held[0] / held[1]), needs=condition("/", (held[1], held[2])))
+        needs = condition("/", (held[1],)) | condition("/", (held[2],))
+        return replace(symbol(held[0] / held[1]), needs=needs)
 
     # --- in time ------------------------------------------------------------------------------------------------------
 
