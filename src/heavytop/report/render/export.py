@@ -285,8 +285,8 @@ def _table(columns: Sequence[str], rows: Iterable[Iterable[str]], words: int, le
     """A table; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
     last = len(columns) - 1
     rule = ["---" if index < words or (left and index == last) else "---:" for index in range(len(columns))]
-    head, *lines = (f"| {' | '.join(map(escaped_cell, row))} |" for row in (columns, *rows))
-    return [head, f"|{'|'.join(rule)}|", *lines]
+    head, *lines = (list(map(escaped_cell, row)) for row in (columns, *rows))
+    return [f"| {' | '.join(cells)} |" for cells in (head, rule, *lines)]
 
 
 def escaped_cell(text: str) -> str:
