@@ -41,7 +41,7 @@ def integrators_of_a_test_end_with_it() -> Iterator[None]:
 @pytest.fixture
 def undiagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scores without the search for what explains an error, which takes a second: where it is not the point."""
-    monkeypatch.setattr("heavytop.features.score.measurement.diagnose", lambda *_, **__: [])
+    monkeypatch.setattr("heavytop.features.score.diagnose.diagnosis.diagnose", lambda *_, **__: [])
 
 
 @pytest.fixture

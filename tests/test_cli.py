@@ -263,7 +263,7 @@ def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
         (["--plan", "huge"], "Unknown plan 'huge'"),
         (["--plan", "none.toml"], "as --plan gate; `heavytop new`"),
         (["--plan", "bad.toml"], "unknown field `surprise`"),
-        (["--workers", "0"], "workers = 0 allows nothing"),
+        (["--workers", "0"], "workers must be at least 1; got 0"),
         (["--resume"], "--out"),
     ],
 )

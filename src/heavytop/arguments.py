@@ -156,7 +156,7 @@ def count(value: int | None, what: str) -> int | None:
         return None
     number = as_integer(value, what)
     if number < 1:
-        raise InputError(f"{what} = {quoted(number)} allows nothing.", "Give 1 or more, or leave it out.")
+        raise InputError(f"{what} must be at least 1; got {quoted(number)}.", "Give 1 or more, or leave it out.")
     return min(number, _MOST)
 
 

@@ -242,7 +242,7 @@ def test_one_odd_component_is_answered_or_refused_in_words() -> None:
         (lambda: ht.propagate(TOP, START, "123"), "times = '123' is not a list"),
         (lambda: ht.ensemble([TOP] * 2, [START] * 3, [1]), "2 tops and 3 starts"),
         (lambda: ht.ensemble([], START, [1]), "0 tops"),
-        (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads = 0"),
+        (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads must be at least 1; got 0"),
         (lambda: ht.reference(TOP, START, [1], 0), "digits must be from 1 to 20000; got 0"),
         (lambda: ht.reference(TOP, START, []), "No times"),
         (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states[0] has 9 numbers, not 6"),

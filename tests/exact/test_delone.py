@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import OutOfReach
 from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
@@ -30,14 +30,12 @@ def delone(omega, gamma3, moment, i3=Fraction(1)):
     return Delone(HeavyTop((2 * i3, 2 * i3, i3), 1, (n1, n2, 0)), State(omega, gamma))
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_every_random_motion_solves_all_six_equations(seed):
+def random_motion(seed):
     rng = random.Random(seed)
     omega = [rational(rng) for _ in range(3)]
     if seed % 6 == 1:
         omega[rng.randrange(3)] = Fraction(0)
-    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
-    assert_solves(motion, rational(rng, size=20))
+    return delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
 
 
 @pytest.mark.parametrize("off", [0, TINY, -TINY])
@@ -65,31 +63,8 @@ def test_beside_the_permanent_rotation_every_digit_comes_out():
             assert_solves(motion, time)
 
 
-@pytest.mark.parametrize(
-    ("inertia", "centre", "omega", "message"),
-    [
-        ((2, 2, "3/4"), (1, 0, 0), (1, 0, 0), "I1 - 2 I3 = 1/2"),
-        ((2, 2, 1), (1, 0, "1/9"), (1, 0, 0), "1/9"),
-        ((2, 2, 1), (0, 0, 0), (1, 0, 0), "P r != 0"),
-        ((2, 2, 1), (1, 0, 0), (1, 1, 0), r"xi = \(-1, 2\)"),
-    ],
-)
-def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, omega, message):
-    with pytest.raises(NotInClass, match=message):
-        Delone(HeavyTop(inertia, 1, centre), State(omega, (1, 0, 0)))
-
-
 # |gamma| = 1: gamma1 = (3/5)^2/(3/5)
 UNIT = delone((Fraction(3, 5), Fraction(0), Fraction(1)), Fraction(4, 5), (Fraction(3, 5), 0))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
-def test_the_attitude_turns_with_the_body(seed):
-    rng = random.Random(seed)
-    omega = [rational(rng) for _ in range(3)]
-    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
-    assert_attitude(motion, rational(rng, size=20))
 
 
 # turning points (Ω2 = 0, n on axis 1), M·γ = 0: (1, 0, −2) with γ = (1, 0, 1), no start at rest

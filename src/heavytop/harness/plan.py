@@ -435,7 +435,7 @@ def positive(texts: list[str], what: str) -> list[Fraction]:
 def samples(count: int) -> int:
     """The count; raises InputError where it cannot be."""
     if not 1 <= count <= _MAX_SAMPLES:
-        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give such as 100.")
+        raise InputError(f"samples must be from 1 to {_MAX_SAMPLES}; got {count}.", "Give, for example, 100.")
     return count
 
 

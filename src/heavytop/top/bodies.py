@@ -227,7 +227,7 @@ _ROUNDED_BITS = 256
 _ROUNDED_DATA = Fraction(1, 2**40)
 """A plate or a rod in rounded numbers is one."""
 _PRINTED_DATA = Fraction(1, 10**6)
-"""Of the tensor: a plate or a rod in seven digits is not warned of."""
+"""Part of the tensor: a plate or a rod in seven digits is not warned of."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 

@@ -40,7 +40,7 @@ class Stability:
 
     @property
     def why(self) -> str:
-        """What the verdict rests on, behind it; empty where it is proven by an eigenvalue or an energy."""
+        """The reason, behind the verdict; empty where an eigenvalue or an energy proves it."""
         if self.drift:
             return f": a part ε of Ω along the axis of symmetry turns it away linearly, by {self.drift:.4g} ε t"
         return (

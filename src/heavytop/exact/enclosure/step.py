@@ -505,8 +505,8 @@ def in_other_bits(field: Quadratic, taken: Step, precision: int, certified: Cert
         return None
     bound = max(tail.bound, float(np.ldexp(taken.widest_ulps, smaller)) + _TINY)
     widest = max(tail.widest, taken.widest)
-    kept = replace(taken, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
-    return kept if widest < CAP else None
+    in_bits = replace(taken, node=rounded, precision=precision, series=series, widest=widest, widest_ulps=bound)
+    return in_bits if widest < CAP else None
 
 
 def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:

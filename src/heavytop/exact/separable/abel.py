@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from math import ceil, expm1, log
 from typing import Any, NamedTuple, NoReturn, Self, TypeAlias
 
-from flint import arb, arb_mat, arb_series, fmpq
+from flint import arb, arb_mat, fmpq
 
 from heavytop.errors import LevelNotDone, OutOfReach
+from heavytop.exact.closed_form import solved
 from heavytop.exact.flint.balls import (
     Balls,
     Undecided,
-    current_length,
     current_precision,
     nearest_integer,
     working_precision,
@@ -308,9 +308,9 @@ class Line:
         if len(moving) == 1:
             # of ε (G_1 − e G_0), one number
             ((k, variable),) = moving.items()
-            place = variables[1 - k].middle
-            inversion = Inversion((RestingVariable(variable, place),), (1,))
-            rates = (signs[k] * (slopes[1] - place * slopes[0]),)
+            double_root = variables[1 - k].middle
+            inversion = Inversion((RestingVariable(variable, double_root),), (1,))
+            rates = (signs[k] * (slopes[1] - double_root * slopes[0]),)
         origin = inversion.values([phases[k] for k in moving])
         return cls(variables, tuple(moving), inversion, tuple(origin), rates)
 
@@ -334,11 +334,11 @@ class Line:
 
     def series(self, phases: Sequence[arb], rates: Callable[[Any, Any], Sequence[Any]]) -> list[Any]:
         """The phases as power series in t, from their differential equations: rates of both at (v1, v2)."""
-        moving = [arb_series([phase], prec=current_length()) for phase in phases]
-        for _ in range(current_length() - 1):
-            v1, v2 = (variable.position(x) for variable, x in zip(self.variables, moving, strict=True))
-            moving = [phase + rate.integral() for phase, rate in zip(phases, rates(v1, v2), strict=True)]
-        return moving
+
+        def slopes(moving: Sequence[Any]) -> Sequence[Any]:
+            return rates(*(variable.position(x) for variable, x in zip(self.variables, moving, strict=True)))
+
+        return solved(phases, slopes)
 
 
 # The integral of a function on a torus along a straight line: Fourier series of two frequencies with a proven error.

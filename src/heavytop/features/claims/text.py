@@ -108,7 +108,7 @@ _PROVEN = {
 }
 _SYMBOLS = """\
 M = I*Omega (+ k of a rotor), r = (a, b, c): centre of mass; residual: left side
-minus right, of (1.1) in Omega', divided by I; omega, gamma there: as claimed.
+minus right, of (1.1) solved for Omega', with the claimed omega and gamma.
 Equations, and alpha and k of the paper: `heavytop docs claim`."""
 _RESIDUAL = 20
 """Characters of a line of a residual: what a terminal of 80 columns leaves to it."""

@@ -33,7 +33,14 @@ from heavytop.integrate.trajectory import EnsembleObserver, Finished, Outcome, P
 from heavytop.multiword.codegen.machine_code import LANES, Doubles
 from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
 from heavytop.multiword.double_double.double_double_run import terms
-from heavytop.multiword.double_double.eight_lane_run import LEFT, Eight, exact_state
+from heavytop.multiword.double_double.eight_lane_run import (
+    LARGER_N0,
+    LEFT,
+    NON_FINITE,
+    TOO_SMALL,
+    Eight,
+    exact_state,
+)
 from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
 from heavytop.multiword.pairs import Numerators, Pairs
 from heavytop.multiword.problem import Scaled
@@ -267,23 +274,18 @@ def double_double_states(
     parameters: NDArray[numpy.float64],
     starts: NDArray[numpy.float64],
     times: Sequence[Fraction],
-    tolerance: Fraction,
+    tolerances: Sequence[Fraction],
     step_limit: int,
-) -> tuple[Pairs, Any]:
-    """States (motions, samples, 6) of heavy tops, and which motions they are good for: the others need more care.
+) -> list[tuple[Pairs, Any]]:
+    """States (motions, samples, 6) of heavy tops by each tolerance, and which motions they are good for: the others
+    need more care.
 
     parameters: doubles (motions, 6), I and n.  starts: (motions, 6).  times: doubles, increasing from above 0.
     """
-    arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
-    assert arithmetic is not None
     compiled_lanes(HEAVY_TOP)
     with numpy.errstate(all="ignore"):
-        run = _Grid(parameters, starts, numpy.array([float(time) for time in times]))
-        pending, low_order = numpy.flatnonzero(run.usual), first_low_order(arithmetic)
-        while len(pending) and low_order < arithmetic.in_lanes.order:
-            pending = run.advance(pending, arithmetic, low_order, step_limit)
-            low_order += _RISE
-        return run.states(), run.good
+        grid = _Grid(parameters, starts, numpy.array([float(time) for time in times]))
+        return [grid.run(tolerance, step_limit) for tolerance in tolerances]
 
 
 class _Grid:
@@ -305,8 +307,6 @@ class _Grid:
         self.times = numpy.ldexp(times[None, :], rate[:, None])
         self.order = numpy.argsort(numpy.maximum(speed, numpy.sqrt(torque)), kind="stable")
         self.usual = self._are_usual()
-        self.good = numpy.zeros(len(starts), bool)
-        self.samples = numpy.full((len(starts), len(times), 12), numpy.nan)
 
     def _are_usual(self) -> Any:
         """Motions of which double-double keeps every component, that do not rest."""
@@ -321,8 +321,20 @@ class _Grid:
         bounded = (constants < _LARGE).all(axis=1) & (numpy.abs(self.exponents) < 300).all(axis=1)
         return fine & turning & bounded & numpy.isfinite(self.begin).all(axis=1)
 
-    def advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
-        """All these motions, those of like rates side by side; gives those that need a larger n0."""
+    def run(self, tolerance: Fraction, step_limit: int) -> tuple[Pairs, Any]:
+        """The states by this tolerance, and the motions that they are good for."""
+        arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
+        assert arithmetic is not None
+        self.good = numpy.zeros(len(self.begin), bool)
+        self.samples = numpy.full((*self.times.shape, 12), numpy.nan)
+        pending, low_order = numpy.flatnonzero(self.usual), first_low_order(arithmetic)
+        while len(pending) and low_order < arithmetic.in_lanes.order:
+            pending = self._advance(pending, arithmetic, low_order, step_limit)
+            low_order += _RISE
+        return self._states(), self.good
+
+    def _advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
+        """Take all these motions, those of like rates side by side; gives those that need a larger n0."""
         position = numpy.empty(len(self.order), int)
         position[self.order] = numpy.arange(len(self.order))
         ordered = pending[numpy.argsort(position[pending])]
@@ -331,8 +343,7 @@ class _Grid:
         for first in range(0, len(ordered), LANES):
             eights = ordered[numpy.minimum(numpy.arange(first, first + LANES), len(ordered) - 1)]
             self._eight(eight, eights, step_limit)
-            outgrown = [eight.status(lane) is None for lane in range(LANES)]
-            larger += eights[outgrown].tolist()
+            larger += eights[(eight.flags & (LARGER_N0 | NON_FINITE | TOO_SMALL)) == LARGER_N0].tolist()
             self.good[eights] = (eight.flags == 0) & (eight.clock[LEFT] > 0)
         return numpy.unique(numpy.array(larger, int))
 
@@ -343,8 +354,8 @@ class _Grid:
         for sample, targets in enumerate(self.times[eights].T):
             self.samples[eights, sample] = eight.reach_all(targets).T
 
-    def states(self) -> Pairs:
-        """In the units of the problems; NaN where they are not good."""
+    def _states(self) -> Pairs:
+        """The samples in the units of the problems; NaN where they are not good."""
         high, low = (numpy.ldexp(self.samples[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
         total = high + low
         bad = ~self.good

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 import numpy
 
 from heavytop import precision as vectors
-from heavytop.errors import InputError, PeerFailed, quoted
+from heavytop.errors import InputError, PeerFailed, Unsupported, quoted
 from heavytop.integrate.peers.contract import DEFAULT_STEP, Declared, of_quaternion, quaternion, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.multiword.codegen.machine_code import Doubles
@@ -212,7 +212,7 @@ def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
 
 def _given(name: str, control: str, problem: Problem, times: Sequence[Fraction], value: Fraction) -> Request:
     if problem.precision != DOUBLE:
-        raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
+        raise Unsupported(f"{name} has no {problem.precision.name}.", "Use double.")
     if value <= 0 or (control == "tolerance" and value > 1):
         limits = "between 0 and 1" if control == "tolerance" else "above 0"
         raise InputError(f"{name} cannot use the {control} {decimal_text(value, 6)}.", f"Give one {limits}.")

@@ -46,6 +46,7 @@ from heavytop.report.document.svg import (
     spoken,
 )
 from heavytop.report.render.page import digits_until, sections
+from heavytop.report.render.text import COMPUTED
 
 _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")
@@ -124,8 +125,9 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     if _FITTED.label in section.legend:
         section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
         section.notes.append(
-            "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
-            "exponential, over the span that was fitted, and the 95 % interval as a fan."
+            "Dashed, and in words at its end: the fitted law of growth with its exponent over the span that was "
+            "fitted, and the 95 % interval as a fan. The rate of an exponential is the median over the starts; the "
+            "root mean square follows the fastest of them."
         )
     return section
 
@@ -221,7 +223,7 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
 def _law_short(law: Law) -> str:
     """Few enough letters to stand beside a curve."""
     if law.exponent is None or law.growth == "unresolved":
-        return "no law"
+        return law.growth if law.exponent is None else "unresolved"
     if law.growth == "bounded":
         return law.growth
     return f"e^({law.exponent:.2g} t)" if law.growth == "exponential" else f"{law.growth} ({law.exponent:z.2f})"
@@ -265,12 +267,14 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Digits right at every sample up to a time: −log10 of the largest |error|/max(1, |true value|) of a "
             "component of Ω or γ, compared with the reference; of many starts the root mean square. A bar is the "
             "interval in which rounding noise alone moves it; dashed: all digits of the format. × is a run that "
-            "failed, or whose error is not available.",
+            "failed, or whose error is not available; the line from a dot leads to its label alone.",
         ],
         columns=["case", "format", "T", "samples", "digits right", "of digits", "± digits"],
         across=2,
         place=10,
     )
+    if any(row.reference.how == "computed" for _, row in runs):
+        section.notes.append(COMPUTED)
     wanted = set(first)
     lanes: dict[str, list[_Run]] = {}
     for source, row in sorted(runs, key=lambda run: (bool(run[1].key.subject.variant), run[1].case not in wanted)):

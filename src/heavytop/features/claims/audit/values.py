@@ -462,7 +462,7 @@ class _KnownNumbers:
             return state[:3] if quantity == "omega" else state[3:6]
         if self.start.attitude is None:
             return self._height(self.motion.state(time, bits), bits)
-        return self._output(Output(quantity.replace("_", "-")), self.motion.whole(time, bits)[1](time, bits), bits)
+        return self._output(Output(quantity.replace("_", "-")), self.motion.with_attitude(time, bits), bits)
 
     @whole_evaluation
     def _height(self, state: Sequence[arb], bits: int) -> list[arb]:

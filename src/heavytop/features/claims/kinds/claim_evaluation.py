@@ -21,7 +21,7 @@ from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, 
 from heavytop.report.document.document import Block, Cell, Chart, Headline, Value, short
 from heavytop.report.document.document import Table as Cells
 from heavytop.report.render.text import both, largest_over
-from heavytop.report.store.checks import CLOSE, sizes
+from heavytop.report.store.checks import CLOSE, peak
 from heavytop.top.equations import GYROSTAT
 
 NAME = "claim_evaluation"
@@ -112,13 +112,8 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
             if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
                 yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
-            sizes_of_series = sizes(series)
-            if (
-                worst is not None
-                and worst.log10 is not None
-                and sizes_of_series
-                and abs(max(sizes_of_series) - worst.log10) > CLOSE
-            ):
+            largest = None if worst is None or worst.log10 is None else peak(series)
+            if worst is not None and largest is not None and abs(largest - (worst.log10 or 0.0)) > CLOSE:
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
