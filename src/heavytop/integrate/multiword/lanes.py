@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from itertools import permutations
@@ -53,17 +53,17 @@ _RISE = 2
 
 @dataclass(slots=True, eq=False)
 class _Motion(LaneRun):
-    """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
+    """A problem on its way; instants: its exact times; moved: its words, between two eights."""
 
     scaled: Scaled
     exponents: tuple[int, ...]
-    targets: list[Fraction]
+    instants: list[Fraction]
     moved: tuple[Doubles, Doubles] | None = None
 
     @property
     def target(self) -> Fraction:
-        """The next of its times."""
-        return self.targets[len(self.times)]
+        """The next of its times, |τ|."""
+        return abs(self.instants[len(self.times)]) * self.scaled.rate
 
     def native(self, words: Doubles) -> Any:
         """A state in words of its units, rounded to the format; None where a number is too large for it."""
@@ -81,33 +81,27 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
     return max(LEAST_LOW_ORDER, ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach))
 
 
+@dataclass(slots=True)
 class WordsLanes:
     """The eight lanes of a thread.
 
     seconds: of compiling.  others: where problems go that need another arithmetic.
     """
 
-    def __init__(
-        self,
-        work: Work,
-        arithmetic: DoubleDouble,
-        tolerance: Fraction | None,
-        seconds: float,
-        others: deque[tuple[int, Problem]],
-    ) -> None:
-        self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
-        self.others = others
-        self.forwards = bool(work.targets[-1] >= 0)
-        self.targets: dict[Fraction, list[Fraction]] = {}
-        self.lanes: dict[int, _Motion] = {}
-        self.waiting: deque[_Motion] = deque()
-        self.outgrown: deque[_Motion] = deque()
-        self.chunk = _FIRST_CHUNK
+    work: Work
+    arithmetic: DoubleDouble
+    tolerance: Fraction | None
+    seconds: float
+    others: deque[tuple[int, Problem]] = field(default_factory=deque)
+    lanes: dict[int, _Motion] = field(default_factory=dict)
+    waiting: deque[_Motion] = field(default_factory=deque)
+    outgrown: deque[_Motion] = field(default_factory=deque)
+    chunk: int = _FIRST_CHUNK
 
-    def _own_flags(self) -> dict[str, str]:
-        schedule = self.arithmetic.in_lanes
-        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
-        return {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
+    @property
+    def forwards(self) -> bool:
+        """Whether time is positive."""
+        return bool(self.work.targets[-1] >= 0)
 
     def run(self) -> None:
         """Until no problem is left, with n0 rising for those that outgrow it."""
@@ -144,9 +138,7 @@ class WordsLanes:
             if own != self.arithmetic:
                 self.others.append(taken)
                 continue
-            if scaled.rate not in self.targets:
-                self.targets[scaled.rate] = [abs(time) * scaled.rate for time in self.work.times]
-            motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.targets[scaled.rate])
+            motion = _Motion(index, problem, perf_counter(), scaled, scaled.exponents, self.work.times)
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
@@ -205,8 +197,11 @@ class WordsLanes:
         self._finish(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
 
     def _finish(self, motion: _Motion, outcome: Outcome, reached: Fraction, steps: int) -> None:
-        order, flags = self.arithmetic.in_lanes.order, self.arithmetic.flags | self._own_flags()
-        self.work.end(motion, "multiword", outcome, reached, steps, order, self.seconds, flags)
+        schedule = self.arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{schedule.reach:.3f}, ten bits"
+        own = {"lanes": str(LANES), "order": str(schedule.order), "step_rule": rule}
+        flags = self.arithmetic.flags | own
+        self.work.end(motion, "multiword", outcome, reached, steps, schedule.order, self.seconds, flags)
 
 
 # Many motions in multi-word arithmetic: eight in lanes where double-double serves, threads on top.
@@ -242,10 +237,10 @@ def propagate_multiword_ensemble(
 
 def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
     """One thread of lanes, and afterwards those that need another arithmetic."""
-    others: deque[tuple[int, Problem]] = deque()
-    WordsLanes(work, arithmetic, tolerance, seconds, others).run()
-    while others:
-        _alone(work, tolerance, *others.popleft())
+    lanes = WordsLanes(work, arithmetic, tolerance, seconds)
+    lanes.run()
+    while lanes.others:
+        _alone(work, tolerance, *lanes.others.popleft())
 
 
 def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
