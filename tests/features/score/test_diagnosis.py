@@ -8,7 +8,8 @@ import pytest
 
 from heavytop.cases import CASES
 from heavytop.features.score.diagnose.diagnosis import diagnose
-from heavytop.features.score.diagnose.samples import Diagnosis, motion
+from heavytop.features.score.diagnose.samples import motion
+from heavytop.features.score.diagnose.search import Diagnosis
 from heavytop.features.score.text import diagnosis_text, sentence
 from heavytop.measure.scalar import roundings
 from heavytop.precision import DOUBLE, QUAD

@@ -16,7 +16,8 @@ from heavytop.cases import Case
 from heavytop.errors import HeavyTopError
 from heavytop.exact.flint.balls import whole_evaluation, working_precision
 from heavytop.features.score.diagnose.readings import Seen, disagreement
-from heavytop.features.score.diagnose.samples import WORTH_ASKING, Diagnosis, FileAxes, rounded, turning_rate
+from heavytop.features.score.diagnose.samples import FileAxes, turning_rate
+from heavytop.features.score.diagnose.search import WORTH_ASKING, Diagnosis, rounded
 from heavytop.features.score.trajectories.observed import GivenTrajectory, Observed
 from heavytop.harness.plan import log_spaced
 from heavytop.harness.rows import Task, computed_row, data_of, seconds_a_step

@@ -8,7 +8,7 @@ samples are judged by themselves as well, and where nothing does better a fall b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -32,24 +32,22 @@ from heavytop.features.score.diagnose.readings import (
     simulate,
     turning,
 )
-from heavytop.features.score.diagnose.samples import (
-    ALIKE,
+from heavytop.features.score.diagnose.samples import looked_at, named, notable, principal, refused
+from heavytop.features.score.diagnose.search import (
+    AS_LIKELY,
     DROP,
     FIRST,
     FITTED_DROP,
-    FLOOR,
     LIKELY_DROP,
     WORTH_ASKING,
     Array,
     Diagnosis,
-    looked_at,
-    named,
-    notable,
-    principal,
-    refused,
+    Hypothesis,
+    Search,
+    scope,
 )
 from heavytop.measure.attitude_error import FORMS
-from heavytop.precision import decimal_text, plain_decimal
+from heavytop.precision import decimal_text
 from heavytop.top.attitude import SEQUENCES
 
 _NEIGHBOURS = 60
@@ -58,8 +56,6 @@ _TWO_MISTAKES = 0.05
 """Relative errors below it are not those of two mistakes of convention at once."""
 _CONTRADICTS = 0.1
 """Ω that is off the rate of the attitude by less, relative to it, may be as right as the method."""
-AS_LIKELY = 3.0
-"""Of likely suppositions whose errors differ by less, the simplest is named."""
 _REFINED = 4
 _NO_SHIFT = Fraction(0)
 _FEWEST = 4
@@ -72,7 +68,6 @@ _START_DROP = 1e5
 """How far the error must fall for a start, whose six numbers may also carry the errors of first steps."""
 Move = Callable[[Any], tuple[BodyData, Beginning]]
 """A body and a start from numbers that are 0 for those of the file."""
-_MOST_OTHERS = 3
 _SAME = 1e-9
 """A rotation that was fitted is a renaming of the axes within that."""
 _LENGTHS = {"1000": 1e3, "100": 1e2, "1/1000": 1e-3, "1/100": 1e-2, "1/0.3048": 1 / 0.3048, "0.3048": 0.3048}
@@ -112,10 +107,6 @@ class _Try:
     begin: Beginning | None = None
     is_round: bool = False
 
-    def least_fall(self, likely: float) -> float:
-        """How far the error must fall; by less, ``likely`` or for a round number DROP, where it need only be likely."""
-        return self.drop if not likely else likely if self.drop == DROP else DROP if self.is_round else self.drop
-
 
 def _course(
     seen: Seen,
@@ -130,46 +121,38 @@ def _course(
     return simulate(body, begin, tuple(float(time + shift if shift else time) for time in seen.times))
 
 
-class Suppositions:
+class Suppositions(Search):
     """Mistakes that a file may have, and the error of each of its samples with them.
 
     step: of the method, where the file says it.
     """
 
+    names_others = True
+
     def __init__(self, seen: Seen, step: Fraction | None = None) -> None:
         self.step, self.start = step, seen.start.begin(seen.said, seen.body.tensor)
         rate = turning(seen.body, self.start)
         self.every, self.seen = seen, seen.at(looked_at(list(map(float, seen.times)), rate))
-        first = FIRST[-1] + (not self.seen.times[0])
-        self.early = self.seen.at(list(range(min(len(self.seen.times), first))))
+        self.times, self.states = self.seen.times, len(seen.times)
+        first = FIRST[-1] + (not self.times[0])
+        self.early = self.seen.at(list(range(min(len(self.times), first))))
         self.own = errors(self.seen, _course(self.seen), seen.said, seen.body)
-        self.tried: list[tuple[_Try, Array]] = []
 
-    def sure(self, first: int | None = None, drop: float = 0.0) -> Diagnosis | None:
-        """The simplest mistake among those that explain the columns about as well as the best; None where none does.
+    def hypotheses(self) -> Iterator[Hypothesis]:
+        """The simplest first, those with a fitted number last."""
+        return map(self._tried, _suppositions(self))
 
-        first: of the first samples alone, where no number is fitted.  drop: a smaller one than usual.
-        """
-        looked = len(self.own) if first is None else first + (not self.seen.times[0])
-        own = float(self.own[:looked].max())
-        if not own > WORTH_ASKING or looked > len(self.own):
-            return None
-        own = own if numpy.isfinite(own) else 1.0
-        if not self.tried:
-            self.tried = [(attempt, self._left(attempt)) for attempt in _suppositions(self)]
-        tried = [(attempt, each_error) for attempt, each_error in self.tried if first is None or attempt.drop == DROP]
-        best = self._best(tried, own, looked, drop)
-        if best is None and first is None and not drop and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
-            pairs = [(attempt, self._left(attempt)) for attempt in _pairs(self.seen)]
-            best = self._best(pairs, own, looked)
-        return best
+    def further(self, diagnosis: Diagnosis | None, own: float) -> Iterator[Hypothesis]:
+        """Two readings at once."""
+        if diagnosis is None and own > _TWO_MISTAKES and _forms(self.seen) & set(FORMS):
+            yield from map(self._tried, _pairs(self.seen))
 
     def of_start(self) -> Diagnosis | None:
         """Another start: with its six numbers it also follows what is only early or late, and is tried last."""
         own = float(self.own.max())
         if not WORTH_ASKING < own < numpy.inf or len(self.own) < _FEWEST:
             return None
-        return self._best([(attempt, self._left(attempt)) for attempt in _start(self)], own, len(self.own))
+        return self.best([*map(self._tried, _start(self))], own)
 
     def of_rates(self) -> Diagnosis | None:
         """The simplest reading of the columns in which Ω is the rate of the attitude; it needs no motion."""
@@ -183,13 +166,8 @@ class Suppositions:
             key=lambda entry: entry[0],
             default=(own, "", {}),
         )
-        return self._told(kind, {**numbers, "of": RATES}, own, left, seen) if left * DROP <= own else None
-
-    def _told(self, kind: str, numbers: dict[str, str], own: float, left: float, seen: Seen) -> Diagnosis:
-        """The diagnosis, found in the samples that were ``seen``."""
-        looked, states = len(seen.times), len(self.every.times)
-        until = None if looked == states else (looked, states, plain_decimal(seen.times[-1], 6))
-        return Diagnosis(kind, numbers, own, left, until)
+        looked = scope(seen.times, self.states)
+        return Diagnosis(kind, {**numbers, "of": RATES}, own, left, looked) if left * DROP <= own else None
 
     @cached_property
     def refused(self) -> float:
@@ -200,13 +178,15 @@ class Suppositions:
         early, largest = (max((float(numpy.abs(values).max()) for values in part), default=1.0) for part in rates)
         return refused(early, largest, float(self.own.max()))
 
-    def _left(self, attempt: _Try) -> Array:
-        """The error of each sample; where a motion has to be computed, infinite behind the first if these refuse it."""
+    def _tried(self, attempt: _Try) -> Hypothesis:
+        """The hypothesis; of a motion that has to be computed, errors behind first ones that refuse it are infinite."""
+        numbers, drop, is_round = {"of": DATA, **attempt.numbers}, attempt.drop, attempt.is_round
         if attempt.start is not None or attempt.body is not None or attempt.shift or attempt.begin is not None:
             early = self._error(attempt, self.early)
             if not float(early.max()) <= self.refused:
-                return numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
-        return self._error(attempt, self.seen)
+                early = numpy.append(early, numpy.full(len(self.own) - len(early), numpy.inf))
+                return Hypothesis(attempt.kind, numbers, early, drop, is_round)
+        return Hypothesis(attempt.kind, numbers, self._error(attempt, self.seen), drop, is_round)
 
     @staticmethod
     def _error(attempt: _Try, seen: Seen) -> Array:
@@ -223,30 +203,6 @@ class Suppositions:
             name, matrix = attempt.mixed
             seen = replace(seen, columns={**seen.columns, name: seen.columns[name] @ matrix})
         return errors(seen, course, attempt.columns or seen.said, body)
-
-    def _best(
-        self, tried: Sequence[tuple[_Try, Array]], own: float, looked: int, drop: float = 0.0
-    ) -> Diagnosis | None:
-        largest = [(attempt, float(left[:looked].max())) for attempt, left in tried]
-        explained = [(attempt, left) for attempt, left in largest if left * attempt.least_fall(drop) <= own]
-        if not explained:
-            return None
-        best = min(max(left, FLOOR) for _, left in explained)
-        alike = [(attempt, left) for attempt, left in explained if left <= (AS_LIKELY if drop else ALIKE) * best]
-        first, _ = alike[0]
-        first, left = _of_kind(first.kind, alike)
-        # with a number that was fitted more can be explained
-        equal = [pair for pair in alike if pair[0].drop <= first.drop and pair[0].kind != first.kind]
-        kinds = list(dict.fromkeys(attempt.kind for attempt, _ in equal))[:_MOST_OTHERS]
-        others = tuple(Diagnosis(kind, {"of": DATA, **_of_kind(kind, equal)[0].numbers}) for kind in kinds)
-        numbers = {"of": DATA, **first.numbers} | ({"or": ", ".join(kinds)} if kinds else {})
-        diagnosis = self._told(first.kind, numbers, own, left, self.seen.at([*range(looked)]))
-        return replace(diagnosis, likely=bool(drop), others=others)
-
-
-def _of_kind(kind: str, tried: Sequence[tuple[_Try, float]]) -> tuple[_Try, float]:
-    """The attempt of a kind whose number fits best, and the error that it leaves."""
-    return min((pair for pair in tried if pair[0].kind == kind), key=lambda pair: max(pair[1], FLOOR))
 
 
 def _suppositions(suppositions: Suppositions) -> Iterator[_Try]:

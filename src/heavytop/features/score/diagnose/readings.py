@@ -11,7 +11,8 @@ from types import SimpleNamespace
 
 import numpy
 
-from heavytop.features.score.diagnose.samples import Array, floats, motion_in_double, principal
+from heavytop.features.score.diagnose.samples import floats, motion_in_double, principal
+from heavytop.features.score.diagnose.search import Array
 from heavytop.measure.attitude_error import UPS, Convention
 from heavytop.precision import cross
 from heavytop.top.attitude import matrix_of_quaternion, quaternion_products, rows_of, rows_of_euler
