@@ -635,7 +635,7 @@ _WITHIN = 0.3
 """A place of the grid is tried if the first state is so near to it, relative to the size of the motion."""
 _TRIED = 12
 _REFINED = 6
-FALLS = 1.5
+_FALLS = 1.5
 """Factor by which the sum of squares falls while a number is refined."""
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is not a shift."""
@@ -757,22 +757,34 @@ def _moved(kind: str, number: float, times: Array) -> Array:
 
 
 def _refined(run: Examined, kind: str, number: float, times: Array, sizes: Array) -> Iterator[tuple[float, Array]]:
-    """The number by Gauss-Newton, with the errors that it leaves; the rate of the motion is a difference quotient."""
-    small, count, before = 1e-6 / run.rate, len(times), numpy.inf
-    for _ in range(_REFINED):
-        at = _moved(kind, number, times)
-        both = run.supposed([*map(Fraction, at), *map(Fraction, at + small)])
-        if both is None:
-            return
-        here, slope = both[:count], (both[count:] - both[:count]) / small / sizes
-        off = (run.states - here) / sizes
-        if not FALLS * (size := float(numpy.nansum(off * off))) < before:
+    """The number that fits best, with the errors that it leaves; none where the motion is not known there."""
+
+    def off(x: Array) -> Array:
+        at = _moved(kind, x[0], times)
+        known = run.supposed([*map(Fraction, at)]) if numpy.isfinite(at).all() else None
+        return numpy.full(1, numpy.inf) if known is None else numpy.nan_to_num((known - run.states) / sizes).reshape(-1)
+
+    small = 1e-6 / run.rate / (1.0 if kind == "times_shifted" else abs(times).max())
+    x, here = gauss_newton(off, numpy.array([number]), small, _REFINED)
+    if numpy.isfinite(here).all():
+        yield float(x[0]), run.beside([Fraction(value) for value in _moved(kind, x[0], times)])
+
+
+def gauss_newton(off: Callable[[Array], Array], x: Array, slight: float, most: int) -> tuple[Array, Array]:
+    """Numbers and residuals ``off``, as far as each of so many steps makes their sum of squares smaller.
+
+    slight: of a number, in a difference quotient.
+    """
+    here = off(x)
+    for _ in range(most):
+        slopes = [(off(x + slight * unit) - here) / slight for unit in numpy.eye(len(x))]
+        if not all(numpy.isfinite(part).all() for part in (here, *slopes)):
+            break
+        after = x - numpy.linalg.lstsq(numpy.stack(slopes, axis=1), here, rcond=None)[0]
+        there = off(after)
+        if not float(there @ there) < float(here @ here):
+            break
+        falls, x, here = float(here @ here) > _FALLS * float(there @ there), after, there
+        if not falls:
             break  # at the least of it
-        slope, before = slope * (1.0 if kind == "times_shifted" else times[:, None]), size
-        square = float((slope * slope)[~numpy.isnan(run.states)].sum())
-        if not square:
-            return
-        number += float(numpy.nansum(slope * off)) / square
-        if not abs(_moved(kind, number, times)).max() * run.rate <= FARTHEST:
-            return
-    yield number, run.beside([Fraction(value) for value in _moved(kind, number, times)])
+    return x, here
