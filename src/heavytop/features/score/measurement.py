@@ -161,20 +161,15 @@ def _disagreements(seen: Seen, times: Sequence[Fraction]) -> list[Diagnosis]:
 
 def used(observed: Observed) -> str:
     """Which columns were scored, and how they were read."""
-    said, parts = observed.said, []
-    for name in observed.names:
-        text = _WORDS[name]
-        if name == "quaternion":
-            text += f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})"
-        elif name == "matrix":
-            text += f" ({said.matrix.replace('_', ' ')})"
-        elif name == "euler":
-            text += f" ({said.sequence}, {said.angles})"
-        elif name == "position":
-            text += " of the centre of mass" if said.point is None else " of the point"
-        parts.append(text)
-    up = "" if not set(observed.names) - {"omega", "gamma"} else f"; {said.up} points up"
-    return f"Scored: {', '.join(parts)}{up}."
+    said = observed.said
+    how = {
+        "quaternion": f" ({said.quaternion_order}, {said.quaternion.replace('_', ' ')})",
+        "matrix": f" ({said.matrix.replace('_', ' ')})",
+        "euler": f" ({said.sequence}, {said.angles})",
+        "position": " of the centre of mass" if said.point is None else " of the point",
+    }
+    up = f"; {said.up} points up" if set(observed.names) - {"omega", "gamma"} else ""
+    return f"Scored: {', '.join(_WORDS[name] + how.get(name, '') for name in observed.names)}{up}."
 
 
 PEER = "heyoka"

@@ -18,7 +18,6 @@ from operator import add
 from typing import Any, TypeVar
 
 import numpy
-from numpy.typing import NDArray
 
 from heavytop.errors import InputError
 from heavytop.features.score.diagnose.samples import (
@@ -63,80 +62,52 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
 """Factor of Ω, factor of γ, and whether M stands in place of Ω."""
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnsHypothesis:
-    """A meaning of the six columns.
+def _readings() -> Iterator[tuple[int, str, dict[str, str], list[int], list[float]]]:
+    """Every reading of the columns but the plain one: how many things are other than they should be, kind and numbers.
 
-    meaning: a key of the table above.  axes: column i of a vector holds ±(axis |axes[i]|), counted from 1.
-    of: "both", "omega" or "gamma", the vectors whose axes these are.  swapped: γ stands before Ω.
+    Then for each column its place in Ω, γ and M of a motion, one after the other, and its factor.  Of renamed axes
+    column i of a vector holds ±(axis |axes[i]|), counted from 1, ``of`` both vectors or of one.
     """
-
-    meaning: str = ""
-    axes: tuple[int, int, int] = (1, 2, 3)
-    of: str = "both"
-    swapped: bool = False
-
-    @property
-    def changes(self) -> int:
-        """How many things are other than they should be."""
-        moved = self.axes != (1, 2, 3)
-        signs = sum(axis < 0 for axis in self.axes)
-        return bool(self.meaning) + ("_gamma_down" in self.meaning) + self.swapped + moved + signs + (self.of != "both")
-
-    @property
-    def places(self) -> tuple[list[int], list[float]]:
-        """The place of each column in Ω, γ and M of a motion, one after the other, and its factor."""
-        omega, gamma, momentum = _MEANINGS[self.meaning]
-        order, signs = [abs(axis) - 1 for axis in self.axes], [axis // abs(axis) for axis in self.axes]
-        plain = [0, 1, 2], [1, 1, 1]
-        vectors = []
-        for factor, start, other in ((omega, 6 * momentum, "gamma"), (gamma, 3, "omega")):
-            axes, turned = plain if self.of == other else (order, signs)
-            vectors.append(([start + axis for axis in axes], [factor * sign for sign in turned]))
-        (first, factors), (second, more) = reversed(vectors) if self.swapped else vectors
-        return first + second, factors + more
-
-    def leaving(self, errors: Array) -> Hypothesis:
-        """The mistake that such columns are."""
-        numbers = {"meaning": self.meaning} if self.meaning else {}
-        if self.axes != (1, 2, 3):
-            numbers |= {"axes": ",".join(map(str, self.axes)), "of": self.of}
-        if self.swapped:
-            numbers["order"] = "gamma before omega"
-        if len(numbers) == 1 and (self.meaning or self.swapped):
-            return Hypothesis(self.meaning or "columns_swapped", {}, errors)
-        return Hypothesis("columns" if self.meaning or self.swapped else "axes_permuted", numbers, errors)
-
-
-def _readings() -> Iterator[ColumnsHypothesis]:
-    renamed = [(a, b, c) for a, b, c in permutations((1, 2, 3))]
-    signed = [
-        (a * s, b * t, c * u) for a, b, c in renamed for s, t, u in product((1, -1), repeat=3) if (s, t, u) != (-1,) * 3
+    plain, renamed = (1, 2, 3), list(permutations((1, 2, 3)))
+    signs = [sign for sign in product((1, -1), repeat=3) if sign != (-1, -1, -1)]
+    kinds: list[tuple[str, tuple[int, ...]]] = [
+        ("both", (a * s, b * t, c * u)) for (a, b, c), (s, t, u) in product(renamed, signs)
     ]
-    kinds = [("both", axes) for axes in signed]
     kinds += [(of, axes) for of in ("omega", "gamma") for axes in renamed[1:]]
-    for meaning, swapped, (of, axes) in product(_MEANINGS, (False, True), kinds):
-        yield ColumnsHypothesis(meaning, axes, of, swapped)
+    for (meaning, (omega, gamma, momentum)), swapped, (of, axes) in product(_MEANINGS.items(), (False, True), kinds):
+        moved, reversed_axes = axes != plain, sum(axis < 0 for axis in axes)
+        changes = bool(meaning) + ("_gamma_down" in meaning) + swapped + moved + reversed_axes + (of != "both")
+        numbers = {"meaning": meaning} if meaning else {}
+        numbers |= {"axes": ",".join(map(str, axes)), "of": of} if moved else {}
+        numbers |= {"order": "gamma before omega"} if swapped else {}
+        kind = "columns" if meaning or swapped else "axes_permuted"
+        if len(numbers) == 1 and not moved:
+            kind, numbers = meaning or "columns_swapped", {}
+        columns = [
+            (first + abs(axis) - 1, factor * (axis // abs(axis)))
+            for first, factor, other in ((6 * momentum, omega, "gamma"), (3, gamma, "omega"))
+            for axis in (plain if of == other else axes)
+        ]
+        columns = columns[3:] + columns[:3] if swapped else columns
+        if changes:
+            yield changes, kind, numbers, [place for place, _ in columns], [factor for _, factor in columns]
 
 
 @cache
-def _every_reading() -> tuple[list[ColumnsHypothesis], NDArray[numpy.int64], Array]:
-    """Every reading that is tried, the simplest first, with the places and the factors of its columns."""
-    simplest = sorted((reading for reading in _readings() if reading.changes), key=lambda reading: reading.changes)
-    places, factors = zip(*(reading.places for reading in simplest), strict=True)
-    return simplest, numpy.array(places), numpy.array(factors)
+def _every_reading() -> tuple[tuple[Any, ...], ...]:
+    """Changes, kinds, numbers, places and factors of every reading, the simplest first."""
+    return tuple(zip(*sorted(_readings(), key=lambda reading: reading[0]), strict=True))
 
 
 def readings(run: Examined, truth: Array) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """The readings of the columns with one change, and those with several, the simplest first."""
     if len(run.frame.columns) < 6:
         return [], []
-    simplest, places, factors = _every_reading()
+    changes, kinds, numbers, places, factors = _every_reading()
     columns = numpy.hstack([truth[:, :6], truth[:, :3] @ run.tensor])
-    errors = run.errors((columns[:, places] * factors).swapaxes(0, 1))
-    tried = [reading.leaving(left) for reading, left in zip(simplest, errors, strict=True)]
-    single = sum(reading.changes == 1 for reading in simplest)
-    return tried[:single], tried[single:]
+    errors = run.errors((columns[:, numpy.array(places)] * numpy.array(factors)).swapaxes(0, 1))
+    tried = list(map(Hypothesis, kinds, numbers, errors))
+    return tried[: changes.count(1)], tried[changes.count(1) :]
 
 
 def scaled(run: Examined, truth: Array) -> Iterator[Hypothesis]:
