@@ -260,15 +260,15 @@ def assess(trajectory: GivenTrajectory, progress: Progress = lambda: None) -> As
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
     scored = measured(trajectory, progress)
-    count, told = len(_finite(trajectory)), _of_clock(trajectory, scored.row)
-    explained = scored if told is None else told[1]
-    said = diagnoses(trajectory if told is None else told[2], _size(explained.row), explained.errors) if count else []
+    count = len(_finite(trajectory))
+    clock, explained, moved = _of_clock(trajectory, scored.row) or (None, scored, trajectory)
+    said = diagnoses(moved, _size(explained.row), explained.errors) if count else []
     written = [] if trajectory.observed is not None else roundings(_finite(trajectory), trajectory.precision)
     single = [rounding.kind for rounding in written[:1]] == ["single"]
     peer = _peer(trajectory, scored, count, progress)
     columns = "" if trajectory.observed is None else used(trajectory.observed)
-    clock = [] if told is None else [told[0]]
-    return Assessment(scored.row, peer, clock + said, trajectory.format_guessed, single, columns, trajectory.cut)
+    said = said if clock is None else [clock, *said]
+    return Assessment(scored.row, peer, said, trajectory.format_guessed, single, columns, trajectory.cut)
 
 
 def _of_clock(trajectory: GivenTrajectory, row: Row) -> tuple[Diagnosis, Scored, GivenTrajectory] | None:
@@ -353,6 +353,7 @@ def _finite(trajectory: GivenTrajectory) -> list[tuple[Fraction, ...]]:
 
 
 def _size(row: Row) -> float | None:
+    """The largest |error|/max(1, |value|), or its bound; None without a reference."""
     metric = row.metrics.get(RELATIVE.text)
     if metric is None or not (_is_number(metric) or metric.bound is not None):
         return None

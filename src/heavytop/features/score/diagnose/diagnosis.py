@@ -35,6 +35,7 @@ from heavytop.features.score.diagnose.search import (
     Hypothesis,
     Search,
     rounded,
+    scope,
 )
 from heavytop.measure.scalar import EXPLAINS, LEAST, Rounding, roundings
 from heavytop.precision import Precision, decimal_text
@@ -155,7 +156,7 @@ class OfStates(Search):
         self.truth = examined.supposed(examined.times)
         self.own = examined.errors(self.truth)
         self.examined = examined.refusing(float(self.own.max()))
-        self.times, self.states = [t * examined.units.time for t in examined.times], len(examined.all_times)
+        self.times, self.states = examined.given_times, len(examined.all_times)
 
     def hypotheses(self) -> Iterator[Hypothesis]:
         """The simplest first, those with a fitted number last."""
@@ -289,10 +290,9 @@ def _jumps(examined: Examined | None, times: Sequence[Fraction], last: int, erro
 
 def _looked_at(examined: Examined, diagnosis: Diagnosis | None) -> Diagnosis | None:
     """The diagnosis with how many of the states it was found in, where that is not all of them."""
-    looked, all_of_them = len(examined.rows), len(examined.all_times)
-    if diagnosis is None or looked == all_of_them:
-        return diagnosis
-    return replace(diagnosis, looked_at=(looked, all_of_them, in_units(examined.times[-1], examined.units.time)))
+    if diagnosis is None:
+        return None
+    return replace(diagnosis, looked_at=scope(examined.given_times, len(examined.all_times)))
 
 
 def _lost_row(every: Examined) -> Diagnosis | None:

@@ -111,6 +111,11 @@ class Examined:
         return [self.all_times[row] for row in self.rows]
 
     @property
+    def given_times(self) -> list[Fraction]:
+        """Times of these rows in the unit of the file."""
+        return [time * self.units.time for time in self.times]
+
+    @property
     def is_whole(self) -> bool:
         """Whether Ω and γ are known in every sample."""
         return not numpy.isnan(self.states[:, :6]).any()
